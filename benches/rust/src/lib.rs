@@ -1,0 +1,1 @@
+//! Nothing of its own: the benchmarks stand beside `Cargo.toml`.

@@ -1,0 +1,262 @@
+"""What the Rust core offers to the Python package.
+
+Everything here converts and decides nothing. Programs use `drivebus`, not this module.
+Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing was sent.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, final
+
+from typing_extensions import Buffer
+
+__version__: Final[str]
+
+def crc16(data: Buffer, /) -> int:
+    """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
+
+def encode_read(unit: int, address: int, count: int, /) -> bytes:
+    """A whole 03H request frame: *unit* 1..=247, *address* 0..=0xFFFF, *count* 1..=125 words."""
+
+def encode_write(unit: int, address: int, value: int | Sequence[int], /) -> bytes:
+    """A whole 06H (an int) or 10H (a sequence of 1..=123 ints) request frame; values 0..=0xFFFF; *unit* 0 is broadcast."""
+
+def encode_echo(unit: int, word: int, /) -> bytes:
+    """A whole 08H/0000 request frame with *word* 0..=0xFFFF."""
+
+def decode_answer(request: Buffer, frame: Buffer, /) -> list[int] | None:
+    """The words that *frame* answers to *request*; None for a confirmed write or echo.
+
+    Raises CrcError, BadAnswer, Refused; NotAllowed where *request* is no request.
+    """
+
+def decode(frame: Buffer, /) -> dict[str, Any]:
+    """Any frame as fields: `unit`, `function`, `kind`, `crc`, and those of its kind.
+
+    `kind` is `"read"`, `"write"`, `"write_many"`, `"echo"` (requests and answers that look alike),
+    `"read_answer"`, `"write_many_answer"`, `"exception"`, `"other"`. Raises CrcError, BadAnswer.
+    """
+
+@final
+class SerialFormat:
+    """How characters look on the wire, and how long they take."""
+
+    def __new__(
+        cls,
+        baudrate: int = 19200,
+        parity: str = "E",
+        stopbits: int = 1,
+        bytesize: int = 8,
+        silence: str | float = "spec",
+    ) -> SerialFormat: ...
+    @property
+    def baudrate(self) -> int:
+        """Bits per second."""
+    @property
+    def parity(self) -> str:
+        """`"N"`, `"E"` or `"O"`."""
+    @property
+    def stopbits(self) -> int:
+        """1 or 2."""
+    @property
+    def bytesize(self) -> int:
+        """7 or 8."""
+    @property
+    def silence(self) -> str | float:
+        """`"spec"`, `"characters"`, or seconds."""
+    @property
+    def bits_per_char(self) -> int:
+        """Start, data, parity and stop bits."""
+    @property
+    def char_time(self) -> float:
+        """Seconds for one character."""
+    @property
+    def t15(self) -> float:
+        """Longest gap inside a frame, in seconds."""
+    @property
+    def t35(self) -> float:
+        """Shortest silence between frames, in seconds."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Bus:
+    """One line and its owner. Every method is safe from any thread and lets go of the GIL."""
+
+    def __new__(
+        cls,
+        port: object,
+        format: SerialFormat,
+        *,
+        timeout: float = 0.5,
+        retries: int = 2,
+        read_only: bool = False,
+        rs485: Mapping[str, object] | None = None,
+        echo: str = "auto",
+    ) -> Bus:
+        """Opens *port*: a path, `socket://host:port`, `tcp://host:port`, a `Simulator`, or an object like `serial.Serial`."""
+    @property
+    def port(self) -> str:
+        """What was opened, for people."""
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def read_only(self) -> bool: ...
+    def close(self) -> None:
+        """Closes the port. Closing again does nothing."""
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+    def sleep(self, seconds: float, /) -> None:
+        """Waits on the line's clock; a signal ends it at once."""
+    def read(self, unit: int, address: int, count: int, /, *, timeout: float | None = None, retries: int | None = None) -> list[int]:
+        """03H: *count* words (1..=125) of *unit* (1..=247) from *address*."""
+    def read_stamped(self, unit: int, address: int, count: int, /) -> tuple[list[int], float, float]:
+        """As `read`, with the Unix times at which the request left and the answer was complete."""
+    def write(self, unit: int, address: int, value: int | Sequence[int], /) -> None:
+        """06H (an int) or 10H (a sequence). Sent once."""
+    def broadcast(self, address: int, value: int | Sequence[int], /) -> None:
+        """06H or 10H to every unit; returns after the turnaround delay."""
+    def echo(self, unit: int, word: int | None = None, /, *, timeout: float | None = None) -> float:
+        """08H/0000; the round trip in seconds on the line's clock."""
+    def transact(self, unit: int, pdu: Buffer, reply_length: int | None = None, /) -> bytes:
+        """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known."""
+    def stats(self) -> dict[str, Any]:
+        """`{"requests": …, "answers": …, …, "units": {1: {…}}}`; counters are ints, latencies seconds."""
+
+@final
+class Profile:
+    """What one family of drives means by its registers."""
+
+    @staticmethod
+    def builtin(name: str, /) -> Profile:
+        """A shipped profile. NotAllowed names the closest for a misspelt one."""
+    @staticmethod
+    def builtin_names() -> list[str]: ...
+    @staticmethod
+    def load(folder: str | os.PathLike[str], /) -> Profile:
+        """A folder with `profile.toml` and the CSV files. NotAllowed names file, line and reason."""
+    @property
+    def name(self) -> str: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def max_words(self) -> int:
+        """Most words in one read or write."""
+    def identify(self, code: int, /) -> str | None:
+        """The family that register 2103H names with *code*, by this profile's list; None if unknown."""
+    def names(self) -> list[str]:
+        """Every register name and parameter code, registers first, in address order."""
+    def monitor_names(self) -> list[str]:
+        """The registers that `Drive.monitor()` reads when it is given no names."""
+    def describe(self, name: str, /) -> dict[str, Any]:
+        """All that is known of one register or parameter.
+
+        Keys: `name`, `code` (or None), `label`, `kind` (`"register"` or `"parameter"`), `address`, `unit`, `scale`,
+        `signed`, `low`, `high`, `default`, `access` (`"rw"`, `"ro"`, `"run"`, `"stop"`, `"unknown"`),
+        `choices` ({int: str}), `bits` ({str: {int: str}} or None), `source`, `verified`, `note`.
+        """
+    def address(self, name: str, /, *, store: bool | None = None) -> int:
+        """The address of *name*; with *store* given, the one to write to for RAM (False) or EEPROM (True)."""
+    def decode(self, name: str, raw: int, /) -> int | float:
+        """*raw* (0..=0xFFFF) in engineering units: int where the drive counts or names, float where it measures."""
+    def encode(self, name: str, value: object, /) -> int:
+        """*value* (int, float, Decimal, or a choice's label) as a word. NotAllowed names value, range and unit."""
+    def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
+        """The fewest reads (address, count) that hold all *names*."""
+    def command(self, name: str, /) -> tuple[int, int]:
+        """Address and code of `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`, `jog_stop`."""
+    def is_command(self, address: int, /) -> bool:
+        """Whether a write to *address* can move a motor."""
+    def state(self, raw: int, /) -> str:
+        """State word 1 as `forward`, `reverse`, `stopped`, `fault`, `power_off`, `pre_exciting` or `unknown`."""
+    def control(self) -> list[dict[str, Any]]:
+        """What must be set before the drive obeys the bus: `code`, `value`, `label`, `verified`, `note`, in order."""
+    def fault(self, code: int, /) -> dict[str, Any]:
+        """`code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `source`; an unknown number says so in its label."""
+    def faults(self) -> list[dict[str, Any]]: ...
+    def exception(self, code: int, /) -> tuple[str, str]:
+        """Name and meaning of an exception code."""
+
+@final
+class Simulator:
+    """A simulated line with simulated drives."""
+
+    def __new__(
+        cls,
+        units: Mapping[int, str],
+        format: SerialFormat,
+        *,
+        seed: int = 0,
+        transport: str = "pty",
+        realtime: bool = True,
+        strict_silence: bool = False,
+    ) -> Simulator:
+        """*transport*: `"pty"`, `"tcp"` (RTU over TCP on 127.0.0.1), or `"process"` (only by `Bus(simulator)`).
+
+        *realtime* False needs `"process"`: the clock jumps to what happens next.
+        """
+    @property
+    def port(self) -> str:
+        """A path, `socket://127.0.0.1:N`, or `sim:` and the units."""
+    def close(self) -> None: ...
+    def now(self) -> float:
+        """Seconds since the simulation began."""
+    def advance(self, seconds: float, /) -> None:
+        """Lets virtual time pass. NotAllowed on a real-time simulation."""
+    def drive(self, unit: int, /) -> SimulatedDrive: ...
+    @property
+    def line(self) -> SimulatedLine: ...
+
+@final
+class SimulatedDrive:
+    """One simulated drive, seen from its shaft and its keypad, not from the bus."""
+
+    @property
+    def unit(self) -> int: ...
+    @property
+    def profile(self) -> str: ...
+    @property
+    def state(self) -> str: ...
+    @property
+    def frequency(self) -> float:
+        """Output frequency in Hz, negative in reverse."""
+    @property
+    def speed(self) -> float:
+        """Shaft speed in rpm, negative in reverse."""
+    @property
+    def fault(self) -> int:
+        """Present fault number, 0 for none."""
+    load: float
+    """Load torque as a share of the motor's rated torque: 0.0..=4.0."""
+    inputs: int
+    """Digital inputs, bit 0 = S1."""
+    def trip(self, code: int, /) -> None:
+        """Trips the drive with fault *code*."""
+    def power_cycle(self) -> None:
+        """Switches the drive off and on: RAM is lost, EEPROM stays."""
+    def register(self, address: int, /) -> int:
+        """The word at *address* as the drive would answer it now. NotAllowed where it would refuse."""
+    @property
+    def eeprom_writes(self) -> int: ...
+    def writes(self) -> list[tuple[float, int, int]]:
+        """Every word the drive took from the bus: seconds, address, value."""
+
+@final
+class SimulatedLine:
+    """The wire: what it saw, and what it is told to spoil."""
+
+    @property
+    def requests(self) -> int: ...
+    @property
+    def silence_violations(self) -> int:
+        """Requests that began before the silence was over."""
+    def answer_with(self, data: Buffer, /) -> None:
+        """The next answer on the line is *data* instead, as it is."""
+    def drop_answers(self, count: int = 1, /) -> None: ...
+    def delay_answers(self, seconds: float, count: int = 1, /) -> None: ...
+    def noise_before(self, data: Buffer, count: int = 1, /) -> None: ...
+    def noise_after(self, data: Buffer, count: int = 1, /) -> None: ...
+    def clear(self) -> None:
+        """Forgets every fault that waits."""
+    def trace(self) -> list[tuple[float, str, bytes]]:
+        """The last 1000 transmissions: seconds of their first bit, `"master"` or `"unit"`, bytes."""
