@@ -1,1 +1,3 @@
-//! Placeholder.
+//! Ports and the bus owner.
+mod port;
+pub use port::{Line, PortError, PortErrorKind};

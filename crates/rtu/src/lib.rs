@@ -1,1 +1,22 @@
-//! Placeholder.
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+mod address;
+mod answer;
+pub mod crc;
+mod frame;
+mod request;
+mod serial;
+mod time;
+mod words;
+
+pub use core::time::Duration;
+
+pub use address::{AddressError, Destination, UnitAddress};
+pub use answer::{Answer, AnswerError, ExceptionCode, Expected};
+pub use crc::crc16;
+pub use frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
+pub use request::{AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, Request, RequestError, function};
+pub use serial::{DataBits, Parity, SerialFormat, SerialFormatError, Silence, StopBits};
+pub use time::Instant;
+pub use words::Words;

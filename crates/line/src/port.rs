@@ -1,0 +1,90 @@
+//! What every kind of line promises: the trait [`Line`] and the error of a port.
+//!
+//! Serial ports, TCP connections and the simulated line implement it; the bus owner uses nothing else of them.
+
+use std::fmt;
+
+use drivebus_rtu::Instant;
+
+/// A way for bytes to reach units and to come back, with a clock of its own.
+///
+/// A line knows nothing about frames. It is used by one owner at a time, and no call blocks beyond the moment it is
+/// given.
+pub trait Line: Send + fmt::Debug {
+    /// Now, on this line's clock: real time, or the simulation's.
+    fn now(&self) -> Instant;
+
+    /// Hands all of `bytes` to the wire in one piece.
+    ///
+    /// Returns when the last character will have left the wire, computed from the character time because drivers
+    /// and adapters report it too early. Does not wait for it.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`]: the port is gone or refused; part of the bytes may have been sent.
+    fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError>;
+
+    /// Waits until bytes are there or `until` is reached, and returns how many were put into `buffer`.
+    ///
+    /// 0 means that `until` was reached. Bytes that are there already come at once, whatever `until` says.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`]: the port is gone.
+    fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError>;
+
+    /// Waits until `until` without touching what arrives.
+    fn sleep(&mut self, until: Instant);
+
+    /// What is open, for people: a path or an address.
+    fn name(&self) -> String;
+
+    /// Whether frames are told apart by something else than silence, as over Modbus TCP.
+    fn gapless(&self) -> bool {
+        false
+    }
+
+    /// What the user should know about this line, such as a setting that did not reach the wire.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Why a port does not serve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PortErrorKind {
+    /// There is no such port.
+    NotFound,
+    /// Another program has it.
+    Busy,
+    /// This user may not open it.
+    Denied,
+    /// It was open and is gone: unplugged, or the peer closed.
+    Lost,
+    /// It was closed by its owner.
+    Closed,
+    /// The port cannot do what was asked of it.
+    Unsupported,
+    /// Anything else the system reports.
+    Other,
+}
+
+/// A port that could not be opened, or was lost.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{port}: {message}")]
+pub struct PortError {
+    /// Which kind of trouble.
+    pub kind: PortErrorKind,
+    /// The port, as it was asked for.
+    pub port: String,
+    /// What happened and what to do, in words.
+    pub message: String,
+}
+
+impl PortError {
+    /// An error of `kind` on `port`; `message` says what happened and what to do.
+    pub fn new(kind: PortErrorKind, port: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { kind, port: port.into(), message: message.into() }
+    }
+}

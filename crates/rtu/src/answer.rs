@@ -1,0 +1,319 @@
+//! What a unit answers: the PDUs of answers, built, parsed, and judged against what was asked.
+
+use core::fmt;
+
+use crate::Words;
+use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::request::{AnswerLength, MAX_PDU, MAX_READ, Request, RequestError, put_words};
+
+/// The code in an exception: why a unit refused. What a code means beyond 04H differs from family to family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ExceptionCode(pub u8);
+
+impl ExceptionCode {
+    /// 01H: the unit does not know the function.
+    pub const ILLEGAL_FUNCTION: Self = Self(0x01);
+    /// 02H: there is no such register.
+    pub const ILLEGAL_ADDRESS: Self = Self(0x02);
+    /// 03H: the request is not well formed.
+    pub const ILLEGAL_VALUE: Self = Self(0x03);
+    /// 04H: the unit could not do it.
+    pub const DEVICE_FAILURE: Self = Self(0x04);
+}
+
+/// An answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer<'a> {
+    /// The words read.
+    #[non_exhaustive]
+    Read {
+        /// 1..=125 words.
+        words: Words<'a>,
+    },
+    /// One word was written.
+    #[non_exhaustive]
+    WriteSingle {
+        /// Register.
+        address: u16,
+        /// What it was given.
+        value: u16,
+    },
+    /// The word sent came back.
+    #[non_exhaustive]
+    Echo {
+        /// The word.
+        data: u16,
+    },
+    /// Several words were written.
+    #[non_exhaustive]
+    WriteMultiple {
+        /// First register.
+        address: u16,
+        /// How many words.
+        count: u16,
+    },
+    /// The unit refused.
+    #[non_exhaustive]
+    Exception {
+        /// The function it was asked for, 00H..=7FH.
+        function: u8,
+        /// Why.
+        code: ExceptionCode,
+    },
+    /// The answer to a custom request.
+    #[non_exhaustive]
+    Custom {
+        /// Function code and data, 1..=253 bytes.
+        pdu: &'a [u8],
+    },
+}
+
+impl<'a> Answer<'a> {
+    /// The answer to a read.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError::Count`]: `words` are none or more than 125.
+    pub const fn read(words: &'a [u16]) -> Result<Self, RequestError> {
+        if words.is_empty() || words.len() > MAX_READ as usize {
+            return Err(RequestError::Count { count: words.len(), max: MAX_READ });
+        }
+        Ok(Self::Read { words: Words::new(words) })
+    }
+
+    /// The refusal of `function` (its low seven bits).
+    pub const fn exception(function: u8, code: ExceptionCode) -> Self {
+        Self::Exception { function: function & !EXCEPTION_BIT, code }
+    }
+
+    /// The answer to a custom request: function code and data.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError::PduLength`]: `pdu` is empty or longer than 253 bytes.
+    pub const fn custom(pdu: &'a [u8]) -> Result<Self, RequestError> {
+        if pdu.is_empty() || pdu.len() > MAX_PDU {
+            return Err(RequestError::PduLength { len: pdu.len() });
+        }
+        Ok(Self::Custom { pdu })
+    }
+
+    /// The answer that confirms `request`; `None` for a read and a custom request, whose answers carry data.
+    pub fn confirming(request: &Request<'_>) -> Option<Self> {
+        match *request {
+            Request::WriteSingle { address, value } => Some(Self::WriteSingle { address, value }),
+            Request::Echo { data } => Some(Self::Echo { data }),
+            Request::WriteMultiple { address, words } => {
+                let count = u16::try_from(words.len()).ok()?;
+                Some(Self::WriteMultiple { address, count })
+            }
+            Request::ReadHolding { .. } | Request::Custom { .. } => None,
+        }
+    }
+
+    /// The answer that `pdu` is, by itself: whether it answers a request, [`Expected::judge`] tells.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError::Length`]: the length does not fit the function.
+    pub fn parse(pdu: &'a [u8]) -> Result<Self, AnswerError> {
+        match *pdu {
+            [function, code] if function & EXCEPTION_BIT != 0 => Ok(Self::exception(function, ExceptionCode(code))),
+            [READ_HOLDING, bytes, ref data @ ..] => match Words::from_wire(data) {
+                Some(words) if usize::from(bytes) == data.len() && !words.is_empty() => Ok(Self::Read { words }),
+                _ => Err(AnswerError::Length { len: pdu.len() }),
+            },
+            [WRITE_SINGLE, a1, a0, v1, v0] => {
+                Ok(Self::WriteSingle { address: u16::from_be_bytes([a1, a0]), value: u16::from_be_bytes([v1, v0]) })
+            }
+            [DIAGNOSTICS, 0, 0, d1, d0] => Ok(Self::Echo { data: u16::from_be_bytes([d1, d0]) }),
+            [WRITE_MULTIPLE, a1, a0, c1, c0] => {
+                Ok(Self::WriteMultiple { address: u16::from_be_bytes([a1, a0]), count: u16::from_be_bytes([c1, c0]) })
+            }
+            [] | [READ_HOLDING | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
+                Err(AnswerError::Length { len: pdu.len() })
+            }
+            [function, ..] if function & EXCEPTION_BIT != 0 => Err(AnswerError::Length { len: pdu.len() }),
+            _ if pdu.len() > MAX_PDU => Err(AnswerError::Length { len: pdu.len() }),
+            _ => Ok(Self::Custom { pdu }),
+        }
+    }
+
+    /// Writes the PDU into `target` and returns its length.
+    pub(crate) fn put(&self, target: &mut [u8; MAX_PDU]) -> usize {
+        match *self {
+            Self::Read { words } => {
+                // At most 125 words, checked by the constructors: the byte count fits.
+                let bytes = 2 * words.len();
+                target[0] = READ_HOLDING;
+                #[expect(clippy::cast_possible_truncation, reason = "at most 250")]
+                {
+                    target[1] = bytes as u8;
+                }
+                words.put(&mut target[2..2 + bytes]);
+                2 + bytes
+            }
+            Self::WriteSingle { address, value } => put_words(target, WRITE_SINGLE, [address, value]),
+            Self::Echo { data } => put_words(target, DIAGNOSTICS, [0, data]),
+            Self::WriteMultiple { address, count } => put_words(target, WRITE_MULTIPLE, [address, count]),
+            Self::Exception { function, code } => {
+                target[..2].copy_from_slice(&[function | EXCEPTION_BIT, code.0]);
+                2
+            }
+            Self::Custom { pdu } => {
+                target[..pdu.len()].copy_from_slice(pdu);
+                pdu.len()
+            }
+        }
+    }
+}
+
+/// What a right answer must look like: all of a request that its answer has to repeat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expected(Kind);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Read { count: u16 },
+    WriteSingle { address: u16, value: u16 },
+    Echo { data: u16 },
+    WriteMultiple { address: u16, count: u16 },
+    Custom { function: u8, answer: AnswerLength },
+}
+
+impl Expected {
+    pub(crate) fn of(request: &Request<'_>) -> Self {
+        Self(match *request {
+            Request::ReadHolding { count, .. } => Kind::Read { count },
+            Request::WriteSingle { address, value } => Kind::WriteSingle { address, value },
+            Request::Echo { data } => Kind::Echo { data },
+            #[expect(clippy::cast_possible_truncation, reason = "at most 123 words")]
+            Request::WriteMultiple { address, words } => Kind::WriteMultiple { address, count: words.len() as u16 },
+            Request::Custom { answer, .. } => Kind::Custom { function: request.function(), answer },
+        })
+    }
+
+    /// The function code of the answer, unless the unit refuses.
+    pub const fn function(&self) -> u8 {
+        match self.0 {
+            Kind::Read { .. } => READ_HOLDING,
+            Kind::WriteSingle { .. } => WRITE_SINGLE,
+            Kind::Echo { .. } => DIAGNOSTICS,
+            Kind::WriteMultiple { .. } => WRITE_MULTIPLE,
+            Kind::Custom { function, .. } => function,
+        }
+    }
+
+    /// How long the answer's PDU is, unless the unit refuses with two bytes.
+    pub const fn length(&self) -> AnswerLength {
+        match self.0 {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 125 words")]
+            Kind::Read { count } => AnswerLength::Bytes(2 + 2 * count as u8),
+            Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => AnswerLength::Bytes(5),
+            Kind::Custom { answer, .. } => answer,
+        }
+    }
+
+    /// Whether the right answer is the request once more, so that an adapter's own echo cannot be told from it.
+    pub const fn repeats_request(&self) -> bool {
+        matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. })
+    }
+
+    /// `pdu` as the answer that was expected, or as the refusal of it.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError`]: it answers something else.
+    pub fn judge<'a>(&self, pdu: &'a [u8]) -> Result<Answer<'a>, AnswerError> {
+        let Some(&came) = pdu.first() else {
+            return Err(AnswerError::Length { len: 0 });
+        };
+        if came & !EXCEPTION_BIT != self.function() {
+            return Err(AnswerError::Function { asked: self.function(), came });
+        }
+        if let (Kind::Custom { answer, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
+            return match answer {
+                AnswerLength::Bytes(len) if usize::from(len) != pdu.len() => {
+                    Err(AnswerError::Length { len: pdu.len() })
+                }
+                _ => Ok(Answer::Custom { pdu }),
+            };
+        }
+        let answer = Answer::parse(pdu)?;
+        match (self.0, answer) {
+            (Kind::Read { count }, Answer::Read { words }) if words.len() != usize::from(count) => {
+                Err(AnswerError::Count { asked: count, came: words.len() })
+            }
+            (_, Answer::Exception { .. }) | (Kind::Read { .. }, Answer::Read { .. }) => Ok(answer),
+            (Kind::WriteSingle { address, value }, Answer::WriteSingle { address: at, value: took }) => {
+                repeats([address, value], [at, took], answer)
+            }
+            (Kind::WriteMultiple { address, count }, Answer::WriteMultiple { address: at, count: took }) => {
+                repeats([address, count], [at, took], answer)
+            }
+            (Kind::Echo { data }, Answer::Echo { data: back }) => repeats([0, data], [0, back], answer),
+            _ => Err(AnswerError::Function { asked: self.function(), came }),
+        }
+    }
+}
+
+fn repeats(asked: [u16; 2], came: [u16; 2], answer: Answer<'_>) -> Result<Answer<'_>, AnswerError> {
+    if asked == came { Ok(answer) } else { Err(AnswerError::Echo { asked, came }) }
+}
+
+/// Why a frame with a good CRC is not the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum AnswerError {
+    /// It comes from another unit.
+    Unit {
+        /// Who was asked.
+        asked: u8,
+        /// Who answers.
+        came: u8,
+    },
+    /// It answers another function.
+    Function {
+        /// The function asked for.
+        asked: u8,
+        /// The function that came.
+        came: u8,
+    },
+    /// It carries another number of words.
+    Count {
+        /// Words asked for.
+        asked: u16,
+        /// Words that came.
+        came: usize,
+    },
+    /// It repeats other words than those sent: address and value, address and count, or sub-function and data.
+    Echo {
+        /// What was sent.
+        asked: [u16; 2],
+        /// What came.
+        came: [u16; 2],
+    },
+    /// Its length does not fit its function.
+    Length {
+        /// Bytes of the PDU.
+        len: usize,
+    },
+}
+
+impl fmt::Display for AnswerError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unit { asked, came } => write!(f, "unit {asked} was asked, unit {came} answers"),
+            Self::Function { asked, came } => write!(f, "function {asked:02X}H was asked, {came:02X}H came"),
+            Self::Count { asked, came } => write!(f, "{asked} words were asked for, {came} came"),
+            Self::Echo { asked, came } => write!(
+                f,
+                "{:04X}H {:04X}H was sent, the answer repeats {:04X}H {:04X}H",
+                asked[0], asked[1], came[0], came[1]
+            ),
+            Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
+        }
+    }
+}
+
+impl core::error::Error for AnswerError {}

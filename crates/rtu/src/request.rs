@@ -1,0 +1,307 @@
+//! What a master asks: the PDUs of requests, built and parsed.
+//!
+//! Source: *Modbus Application Protocol* V1.1b3, §6.3, §6.6, §6.8, §6.12.
+
+use core::fmt;
+
+use crate::Words;
+use crate::answer::Expected;
+
+/// Most bytes of a PDU: 256 of the ADU less address and CRC.
+pub const MAX_PDU: usize = 253;
+/// Most words of one 03H read.
+pub const MAX_READ: u16 = 125;
+/// Most words of one 10H write.
+pub const MAX_WRITE: u16 = 123;
+
+/// Function codes this crate knows by name.
+pub mod function {
+    /// Read holding registers.
+    pub const READ_HOLDING: u8 = 0x03;
+    /// Write one register.
+    pub const WRITE_SINGLE: u8 = 0x06;
+    /// Diagnostics; sub-function 0000 is the echo.
+    pub const DIAGNOSTICS: u8 = 0x08;
+    /// Write several registers.
+    pub const WRITE_MULTIPLE: u8 = 0x10;
+    /// Set in the function code of an exception.
+    pub const EXCEPTION_BIT: u8 = 0x80;
+}
+
+use function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+
+/// How long the answer to a custom request is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnswerLength {
+    /// The answer's PDU has this many bytes, function code included: 1..=253.
+    Bytes(u8),
+    /// Not known: the answer ends when the line falls silent.
+    BySilence,
+}
+
+/// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request<'a> {
+    /// 03H: read `count` words from `address`.
+    #[non_exhaustive]
+    ReadHolding {
+        /// First register.
+        address: u16,
+        /// 1..=125.
+        count: u16,
+    },
+    /// 06H: write one word.
+    #[non_exhaustive]
+    WriteSingle {
+        /// Register.
+        address: u16,
+        /// What to write.
+        value: u16,
+    },
+    /// 08H, sub-function 0000: the unit returns `data` as it is.
+    #[non_exhaustive]
+    Echo {
+        /// Any word.
+        data: u16,
+    },
+    /// 10H: write several words from `address` on.
+    #[non_exhaustive]
+    WriteMultiple {
+        /// First register.
+        address: u16,
+        /// 1..=123 words.
+        words: Words<'a>,
+    },
+    /// Any other PDU.
+    #[non_exhaustive]
+    Custom {
+        /// Function code and data.
+        pdu: &'a [u8],
+        /// How long the answer will be.
+        answer: AnswerLength,
+    },
+}
+
+impl<'a> Request<'a> {
+    /// 03H: `count` words (1..=125) from `address`.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: the count is out of range, or the last register would lie beyond 0xFFFF.
+    pub const fn read(address: u16, count: u16) -> Result<Self, RequestError> {
+        match check_range(address, count as usize, MAX_READ) {
+            Ok(_) => Ok(Self::ReadHolding { address, count }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// 06H: `value` to `address`.
+    pub const fn write(address: u16, value: u16) -> Self {
+        Self::WriteSingle { address, value }
+    }
+
+    /// 08H/0000: the unit is asked to return `data`.
+    pub const fn echo(data: u16) -> Self {
+        Self::Echo { data }
+    }
+
+    /// 10H: `words` (1..=123) from `address` on.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: the count is out of range, or the last register would lie beyond 0xFFFF.
+    pub const fn write_many(address: u16, words: &'a [u16]) -> Result<Self, RequestError> {
+        match check_range(address, words.len(), MAX_WRITE) {
+            Ok(_) => Ok(Self::WriteMultiple { address, words: Words::new(words) }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Any `pdu`: function code 1..=127 and 0..=252 bytes of data.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: `pdu` is empty or too long, its function code cannot be asked for, or the length of the
+    /// answer is impossible.
+    pub const fn custom(pdu: &'a [u8], answer: AnswerLength) -> Result<Self, RequestError> {
+        if pdu.is_empty() || pdu.len() > MAX_PDU {
+            return Err(RequestError::PduLength { len: pdu.len() });
+        }
+        if pdu[0] == 0 || pdu[0] & EXCEPTION_BIT != 0 {
+            return Err(RequestError::Function { function: pdu[0] });
+        }
+        match answer {
+            AnswerLength::Bytes(len) if len == 0 || len as usize > MAX_PDU => Err(RequestError::AnswerLength { len }),
+            _ => Ok(Self::Custom { pdu, answer }),
+        }
+    }
+
+    /// The request that `pdu` is.
+    ///
+    /// A diagnostic other than the echo, and a function code without a name here, come back as
+    /// [`Custom`](Self::Custom).
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: the length does not fit the function, or a count is out of range. A unit answers exception
+    /// 03H to it.
+    pub fn parse(pdu: &'a [u8]) -> Result<Self, RequestError> {
+        match *pdu {
+            [READ_HOLDING, a1, a0, c1, c0] => Self::read(u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0])),
+            [WRITE_SINGLE, a1, a0, v1, v0] => {
+                Ok(Self::write(u16::from_be_bytes([a1, a0]), u16::from_be_bytes([v1, v0])))
+            }
+            [DIAGNOSTICS, 0, 0, d1, d0] => Ok(Self::echo(u16::from_be_bytes([d1, d0]))),
+            [WRITE_MULTIPLE, a1, a0, c1, c0, bytes, ref data @ ..] => {
+                let (address, count) = (u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]));
+                let count = check_range(address, usize::from(count), MAX_WRITE)?;
+                match Words::from_wire(data) {
+                    Some(words) if words.len() == count && usize::from(bytes) == data.len() => {
+                        Ok(Self::WriteMultiple { address, words })
+                    }
+                    _ => Err(RequestError::ByteCount { count, bytes, came: data.len() }),
+                }
+            }
+            [READ_HOLDING | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
+                Err(RequestError::PduLength { len: pdu.len() })
+            }
+            _ => Self::custom(pdu, AnswerLength::BySilence),
+        }
+    }
+
+    /// The function code.
+    pub const fn function(&self) -> u8 {
+        match self {
+            Self::ReadHolding { .. } => READ_HOLDING,
+            Self::WriteSingle { .. } => WRITE_SINGLE,
+            Self::Echo { .. } => DIAGNOSTICS,
+            Self::WriteMultiple { .. } => WRITE_MULTIPLE,
+            Self::Custom { pdu, .. } => pdu[0],
+        }
+    }
+
+    /// Whether the request may change something in the unit.
+    ///
+    /// A custom request counts as a write unless its function only reads: 01H, 02H, 04H, 07H, 0BH, 0CH, 11H, 14H,
+    /// 18H, or 08H with a sub-function that returns a counter.
+    pub const fn is_write(&self) -> bool {
+        match self {
+            Self::ReadHolding { .. } | Self::Echo { .. } => false,
+            Self::WriteSingle { .. } | Self::WriteMultiple { .. } => true,
+            Self::Custom { pdu, .. } => !matches!(
+                pdu,
+                [READ_HOLDING | 0x01 | 0x02 | 0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..]
+                    | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
+            ),
+        }
+    }
+
+    /// What a right answer must look like, without borrowing from the request.
+    pub fn expected(&self) -> Expected {
+        Expected::of(self)
+    }
+
+    /// Writes the PDU into `target` and returns its length.
+    pub(crate) fn put(&self, target: &mut [u8; MAX_PDU]) -> usize {
+        match *self {
+            Self::ReadHolding { address, count } => put_words(target, READ_HOLDING, [address, count]),
+            Self::WriteSingle { address, value } => put_words(target, WRITE_SINGLE, [address, value]),
+            Self::Echo { data } => put_words(target, DIAGNOSTICS, [0, data]),
+            Self::WriteMultiple { address, words } => {
+                // At most 123 words, checked by the constructors: both numbers fit.
+                #[expect(clippy::cast_possible_truncation, reason = "at most 123")]
+                let count = words.len() as u8;
+                put_words(target, WRITE_MULTIPLE, [address, u16::from(count)]);
+                target[5] = 2 * count;
+                let end = 6 + 2 * words.len();
+                words.put(&mut target[6..end]);
+                end
+            }
+            Self::Custom { pdu, .. } => {
+                target[..pdu.len()].copy_from_slice(pdu);
+                pdu.len()
+            }
+        }
+    }
+}
+
+/// A function code and two words: the shape of most PDUs.
+pub(crate) fn put_words(target: &mut [u8; MAX_PDU], function: u8, [first, second]: [u16; 2]) -> usize {
+    target[0] = function;
+    target[1..3].copy_from_slice(&first.to_be_bytes());
+    target[3..5].copy_from_slice(&second.to_be_bytes());
+    5
+}
+
+const fn check_range(address: u16, count: usize, max: u16) -> Result<usize, RequestError> {
+    if count == 0 || count > max as usize {
+        return Err(RequestError::Count { count, max });
+    }
+    if address as usize + count > 0x1_0000 {
+        return Err(RequestError::Range { address, count });
+    }
+    Ok(count)
+}
+
+/// A request that cannot be: nothing of it goes out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// Too many words, or none.
+    Count {
+        /// What was asked.
+        count: usize,
+        /// Most words the function can carry.
+        max: u16,
+    },
+    /// The last register lies beyond 0xFFFF.
+    Range {
+        /// First register.
+        address: u16,
+        /// Number of words.
+        count: usize,
+    },
+    /// Byte count, word count and data of a 10H request do not agree.
+    ByteCount {
+        /// Words announced.
+        count: usize,
+        /// Bytes announced.
+        bytes: u8,
+        /// Bytes that stand there.
+        came: usize,
+    },
+    /// The length does not fit the function.
+    PduLength {
+        /// Bytes of the PDU.
+        len: usize,
+    },
+    /// The function code is 0 or has the exception bit.
+    Function {
+        /// What was given.
+        function: u8,
+    },
+    /// No answer can have this length.
+    AnswerLength {
+        /// Bytes of the answer's PDU.
+        len: u8,
+    },
+}
+
+impl fmt::Display for RequestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count { count, max } => write!(f, "{count} words in one request: 1..={max} can be carried"),
+            Self::Range { address, count } => {
+                write!(f, "{count} words from {address:04X}H end beyond the last register FFFFH")
+            }
+            Self::ByteCount { count, bytes, came } => {
+                write!(f, "{count} words and {bytes} bytes announced, {came} bytes of data")
+            }
+            Self::PduLength { len } => write!(f, "a PDU of {len} bytes does not fit its function (1..={MAX_PDU})"),
+            Self::Function { function } => write!(f, "function {function:02X}H cannot be asked for (01H..=7FH)"),
+            Self::AnswerLength { len } => write!(f, "an answer's PDU of {len} bytes cannot be (1..={MAX_PDU})"),
+        }
+    }
+}
+
+impl core::error::Error for RequestError {}

@@ -1,0 +1,86 @@
+//! Registers inside a PDU: 16-bit words, high byte first, borrowed from wherever they are.
+
+use core::fmt;
+
+/// Words of a request or an answer, borrowed: from the caller as `u16`, or from a frame as bytes.
+///
+/// ```
+/// use drivebus_rtu::Words;
+///
+/// let words = Words::from_wire(&[0x13, 0x88, 0x00, 0x32]).ok_or("an odd number of bytes")?;
+/// assert_eq!(words, Words::new(&[5000, 50]));
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct Words<'a>(Source<'a>);
+
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Host(&'a [u16]),
+    Wire(&'a [[u8; 2]]),
+}
+
+impl<'a> Words<'a> {
+    /// Words of the caller's.
+    pub const fn new(words: &'a [u16]) -> Self {
+        Self(Source::Host(words))
+    }
+
+    /// Words as they stand in a frame, high byte first; `None` where the last one has only one byte.
+    pub const fn from_wire(bytes: &'a [u8]) -> Option<Self> {
+        match bytes.as_chunks::<2>() {
+            (pairs, []) => Some(Self(Source::Wire(pairs))),
+            _ => None,
+        }
+    }
+
+    /// How many words.
+    pub const fn len(&self) -> usize {
+        match self.0 {
+            Source::Host(words) => words.len(),
+            Source::Wire(pairs) => pairs.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The word at `index`.
+    pub fn get(&self, index: usize) -> Option<u16> {
+        match self.0 {
+            Source::Host(words) => words.get(index).copied(),
+            Source::Wire(pairs) => pairs.get(index).map(|&pair| u16::from_be_bytes(pair)),
+        }
+    }
+
+    /// The words in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = u16> + Clone + use<'a> {
+        let words = *self;
+        (0..words.len()).map(move |index| words.get(index).unwrap_or_default())
+    }
+
+    /// Writes the words into `target`, high byte first, as many as fit.
+    pub(crate) fn put(&self, target: &mut [u8]) {
+        let (pairs, _) = target.as_chunks_mut::<2>();
+        match self.0 {
+            Source::Host(words) => pairs.iter_mut().zip(words).for_each(|(pair, word)| *pair = word.to_be_bytes()),
+            Source::Wire(wire) => pairs.iter_mut().zip(wire).for_each(|(pair, word)| *pair = *word),
+        }
+    }
+}
+
+impl PartialEq for Words<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl Eq for Words<'_> {}
+
+impl fmt::Debug for Words<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.iter()).finish()
+    }
+}
