@@ -1,0 +1,118 @@
+# Every command of this project. People and CI run the same lines.
+# All that is set up stays in .venv/, .tools/, target/ and dist/.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+CARGO  := cargo
+LOCKED := --locked
+
+# PyO3 asks this interpreter; one answer for every cargo command keeps what is built in use.
+export PYO3_PYTHON := $(abspath $(BIN)/python)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.md' \))
+PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f \( -name '*.py' -o -name '*.pyi' -o -name py.typed \))
+# The extension module has no Rust tests, and linking a test of it would need a shared libpython.
+RUST_TESTED := --workspace --exclude drivebus-python
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test lint bench wheel clean \
+        machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
+
+help: ## what can be made
+	@echo "make demo    a simulated GD350 runs through a whole job"
+	@echo "make test    sets everything up and runs every check"
+	@echo "make lint    format, clippy, rustdoc, ruff, mypy, stubtest, layers"
+	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
+	@echo "make wheel   the wheel, in dist/"
+	@echo "make clean   removes what was built and set up here"
+	@echo
+	@echo "Parts: format types layers rust-lint rust-test python-test examples wheel-smoke"
+	@echo "       make format changes files, the others only look. Another interpreter: make PYTHON=python3.13 …"
+
+demo: $(VENV)/.wheel
+	$(BIN)/drivebus demo
+
+test: lint rust-test python-test examples wheel-smoke
+	@echo "make test: every check passed"
+
+lint: layers rust-lint types
+
+# --- what the machine must have, and the local environment -------------------------------------------------
+
+machine:
+	@sh tools/check_machine.sh $(PYTHON) rust
+
+$(VENV)/.created: | machine
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9.4,<2'
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml $(VENV)/.created
+	$(BIN)/python -m pip install --quiet --group dev
+	@touch $@
+
+dist/.wheel: $(RUST_SOURCES) $(PYTHON_SOURCES) $(VENV)/.created
+	@mkdir -p dist && rm -f dist/drivebus-*.whl
+	$(BIN)/maturin build --release $(LOCKED) --interpreter $(BIN)/python --out dist
+	@touch $@
+
+# Tests run against the wheel, so what is tested is what is shipped, and Rust is built for release once.
+$(VENV)/.wheel: dist/.wheel
+	$(BIN)/python -m pip install --quiet dist/drivebus-*.whl
+	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps dist/drivebus-*.whl
+	@touch $@
+
+wheel: dist/.wheel ## the wheel, in dist/
+
+# --- checks --------------------------------------------------------------------------------------------------
+
+layers: $(VENV)/.created
+	$(BIN)/python tools/check_layers.py
+	$(BIN)/python tools/check_layers.py --self-test
+	$(BIN)/python tools/check_links.py
+
+rust-lint: $(VENV)/.created
+	$(CARGO) fmt --check
+	$(CARGO) clippy $(LOCKED) --quiet --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(RUST_TESTED)
+
+types: $(VENV)/.dev $(VENV)/.wheel
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest drivebus._native
+
+rust-test: $(VENV)/.created
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+	    set -x; $(CARGO) nextest run $(LOCKED) $(RUST_TESTED) && $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED) --doc; \
+	else \
+	    set -x; $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED); \
+	fi
+
+interop-parts:
+	@sh tools/debian_parts.sh
+
+python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
+	$(BIN)/python -m pytest
+
+examples: $(VENV)/.wheel
+	$(BIN)/python tools/run_examples.py
+
+wheel-smoke: dist/.wheel
+	$(BIN)/python tools/wheel_smoke.py
+
+# --- the rest ------------------------------------------------------------------------------------------------
+
+format: $(VENV)/.dev ## changes files
+	$(CARGO) fmt
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+bench: $(VENV)/.dev $(VENV)/.wheel
+	$(BIN)/python tools/bench_report.py
+
+clean: ## removes what was built and set up here
+	rm -rf $(VENV) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
