@@ -95,22 +95,22 @@ def crate_findings(root: Path) -> Iterator[str]:
         for match in re.finditer(r"\bdrivebus_line\b(?:::(?:\{([^}]*)\}|(\w+)))?", code_of(path)):
             names = {name.split(" as ")[0].strip() for name in (match[1] or match[2] or "*").split(",")} - {""}
             for wrong in sorted(names - LINE_TRAIT):
-                yield f"{path.relative_to(root)}: takes `{wrong}` of drivebus_line; only {sorted(LINE_TRAIT)} are its trait"
+                yield f"{path.relative_to(root)}: takes `{wrong}` of drivebus_line; its trait is {sorted(LINE_TRAIT)}"
 
 
 def imports(path: Path, package: Path) -> Iterator[tuple[int, str]]:
     """Each module of ours that *path* imports: its first name below the package, or `drivebus` for the package."""
     here = list(path.relative_to(package).with_suffix("").parts)
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
-        dotted: list[str] = []
-        if isinstance(node, ast.Import):
-            dotted = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        if not isinstance(node, (ast.Import, ast.ImportFrom)):
+            continue
+        dotted = [alias.name for alias in node.names]
+        if isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
                 above = ["drivebus", *here][: len(here) + 1 - node.level]
                 base = ".".join([*above, *([base] if base else [])])
-            dotted = [f"{base}.{alias.name}" for alias in node.names]
+            dotted = [f"{base}.{name}" for name in dotted]
         for name in dotted:
             first, *rest = name.split(".")
             if first == "drivebus":
@@ -145,18 +145,37 @@ def findings(root: Path) -> list[str]:
     return [*crate_findings(root), *python_findings(root)]
 
 
+# For manifests.
+HEAD = "[dependencies]"
+A_DEPENDENCY = "\n[dependencies]\nserde.workspace = true\n"
+
 # Each rule broken once: file, what is replaced (None: put at the end), by what, and a part of the expected finding.
 BREAKS: list[tuple[str, str | None, str, str]] = [
-    ("crates/rtu/Cargo.toml", None, "\n[dependencies]\nserde.workspace = true\n", "crates/rtu: depends on nothing"),
-    ("crates/rtu/Cargo.toml", None, "\n[build-dependencies]\nserde.workspace = true\n", "crates/rtu: depends on nothing"),
+    ("crates/rtu/Cargo.toml", None, A_DEPENDENCY, "crates/rtu: depends on nothing"),
+    ("crates/rtu/Cargo.toml", None, A_DEPENDENCY.replace("[", "[build-"), "crates/rtu: depends on nothing"),
     ("crates/rtu/src/lib.rs", "#![no_std]", "", "lacks #![no_std]"),
     ("crates/rtu/src/crc.rs", "//!", "use std::time::Instant;\n//!", "rtu/src/crc.rs: must not use `std::`"),
     ("crates/rtu/src/crc.rs", "//!", "unsafe fn f() {}\n//!", "rtu/src/crc.rs: must not use `unsafe`"),
     ("crates/rtu/Cargo.toml", "[lints]\nworkspace = true", "", "crates/rtu/Cargo.toml: lacks [lints]"),
     ("Cargo.toml", 'unsafe_code = "forbid"', 'unsafe_code = "warn"', "Cargo.toml: [workspace.lints.rust] lacks"),
-    ("crates/drives/Cargo.toml", "[dependencies]", "[dependencies]\ndrivebus-rtu.workspace = true", "crates/drives: must not use drivebus-rtu"),
-    ("crates/drives/src/lib.rs", "//!", "use std::thread::sleep;\n//!", "drives/src/lib.rs: must not use `std::thread`"),
-    ("crates/line/Cargo.toml", "[dependencies]", "[dependencies]\ndrivebus-drives.workspace = true", "crates/line: must not use drivebus-drives"),
+    (
+        "crates/drives/Cargo.toml",
+        HEAD,
+        f"{HEAD}\ndrivebus-rtu.workspace = true",
+        "crates/drives: must not use drivebus-rtu",
+    ),
+    (
+        "crates/drives/src/lib.rs",
+        "//!",
+        "use std::thread::sleep;\n//!",
+        "drives/src/lib.rs: must not use `std::thread`",
+    ),
+    (
+        "crates/line/Cargo.toml",
+        HEAD,
+        f"{HEAD}\ndrivebus-drives.workspace = true",
+        "crates/line: must not use drivebus-drives",
+    ),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line::{Line, Bus};\n//!", "takes `Bus` of drivebus_line"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line as line;\n//!", "takes `*` of drivebus_line"),
     ("python/drivebus/errors.py", None, "\nfrom drivebus import _native\n", "errors must not import _native"),

@@ -51,14 +51,18 @@ def findings(path: Path, root: Path = ROOT) -> list[str]:
         targets = UPWARDS.findall(line)
         if path.suffix == ".md":
             targets += LINK.findall(line)
-        wrong += [f"{where}:{number}: leads nowhere: {target}" for target in targets if leads_nowhere(path, target, root)]
+        wrong += [
+            f"{where}:{number}: leads nowhere: {target}" for target in targets if leads_nowhere(path, target, root)
+        ]
         wrong += [f"{where}:{number}: a folder of one machine: {found}" for found in OWN_FOLDER.findall(line)]
     return wrong
 
 
 def main() -> int:
     """Prints every finding."""
-    wrong = [finding for path in tracked(ROOT) if path.resolve() != Path(__file__).resolve() for finding in findings(path)]
+    wrong = [
+        finding for path in tracked(ROOT) if path.resolve() != Path(__file__).resolve() for finding in findings(path)
+    ]
     for finding in wrong:
         print(finding, file=sys.stderr)
     return 1 if wrong else 0
