@@ -1,0 +1,84 @@
+//! The clock of real lines, and how they wait on it.
+//!
+//! The only place of this crate that reads the time or blocks. A wait is one system call that ends shortly before its
+//! moment, and a spin of a few microseconds for the rest: the kernel wakes a thread up to its timer slack late (50 µs
+//! on Linux), which is a large part of a silence at 115 200 bit/s.
+
+use std::thread;
+
+use drivebus_rtu::{Duration, Instant};
+
+/// How long before its moment a wait leaves the kernel and spins: the timer slack of Linux and a little more.
+const SPIN: Duration = Duration::from_micros(60);
+
+/// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take no more than 24 days.
+const TURN: Duration = Duration::from_secs(3_600);
+
+/// Now, in nanoseconds of the system's monotonic clock.
+///
+/// On Linux the same clock as Python's `time.monotonic_ns()`, and the same in every process.
+#[cfg(unix)]
+pub fn monotonic() -> Instant {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    let now = Duration::try_from(now).unwrap_or_default(); // cannot fail: the clock starts at zero and rises
+    Instant::ZERO + now
+}
+
+/// Now, in nanoseconds since this process first asked.
+#[cfg(not(unix))]
+pub fn monotonic() -> Instant {
+    static START: std::sync::LazyLock<std::time::Instant> = std::sync::LazyLock::new(std::time::Instant::now);
+    Instant::ZERO + START.elapsed()
+}
+
+/// Blocks the thread until `until`, and never wakes it earlier.
+pub fn sleep_until(until: Instant) {
+    let left = until.saturating_duration_since(monotonic());
+    if left > SPIN {
+        thread::sleep(left.saturating_sub(SPIN));
+    }
+    while monotonic() < until {
+        std::hint::spin_loop();
+    }
+}
+
+/// Waits until `descriptor` is ready for one of `events` or has failed, and returns what it is ready for.
+///
+/// `None` means that `until` was reached. A descriptor that is ready already is found so whatever `until` says.
+#[cfg(unix)]
+pub(crate) fn wait_for(
+    descriptor: std::os::fd::BorrowedFd<'_>,
+    events: rustix::event::PollFlags,
+    until: Instant,
+) -> std::io::Result<Option<rustix::event::PollFlags>> {
+    use rustix::event::{PollFd, Timespec, poll};
+
+    loop {
+        let left = until.saturating_duration_since(monotonic());
+        let in_kernel = left.saturating_sub(SPIN).min(TURN);
+        let timeout = Timespec::try_from(in_kernel).unwrap_or_default(); // cannot fail: at most an hour
+        let mut descriptors = [PollFd::from_borrowed_fd(descriptor, events)];
+        match poll(&mut descriptors, Some(&timeout)) {
+            Ok(0) if left.is_zero() => return Ok(None),
+            Ok(0) | Err(rustix::io::Errno::INTR) => {}
+            Ok(_) => return Ok(Some(descriptors[0].revents())),
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_rises_and_a_sleep_ends_no_earlier_than_asked() {
+        let start = monotonic();
+        for micros in [0, 1, 59, 61, 500, 3_000] {
+            let until = monotonic() + Duration::from_micros(micros);
+            sleep_until(until);
+            assert!(monotonic() >= until, "{micros} µs");
+        }
+        sleep_until(start); // long over: returns
+    }
+}
