@@ -19,7 +19,10 @@ def encode_read(unit: int, address: int, count: int, /) -> bytes:
     """A whole 03H request frame: *unit* 1..=247, *address* 0..=0xFFFF, *count* 1..=125 words."""
 
 def encode_write(unit: int, address: int, value: int | Sequence[int], /) -> bytes:
-    """A whole 06H (an int) or 10H (a sequence of 1..=123 ints) request frame; values 0..=0xFFFF; *unit* 0 is broadcast."""
+    """A whole 06H (an int) or 10H (a sequence of 1..=123 ints) request frame.
+
+    *value* 0..=0xFFFF each; *unit* 1..=247, or 0 for a broadcast.
+    """
 
 def encode_echo(unit: int, word: int, /) -> bytes:
     """A whole 08H/0000 request frame with *word* 0..=0xFFFF."""
@@ -86,7 +89,7 @@ class Bus:
     def __new__(
         cls,
         port: object,
-        format: SerialFormat,
+        format: SerialFormat,  # noqa: A002
         *,
         timeout: float = 0.5,
         retries: int = 2,
@@ -94,7 +97,10 @@ class Bus:
         rs485: Mapping[str, object] | None = None,
         echo: str = "auto",
     ) -> Bus:
-        """Opens *port*: a path, `socket://host:port`, `tcp://host:port`, a `Simulator`, or an object like `serial.Serial`."""
+        """Opens *port*.
+
+        A path, `socket://host:port`, `tcp://host:port`, a `Simulator`, or an object like `serial.Serial`.
+        """
     @property
     def port(self) -> str:
         """What was opened, for people."""
@@ -108,7 +114,9 @@ class Bus:
         """Seconds on the line's clock: real time, or the simulation's."""
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock; a signal ends it at once."""
-    def read(self, unit: int, address: int, count: int, /, *, timeout: float | None = None, retries: int | None = None) -> list[int]:
+    def read(
+        self, unit: int, address: int, count: int, /, *, timeout: float | None = None, retries: int | None = None
+    ) -> list[int]:
         """03H: *count* words (1..=125) of *unit* (1..=247) from *address*."""
     def read_stamped(self, unit: int, address: int, count: int, /) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and the answer was complete."""
@@ -161,10 +169,19 @@ class Profile:
         """*raw* (0..=0xFFFF) in engineering units: int where the drive counts or names, float where it measures."""
     def encode(self, name: str, value: object, /) -> int:
         """*value* (int, float, Decimal, or a choice's label) as a word. NotAllowed names value, range and unit."""
+    def fields(self, name: str, raw: int, /) -> dict[str, str]:
+        """The bit fields of *raw* (0..=0xFFFF) in the profile's words, such as `{"motor": "motor 1"}`.
+
+        A bit without words of its own is `"off"` or `"on"`; a register without bit fields has none.
+        """
     def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
         """The fewest reads (address, count) that hold all *names*."""
     def command(self, name: str, /) -> tuple[int, int]:
-        """Address and code of `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`, `jog_stop`."""
+        """Address and code of a command.
+
+        Commands are `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`,
+        `jog_stop`.
+        """
     def is_command(self, address: int, /) -> bool:
         """Whether a write to *address* can move a motor."""
     def state(self, raw: int, /) -> str:
@@ -172,7 +189,10 @@ class Profile:
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus: `code`, `value`, `label`, `verified`, `note`, in order."""
     def fault(self, code: int, /) -> dict[str, Any]:
-        """`code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `source`; an unknown number says so in its label."""
+        """One fault: `code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `source`.
+
+        An unknown number says so in its label.
+        """
     def faults(self) -> list[dict[str, Any]]: ...
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code."""
@@ -184,7 +204,7 @@ class Simulator:
     def __new__(
         cls,
         units: Mapping[int, str],
-        format: SerialFormat,
+        format: SerialFormat,  # noqa: A002
         *,
         seed: int = 0,
         transport: str = "pty",

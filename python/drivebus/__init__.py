@@ -1,0 +1,79 @@
+"""Control and watch variable-frequency drives over RS-485.
+
+    import drivebus
+
+    with drivebus.Bus("sim://gd350") as bus:        # or "/dev/ttyUSB0", "COM3", "socket://host:port"
+        drive = bus.drive(1)
+        drive.prepare_control()
+        with drive.running(hz=10.0):
+            drive.wait_for_speed(timeout=30)
+            print(drive.status(), drive.monitor("output_current"))
+
+This is not a safety function. An emergency stop is a wire.
+"""
+
+from drivebus import rtu, sim
+from drivebus._native import SerialFormat, __version__, crc16
+from drivebus.bus import Bus
+from drivebus.drive import Drive
+from drivebus.errors import (
+    BadAnswer,
+    CrcError,
+    DrivebusError,
+    DrivebusWarning,
+    NoAnswer,
+    NotAllowed,
+    PortError,
+    Refused,
+    StoreWarning,
+    Unconfirmed,
+)
+from drivebus.profile import Profile, profiles
+from drivebus.sim import Simulator
+from drivebus.values import (
+    Choice,
+    Control,
+    ControlItem,
+    ControlSource,
+    Description,
+    Fault,
+    Found,
+    Snapshot,
+    State,
+    Stats,
+    Status,
+)
+
+__all__ = [
+    "BadAnswer",
+    "Bus",
+    "Choice",
+    "Control",
+    "ControlItem",
+    "ControlSource",
+    "CrcError",
+    "Description",
+    "Drive",
+    "DrivebusError",
+    "DrivebusWarning",
+    "Fault",
+    "Found",
+    "NoAnswer",
+    "NotAllowed",
+    "PortError",
+    "Profile",
+    "Refused",
+    "SerialFormat",
+    "Simulator",
+    "Snapshot",
+    "State",
+    "Stats",
+    "Status",
+    "StoreWarning",
+    "Unconfirmed",
+    "__version__",
+    "crc16",
+    "profiles",
+    "rtu",
+    "sim",
+]

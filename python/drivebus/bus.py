@@ -1,0 +1,260 @@
+"""A line with units on it: reads, writes, and everything else a master may ask.
+
+The work is done in the compiled core, without the GIL. This module checks arguments, finds out who is there, and opens
+what people type as a port.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from drivebus import _native, checks, ports
+from drivebus._native import SerialFormat
+from drivebus.drive import Drive
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.profile import Profile, identify, profiles
+from drivebus.sim import Simulator
+from drivebus.values import Found, Stats
+
+__all__ = ["Bus"]
+
+_IDENTIFICATION = "identification_code"
+_SCAN_TIMEOUT = 0.1
+"""Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
+
+
+class Bus:
+    """One line, opened at once. Safe from any thread; requests of several threads take turns.
+
+    Args:
+        port: A path (`/dev/ttyUSB0`, `COM3`), `sim://gd350`, `sim://1=gd350,2=gd350?clock=virtual&seed=1`,
+            `socket://host:port` (RTU over TCP), `tcp://host:502` (Modbus TCP), any other pyserial URL, a
+            `drivebus.sim.Simulator`, or an open `serial.Serial`, which keeps its own settings.
+        baudrate: Bits per second.
+        parity: `"N"`, `"E"` or `"O"`.
+        stopbits: 1 or 2.
+        bytesize: 7 or 8.
+        silence: `"spec"`, `"characters"` or seconds; see `drivebus.SerialFormat`.
+        timeout: Seconds to wait for an answer after the request has left.
+        retries: How often a *read* is repeated after silence or a bad answer. Writes are never repeated.
+        read_only: Refuse every write before it is sent.
+        rs485: Kernel RS-485 settings, for ports whose driver switches direction.
+        echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.
+
+    Raises:
+        NotAllowed: An argument is wrong; nothing was opened.
+        PortError: The port is not there, busy, or not permitted.
+
+    Attributes:
+        simulator: The simulator behind a `sim://` port or the one that was given; None on a real line.
+        format: The `SerialFormat` in force.
+    """
+
+    simulator: Simulator | None
+    format: SerialFormat
+
+    def __init__(
+        self,
+        port: object,
+        *,
+        baudrate: int = 19200,
+        parity: str = "E",
+        stopbits: int = 1,
+        bytesize: int = 8,
+        silence: str | float = "spec",
+        timeout: float = 0.5,
+        retries: int = 2,
+        read_only: bool = False,
+        rs485: Mapping[str, object] | None = None,
+        echo: str = "auto",
+    ) -> None:
+        timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        retries = checks.whole("retries", retries, 0, 100)
+        asked = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
+        target = ports.resolve(port, asked)
+        self.format = ports.format_of(target, asked)
+        self.simulator = target if isinstance(target, Simulator) else None
+        self._owns_simulator = self.simulator is not None and target is not port
+        if isinstance(target, Simulator):
+            target = target._native if target.transport == "process" else target.port
+        self._native = _native.Bus(
+            target, self.format, timeout=timeout, retries=retries, read_only=read_only, rs485=rs485, echo=echo
+        )
+        self._timeout = timeout
+
+    @property
+    def port(self) -> str:
+        """What was opened, for people."""
+        return self._native.port
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._native.closed
+
+    @property
+    def read_only(self) -> bool:
+        """Whether every write is refused."""
+        return self._native.read_only
+
+    @property
+    def timeout(self) -> float:
+        """Seconds a unit is given to answer."""
+        return self._timeout
+
+    def close(self) -> None:
+        """Closes the port, and ends a simulator that this bus made. Closing again does nothing."""
+        self._native.close()
+        if self._owns_simulator and self.simulator is not None:
+            self.simulator.close()
+
+    def __enter__(self) -> Bus:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Bus on {self.port}{', closed' if self.closed else ''}>"
+
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+        return self._native.now()
+
+    def sleep(self, seconds: float, /) -> None:
+        """Waits on the line's clock. Ctrl-C ends it at once."""
+        self._native.sleep(checks.number("seconds", seconds, 0.0))
+
+    def read(self, unit: int, address: int, count: int = 1) -> list[int]:
+        """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.
+
+        Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
+
+        Raises:
+            NoAnswer, BadAnswer: After the bus's retries.
+            Refused: The drive says why in `meaning`.
+        """
+        return self._native.read(checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125))
+
+    def read_stamped(self, unit: int, address: int, count: int = 1) -> tuple[list[int], float, float]:
+        """As `read`, with the Unix times at which the request left and at which the answer was complete."""
+        return self._native.read_stamped(
+            checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+        )
+
+    def write(self, unit: int, address: int, value: int | Sequence[int]) -> None:
+        """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
+
+        Nothing here asks what stands at *address*: a word in a command register moves the motor.
+
+        Raises:
+            NotAllowed: An argument is out of range, or the bus is read-only. Nothing was sent.
+            NoAnswer, BadAnswer, PortError: The unit may have taken it all the same.
+            Refused: The unit did not take it.
+        """
+        self._native.write(checks.unit(unit), checks.address(address), checks.payload(value))
+
+    def broadcast(self, address: int, value: int | Sequence[int]) -> None:
+        """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once."""
+        self._native.broadcast(checks.address(address), checks.payload(value))
+
+    def echo(self, unit: int, word: int | None = None) -> float:
+        """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
+        if word is not None:
+            word = checks.whole("word", word, 0, 0xFFFF, hexadecimal=True)
+        return self._native.echo(checks.unit(unit), word)
+
+    def transact(self, unit: int, pdu: bytes | bytearray | memoryview, reply_length: int | None = None) -> bytes:
+        """Sends any PDU (1..253 bytes) and returns the answer's PDU; unit and CRC are added and checked. Sent once.
+
+        *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence.
+        """
+        try:
+            body = bytes(memoryview(pdu))
+        except TypeError:
+            raise NotAllowed(f"PDU {pdu!r} is not bytes; give 1..253 bytes, function code first") from None
+        if not 1 <= len(body) <= 253:
+            raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1..253 bytes, function code first")
+        if reply_length is not None:
+            reply_length = checks.whole("reply_length", reply_length, 1, 253)
+        return self._native.transact(checks.unit(unit), body, reply_length)
+
+    def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
+        """Asks each of *units* who it is, and yields those that answer as they do.
+
+        One read of the identification register each, not repeated. A unit that refuses has answered too, and so has one
+        whose answer is damaged: its `problem` says how (often two units with one address, or a wrong parity).
+
+        Args:
+            units: Addresses, 1..247.
+            timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
+        """
+        wanted = [checks.unit(unit) for unit in units]
+        limit = min(_SCAN_TIMEOUT, self._timeout) if timeout is None else timeout
+        limit = checks.number("timeout", limit, 0.0, 3600.0, above=True)
+        return self._scan(wanted, limit)
+
+    def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
+        for unit in units:
+            started = self.now()
+            code: int | None = None
+            problem: str | None = None
+            try:
+                [code] = self._native.read(unit, _identification_address(), 1, timeout=timeout, retries=0)
+            except NoAnswer:
+                continue
+            except (Refused, BadAnswer) as error:
+                problem = str(error)
+            family = None if code is None else identify(code)
+            yield Found(unit, family, code, self.now() - started, problem)
+
+    def drive(self, unit: int, profile: str | os.PathLike[str] | Profile | None = None) -> Drive:
+        """The drive at *unit*.
+
+        Args:
+            unit: Its address, 1..247.
+            profile: A shipped name, a folder, or a `Profile`. None asks the drive, by one read of its identification.
+
+        Raises:
+            NotAllowed: No such profile, or the drive names a family that no profile knows: give one.
+            NoAnswer, BadAnswer, Refused: The drive did not tell; only if *profile* is None.
+        """
+        unit = checks.unit(unit)
+        return Drive(self, unit, self._ask_profile(unit) if profile is None else _find_profile(profile))
+
+    def _ask_profile(self, unit: int) -> Profile:
+        [code] = self.read(unit, _identification_address())
+        family = identify(code)
+        if family is None:
+            raise NotAllowed(
+                f"unit {unit} identifies itself as {code:#06x}, which no profile knows; "
+                f"if you know that it behaves like one of {', '.join(profiles())}, give profile=…",
+                unit=unit,
+            )
+        return Profile.builtin(family)
+
+    def stats(self) -> Stats:
+        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit."""
+        return Stats(self._native.stats())
+
+
+def _identification_address() -> int:
+    """Where a drive says what it is. All shipped families use one register."""
+    return Profile.builtin(profiles()[0]).address(_IDENTIFICATION)
+
+
+def _find_profile(profile: object) -> Profile:
+    if isinstance(profile, Profile):
+        return profile
+    if isinstance(profile, os.PathLike):
+        return Profile.load(profile)
+    if isinstance(profile, str):
+        if os.sep in profile or Path(profile).is_dir():
+            return Profile.load(profile)
+        return Profile.builtin(checks.one_of("profile", profile, profiles()))
+    raise NotAllowed(f"profile {profile!r} is none; give a name ({', '.join(profiles())}), a folder, or a Profile")

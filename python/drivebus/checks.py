@@ -1,0 +1,79 @@
+"""Arguments are checked here, at the door, so that nothing wrong reaches a line.
+
+Every message names the value that came, what is allowed, and for a misspelt name the closest match.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import SupportsIndex
+
+from drivebus.errors import NotAllowed
+
+__all__ = ["address", "closest", "number", "one_of", "payload", "unit", "whole"]
+
+
+def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = False) -> int:
+    """*value* as an int in *low*..*high*; anything that is not a whole number is refused."""
+    allowed = f"{low:#06x}..{high:#06x}" if hexadecimal else f"{low}..{high}"
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise NotAllowed(f"{what} {value!r} is not a whole number; allowed is {allowed}")
+    number = operator.index(value)
+    if not low <= number <= high:
+        shown = f"{number:#06x}" if hexadecimal and number >= 0 else str(number)
+        raise NotAllowed(f"{what} {shown} is out of range; allowed is {allowed}")
+    return number
+
+
+def unit(value: object) -> int:
+    """A unit address, 1..247. Broadcast has a method of its own."""
+    if value == 0 and not isinstance(value, bool):
+        raise NotAllowed("unit 0 is the broadcast address, which nobody answers; allowed is 1..247, or use broadcast()")
+    return whole("unit", value, 1, 247)
+
+
+def address(value: object) -> int:
+    """A register address, 0..0xFFFF."""
+    return whole("address", value, 0, 0xFFFF, hexadecimal=True)
+
+
+def payload(value: object) -> int | list[int]:
+    """What a write carries: one word, or 1..123 words, each 0..0xFFFF."""
+    if isinstance(value, (str, bytes, bytearray)) or not isinstance(value, Iterable):
+        return whole("value", value, 0, 0xFFFF)
+    words = [whole(f"value {index} of the sequence:", word, 0, 0xFFFF) for index, word in enumerate(value)]
+    whole("number of values", len(words), 1, 123)
+    return words
+
+
+def number(what: str, value: object, low: float, high: float = math.inf, *, above: bool = False) -> float:
+    """*value* as a finite float in *low*..*high*; with *above*, *low* itself is refused."""
+    allowed = f"{'more than ' if above else ''}{low:g}" + ("" if math.isinf(high) else f"..{high:g}")
+    allowed += " or more" if math.isinf(high) and not above else ""
+    if isinstance(value, (bool, str, bytes)):
+        raise NotAllowed(f"{what} {value!r} is not a number; allowed is {allowed}")
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise NotAllowed(f"{what} {value!r} is not a number; allowed is {allowed}") from None
+    if not math.isfinite(result) or not low <= result <= high or (above and result == low):
+        raise NotAllowed(f"{what} {value} is out of range; allowed is {allowed}")
+    return result
+
+
+def one_of(what: str, value: object, allowed: Sequence[str]) -> str:
+    """*value*, if it is one of *allowed*."""
+    if isinstance(value, str) and value in allowed:
+        return value
+    hint = closest(value, allowed) if isinstance(value, str) else ""
+    raise NotAllowed(f"{what} {value!r} is unknown; allowed is {', '.join(allowed)}{hint}")
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """`"; did you mean …?"` for a misspelt *name*, or nothing where nothing is near."""
+    by_lower = {candidate.lower(): candidate for candidate in known}
+    matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
+    return f"; did you mean {by_lower[matches[0]]!r}?" if matches else ""

@@ -1,0 +1,142 @@
+"""Every error this package raises, sorted by whose fault it is.
+
+After an error on a line with a motor at its end, the first question is: *did the drive take it?* Each class answers
+that in its docstring. Nothing that arrives on a line can raise anything outside this tree.
+
+This module uses nothing of the package; the compiled core imports it and raises these classes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = [
+    "BadAnswer",
+    "CrcError",
+    "DrivebusError",
+    "DrivebusWarning",
+    "NoAnswer",
+    "NotAllowed",
+    "PortError",
+    "Refused",
+    "StoreWarning",
+    "Unconfirmed",
+]
+
+
+class DrivebusError(Exception):
+    """The base of all errors here.
+
+    Attributes:
+        unit: The unit that was asked (1..247, 0 for a broadcast), or None where no unit is concerned.
+        request: The whole request frame, empty if nothing was sent.
+        raw: The bytes that came back, as they came; empty if none did.
+        started: Unix time in seconds at which the request began, or None.
+        ended: Unix time in seconds at which it was given up or answered, or None.
+    """
+
+    unit: int | None
+    request: bytes
+    raw: bytes
+    started: float | None
+    ended: float | None
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        unit: int | None = None,
+        request: bytes = b"",
+        raw: bytes = b"",
+        started: float | None = None,
+        ended: float | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.unit = unit
+        self.request = bytes(request)
+        self.raw = bytes(raw)
+        self.started = started
+        self.ended = ended
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The built-in reduction passes positional arguments only, and OSError adds its own.
+        return _rebuild, (type(self), str(self), dict(self.__dict__))
+
+
+class PortError(DrivebusError, OSError):
+    """The port: not found, busy, not permitted, or lost. It is re-opened by itself at the next call.
+
+    Did the drive take it? If the port was lost after the request had left, it may have.
+    """
+
+
+class NoAnswer(DrivebusError, TimeoutError):
+    """The unit stayed silent.
+
+    Did the drive take it? It may have: a silent drive has either not heard the request, or its answer was lost.
+    """
+
+
+class BadAnswer(DrivebusError):
+    """Bytes came, but no valid answer to what was asked. They are in `raw`.
+
+    Did the drive take it? It may have: only its answer is known to be bad.
+    """
+
+
+class CrcError(BadAnswer):
+    """The bytes that came do not match their own CRC; the message names both values.
+
+    Did the drive take it? It may have: only its answer is known to be damaged.
+    """
+
+
+class Refused(DrivebusError):
+    """The drive said no: an exception answer.
+
+    Did the drive take it? No. What it was doing before, it still does.
+
+    Attributes:
+        code: The exception code, 1..255.
+        name: Its short name, such as `"illegal_address"`.
+        meaning: What this family of drives means by it.
+    """
+
+    code: int
+    name: str
+    meaning: str
+
+    def __init__(self, message: str = "", *, code: int = 0, name: str = "", meaning: str = "", **details: Any) -> None:
+        super().__init__(message, **details)
+        self.code = code
+        self.name = name
+        self.meaning = meaning
+
+
+class Unconfirmed(DrivebusError):
+    """A command was sent, and its effect is not known or did not show in time.
+
+    Did the drive take it? Nobody knows from here. The message names the state that was seen last. Commands are never
+    repeated by this package: look at the machine, then decide.
+    """
+
+
+class NotAllowed(DrivebusError, ValueError):
+    """Out of range, read-only, unknown name, wrong state of the drive, or a read-only bus.
+
+    Did the drive take it? No: what was asked was not sent.
+    """
+
+
+class DrivebusWarning(UserWarning):
+    """The base of all warnings here."""
+
+
+class StoreWarning(DrivebusWarning):
+    """The same parameter is stored in EEPROM again and again; its write life is limited. Write to RAM instead."""
+
+
+def _rebuild(cls: type[DrivebusError], message: str, state: dict[str, Any]) -> DrivebusError:
+    error = cls(message)
+    error.__dict__.update(state)
+    return error

@@ -1,0 +1,253 @@
+"""Commands that move a motor, and the proof that they did.
+
+Three rules hold for every command. What can be checked is checked before anything is sent. The command is sent once and
+never repeated. Success is what the drive's own state says afterwards; if that cannot be learnt, the caller is told so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from drivebus import checks
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Unconfirmed
+from drivebus.registers import Registers
+from drivebus.values import ControlSource, Fault, State, Value
+
+__all__ = ["POLL_INTERVAL", "Motion", "Seen"]
+
+POLL_INTERVAL = 0.02
+"""Seconds of the line's clock between two looks at the state."""
+
+_LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
+
+
+class Seen(NamedTuple):
+    """The status words of one read, decoded."""
+
+    state: State
+    fields: Mapping[str, str]
+    fault: Fault | None
+    time: float
+
+    @property
+    def source(self) -> ControlSource | None:
+        """Where the drive takes its commands from, if its words tell."""
+        channel = self.fields.get("control_channel")
+        return next((source for source in ControlSource if source.value == channel), None)
+
+    def __str__(self) -> str:
+        return f"{self.state}, {self.fault}" if self.fault else str(self.state)
+
+
+class Motion(Registers):
+    """Starts, stops and resets one drive. Times are seconds of the line's clock, real or simulated."""
+
+    def run(self, hz: float | None = None, *, reverse: bool = False, confirm: float = 1.0) -> None:
+        """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
+
+        Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`.
+
+        Args:
+            hz: Setpoint in Hz, 0 to the drive's own maximum; None keeps the one it has.
+            reverse: Turn the other way.
+            confirm: Seconds until the state word must show it; 0 does not look.
+
+        Raises:
+            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum. Nothing was sent
+                that moves it.
+            Refused: The drive did not start.
+            Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
+        """
+        confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        raw = None if hz is None else self._setpoint_word(hz)
+        before = self._ready_to_start()
+        self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
+
+    def jog(self, *, reverse: bool = False, confirm: float = 1.0) -> None:
+        """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`."""
+        confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        before = self._ready_to_start()
+        self._start("jog_reverse" if reverse else "jog_forward", None, reverse, before, confirm)
+
+    def stop(self, *, confirm: float = 1.0) -> None:
+        """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
+
+        Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end.
+
+        Raises:
+            Refused: The drive did not take it; it still runs if it ran.
+            Unconfirmed: It was sent, and the drive does not show it.
+        """
+        self._halt("stop", confirm)
+
+    def coast(self, *, confirm: float = 1.0) -> None:
+        """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`."""
+        self._halt("coast", confirm)
+
+    def jog_stop(self, *, confirm: float = 1.0) -> None:
+        """Ends a jog by the jog's own ramp. Errors as for `stop`."""
+        self._halt("jog_stop", confirm)
+
+    def reset_fault(self, *, confirm: float = 1.0) -> None:
+        """Resets a fault whose cause is gone. Sends nothing where there is none.
+
+        Raises:
+            Refused: The drive did not take it.
+            Unconfirmed: It was sent, and the fault is still there: its cause is, most likely.
+        """
+        confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        if self.look().state is not State.FAULT:
+            return
+        self._command("reset_fault")
+        self._confirm("reset_fault", lambda seen: seen.state is not State.FAULT, confirm)
+
+    @property
+    def setpoint(self) -> float:
+        """The setpoint last given over the bus, in Hz. Setting it changes the speed of a motor that runs.
+
+        Raises, when set:
+            NotAllowed: Above the drive's own maximum or out of range; nothing was sent.
+            NoAnswer, BadAnswer, PortError: The drive may have taken it all the same.
+            Refused: The drive kept the old one.
+        """
+        return float(self.read("set_frequency"))
+
+    @setpoint.setter
+    def setpoint(self, hz: float) -> None:
+        self.bus.write(self.unit, self.profile.address("set_frequency"), self._setpoint_word(hz))
+
+    def look(self) -> Seen:
+        """The status words, in one read."""
+        names = ("status_word_1", "status_word_2", "fault_code")
+        first, *_ = places = [self.profile.address(name) for name in names]
+        words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1)
+        state, fields, fault = (words[place - first] for place in places)
+        return Seen(
+            self._state_of(state),
+            self.profile.fields("status_word_2", fields),
+            self.profile.fault(fault) if fault else None,
+            time,
+        )
+
+    def _setpoint_word(self, hz: float) -> int:
+        hz = checks.number("setpoint", hz, 0.0)
+        raw = self.profile.encode("set_frequency", hz)
+        limit = self.profile.maximum_frequency
+        if limit is not None:
+            highest: Value = self.read(limit)
+            if hz > highest:
+                raise NotAllowed(
+                    f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
+                    f"allowed is 0..{highest:g} Hz. No setpoint was sent to unit {self.unit}",
+                    unit=self.unit,
+                )
+        return raw
+
+    def _ready_to_start(self) -> Seen:
+        seen = self.look()
+        if seen.state is State.FAULT:
+            raise NotAllowed(
+                f"unit {self.unit} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
+                "Remove the cause, then reset_fault()",
+                unit=self.unit,
+            )
+        if seen.state is State.POWER_OFF:
+            raise NotAllowed(
+                f"unit {self.unit} has no voltage on its DC bus; nothing that moves it was sent", unit=self.unit
+            )
+        if seen.source not in (ControlSource.COMMUNICATION, None):
+            raise NotAllowed(
+                f"unit {self.unit} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
+                "was sent. prepare_control() sets it to obey the bus",
+                unit=self.unit,
+            )
+        return seen
+
+    def _start(self, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
+        wanted = State.REVERSE if reverse else State.FORWARD
+        turning_round = before.state.running and before.state is not wanted
+        frequency = self._running_frequency() if turning_round else 0.0
+        self._command(command, setpoint)
+
+        def shows(seen: Seen) -> bool:
+            # A motor that turns the other way must slow down first; its state word follows at zero.
+            return seen.state is wanted or (turning_round and self._running_frequency() < frequency)
+
+        self._confirm(command, shows, confirm)
+
+    def _halt(self, command: str, confirm: float) -> None:
+        confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        self._command(command)
+        first: list[float] = []
+
+        def shows(seen: Seen) -> bool:
+            if not seen.state.running:
+                return True
+            first.append(self._running_frequency())
+            return first[-1] < first[0]
+
+        self._confirm(command, shows, confirm)
+
+    def _running_frequency(self) -> float:
+        return float(self.read("running_frequency"))
+
+    def _command(self, name: str, setpoint: int | None = None) -> None:
+        """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
+        address, code = self.profile.command(name)
+        words: int | list[int] = code
+        if setpoint is not None:
+            place = self.profile.address("set_frequency")
+            if place == address + 1:
+                words = [code, setpoint]
+            else:
+                self.bus.write(self.unit, place, setpoint)
+        try:
+            self.bus.write(self.unit, address, words)
+        except _LINE_ERRORS as error:
+            raise Unconfirmed(
+                f"{name} was sent to unit {self.unit} and not confirmed ({error}); it may have acted. "
+                f"{self._seen_last()}. It was not repeated",
+                unit=self.unit,
+                request=error.request,
+                raw=error.raw,
+                started=error.started,
+                ended=error.ended,
+            ) from error
+
+    def _seen_last(self) -> str:
+        try:
+            return f"State seen afterwards: {self.look()}"
+        except _LINE_ERRORS as error:
+            return f"Its state could not be read afterwards either ({type(error).__name__})"
+
+    def _confirm(self, command: str, shows: Callable[[Seen], bool], within: float) -> None:
+        if within == 0:
+            return
+        deadline = self.bus.now() + within
+        last = "no state could be read"
+        while True:
+            try:
+                seen = self.look()
+                if shows(seen):
+                    return
+                last = f"state seen last: {seen}"
+                source = seen.source
+                if source not in (ControlSource.COMMUNICATION, None):
+                    last += f", with commands from the {source}"
+                if seen.fault is not None:
+                    break
+            except (NoAnswer, BadAnswer) as error:
+                last = f"its last answer: {error}"
+            except PortError as error:
+                raise Unconfirmed(
+                    f"{command} was sent to unit {self.unit}; the port was lost before its state showed it ({error})",
+                    unit=self.unit,
+                ) from error
+            if self.bus.now() >= deadline:
+                break
+            self.bus.sleep(POLL_INTERVAL)
+        raise Unconfirmed(
+            f"{command} was sent to unit {self.unit}, and its state does not show it; {last}. It was not repeated",
+            unit=self.unit,
+        )

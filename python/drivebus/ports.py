@@ -1,0 +1,121 @@
+"""From what a person types as a port to what the core opens.
+
+Paths and COM names, `socket://` and `tcp://` go to the core as they are. `sim://` makes a simulator. pyserial's other
+URLs are opened by pyserial. What is already open is taken as it is.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+from urllib.parse import parse_qsl
+
+import serial
+
+from drivebus import checks
+from drivebus._native import SerialFormat
+from drivebus.errors import NotAllowed, PortError
+from drivebus.profile import profiles
+from drivebus.sim import Simulator
+
+__all__ = ["format_of", "open_simulator", "resolve"]
+
+_CORE_SCHEMES = ("socket", "tcp")
+_PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
+_SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence")
+
+
+def resolve(port: object, line: SerialFormat) -> object:
+    """What to hand to the core for *port*; a `Simulator` stays one.
+
+    Raises:
+        NotAllowed: It is no port at all, or a URL that nobody opens.
+        PortError: pyserial could not open it.
+    """
+    if isinstance(port, Simulator):
+        return port
+    if isinstance(port, os.PathLike):
+        port = os.fspath(port)
+    if isinstance(port, str):
+        return _resolve_text(port, line)
+    if callable(getattr(port, "read", None)) and callable(getattr(port, "write", None)):
+        return port
+    raise NotAllowed(
+        f"port {port!r} is no port; give a path (/dev/ttyUSB0, COM3), a URL (socket://host:port, sim://gd350), "
+        "a Simulator, or an open serial.Serial"
+    )
+
+
+def format_of(port: object, asked: SerialFormat) -> SerialFormat:
+    """The format for *port*: an open serial port and a simulator keep their own, everything else takes *asked*."""
+    if isinstance(port, Simulator):
+        return port.format
+    if isinstance(port, (str, os.PathLike)) or not hasattr(port, "baudrate"):
+        return asked
+    return SerialFormat(
+        getattr(port, "baudrate", asked.baudrate),
+        getattr(port, "parity", asked.parity),
+        getattr(port, "stopbits", asked.stopbits),
+        getattr(port, "bytesize", asked.bytesize),
+        asked.silence,
+    )
+
+
+def _resolve_text(port: str, line: SerialFormat) -> object:
+    if not port.strip() or "\0" in port:
+        raise NotAllowed(f"port {port!r} is no port; give a path such as /dev/ttyUSB0 or COM3, or a URL")
+    scheme, separator, _ = port.partition("://")
+    if not separator or scheme in _CORE_SCHEMES:
+        return port
+    if scheme == "sim":
+        return open_simulator(port, line)
+    if scheme in _PYSERIAL_SCHEMES:
+        return _open_pyserial(port, line)
+    known = (*_CORE_SCHEMES, "sim", *_PYSERIAL_SCHEMES)
+    names = ", ".join(f"{name}://" for name in known)
+    raise NotAllowed(f"port {port!r} has an unknown scheme; known are {names}{checks.closest(scheme, known)}")
+
+
+def _open_pyserial(url: str, line: SerialFormat) -> Any:
+    try:
+        return serial.serial_for_url(
+            url,
+            baudrate=line.baudrate,
+            parity=line.parity,
+            stopbits=line.stopbits,
+            bytesize=line.bytesize,
+            timeout=0,
+        )
+    except (serial.SerialException, ValueError, OSError) as error:
+        raise PortError(f"{url} could not be opened: {error}") from error
+
+
+def open_simulator(url: str, line: SerialFormat) -> Simulator:
+    """`sim://gd350` or `sim://1=gd350,2=gd350`, with `?clock=virtual&seed=1`, as a simulator in this process."""
+    body, _, query = url.removeprefix("sim://").partition("?")
+    units: dict[int, str] = {}
+    for part in body.strip("/").split(","):
+        left, equals, right = part.partition("=")
+        unit, family = (left, right) if equals else ("1", left)
+        if not unit.isdecimal():
+            raise NotAllowed(f"unit {unit!r} in {url!r} is not a whole number; allowed is 1..247, as in sim://1=gd350")
+        if int(unit) in units:
+            raise NotAllowed(f"unit {unit} stands twice in {url!r}; give each unit once, as in sim://1=gd350,2=gd350")
+        units[checks.unit(int(unit))] = checks.one_of("profile", family, profiles())
+    options = {"clock": "real", "seed": "0", "strict_silence": "0"}
+    for key, value in parse_qsl(query, keep_blank_values=True):
+        options[checks.one_of("simulator option", key, _SIMULATOR_OPTIONS)] = value
+    if not options["seed"].isdecimal():
+        raise NotAllowed(f"seed {options['seed']!r} in {url!r} is not a whole number; allowed is 0 or more")
+    return Simulator(
+        units,
+        baudrate=line.baudrate,
+        parity=line.parity,
+        stopbits=line.stopbits,
+        bytesize=line.bytesize,
+        silence=line.silence,
+        seed=int(options["seed"]),
+        transport="process",
+        clock=options["clock"],
+        strict_silence=options["strict_silence"] not in ("0", "false", ""),
+    )

@@ -1,0 +1,181 @@
+"""Families of drives: what their registers, parameters, faults and commands mean.
+
+A profile is data; the package ships some, and `Profile.load` reads one from a folder of your own.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from drivebus import _native
+from drivebus.values import Description, Fault
+
+__all__ = ["Profile", "identify", "profiles"]
+
+_MAXIMUM_FREQUENCY = "P00.03"
+_FAULT_HISTORY = ("P07.27", "P07.28", "P07.29", "P07.30", "P07.31", "P07.32")
+
+
+class Profile:
+    """What one family of drives means by its words. Immutable, and shared freely between drives and threads."""
+
+    __slots__ = ("_descriptions", "_names", "_native")
+
+    def __init__(self, native: _native.Profile) -> None:
+        self._native = native
+        self._names = native.names()
+        self._descriptions: dict[str, Description] = {}
+
+    @classmethod
+    def builtin(cls, name: str) -> Profile:
+        """A shipped profile by its name.
+
+        Raises:
+            NotAllowed: There is none of that name; the message has the closest.
+        """
+        return cls(_native.Profile.builtin(name))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Profile:
+        """A profile from a folder with `profile.toml` and its CSV files.
+
+        Raises:
+            NotAllowed: The folder or a line in it is wrong; the message names file, line and reason.
+        """
+        return cls(_native.Profile.load(path))
+
+    @property
+    def name(self) -> str:
+        """The family in one word, such as `"gd350"`."""
+        return self._native.name
+
+    @property
+    def title(self) -> str:
+        """The family as its maker calls it."""
+        return self._native.title
+
+    @property
+    def max_words(self) -> int:
+        """Most words in one read or write."""
+        return self._native.max_words
+
+    def names(self) -> list[str]:
+        """Every register name and parameter code, registers first, in address order."""
+        return list(self._names)
+
+    def monitor_names(self) -> list[str]:
+        """The registers that `Drive.monitor` reads when it is given no names."""
+        return self._native.monitor_names()
+
+    def name_at(self, address: int) -> str | None:
+        """The register or parameter at *address* (0..0xFFFF), or None."""
+        return next((name for name in self._names if self._native.address(name) == address), None)
+
+    def describe(self, name: str, /) -> Description:
+        """All that is known of one register or parameter. NotAllowed names the closest for a misspelt one."""
+        known = self._descriptions.get(name)
+        if known is None:
+            known = self._descriptions[name] = Description(**self._native.describe(name))
+        return known
+
+    def address(self, name: str, /, *, store: bool | None = None) -> int:
+        """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True)."""
+        return self._native.address(name, store=store)
+
+    def decode(self, name: str, raw: int, /) -> int | float:
+        """*raw* (0..0xFFFF) in engineering units."""
+        return self._native.decode(name, raw)
+
+    def encode(self, name: str, value: object, /) -> int:
+        """*value* as a word 0..0xFFFF. NotAllowed names value, range and unit."""
+        return self._native.encode(name, value)
+
+    def fields(self, name: str, raw: int, /) -> dict[str, str]:
+        """The bit fields of a word, such as `{"ready": "ready", "motor": "motor 1"}`; empty for a plain number."""
+        return self._native.fields(name, raw)
+
+    def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
+        """The fewest reads (address, count) that hold all *names*."""
+        return self._native.plan(names)
+
+    def command(self, name: str, /) -> tuple[int, int]:
+        """Address and code of a command such as `"run_forward"` or `"coast"`."""
+        return self._native.command(name)
+
+    def is_command(self, address: int, /) -> bool:
+        """Whether a write to *address* can move a motor."""
+        return self._native.is_command(address)
+
+    def state(self, raw: int, /) -> str:
+        """The first status word by name."""
+        return self._native.state(raw)
+
+    def control(self) -> list[dict[str, Any]]:
+        """What must be set before the drive obeys the bus, in the order in which to set it."""
+        return self._native.control()
+
+    def fault(self, code: int, /) -> Fault:
+        """One fault by its number; an unknown number says so in its label."""
+        return _fault(self._native.fault(code))
+
+    def faults(self) -> list[Fault]:
+        """Every fault that is known, by number."""
+        return [_fault(row) for row in self._native.faults()]
+
+    def fault_named(self, mnemonic: str) -> Fault | None:
+        """One fault by what the keypad shows, such as `"OL1"`, or None. Capitals count: STo and STO differ."""
+        return next((fault for fault in self.faults() if fault.mnemonic == mnemonic), None)
+
+    def exception(self, code: int, /) -> tuple[str, str]:
+        """Name and meaning of an exception code in this family."""
+        return self._native.exception(code)
+
+    def identifies(self, code: int) -> str | None:
+        """The family that identification *code* names, as far as this profile knows; None if it does not."""
+        return self._native.identify(code)
+
+    @property
+    def maximum_frequency(self) -> str | None:
+        """The parameter that holds the drive's highest output frequency, if it has one."""
+        return _MAXIMUM_FREQUENCY if _MAXIMUM_FREQUENCY in self._names else None
+
+    @property
+    def fault_history(self) -> tuple[str, ...]:
+        """The parameters that hold the last faults, the latest first."""
+        return tuple(code for code in _FAULT_HISTORY if code in self._names)
+
+    def __repr__(self) -> str:
+        return f"Profile({self.name!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return self._native is other._native if isinstance(other, Profile) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(id(self._native))
+
+
+def profiles() -> list[str]:
+    """The names of the profiles that come with the package."""
+    return _native.Profile.builtin_names()
+
+
+def identify(code: int) -> str | None:
+    """The family that identification *code* (register 2103H) names, by all shipped profiles; None if none knows it."""
+    for name in profiles():
+        family = _native.Profile.builtin(name).identify(code)
+        if family is not None:
+            return family
+    return None
+
+
+def _fault(row: dict[str, Any]) -> Fault:
+    return Fault(
+        code=row["code"],
+        mnemonic=row["mnemonic"],
+        label=row["label"],
+        cause=row["cause"] or "",
+        remedy=row["remedy"] or "",
+        verified=row["verified"],
+    )

@@ -1,0 +1,84 @@
+"""What a drive needs from the line it hangs on and from the profile of its family.
+
+`Drive` is written against these two protocols: it runs on a bus, on a stand-in, on anything that behaves like one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from drivebus.values import Description, Fault
+
+__all__ = ["BusProtocol", "ProfileProtocol"]
+
+
+class BusProtocol(Protocol):
+    """A line with its own clock. All times are seconds."""
+
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+
+    def sleep(self, seconds: float, /) -> None:
+        """Waits on the line's clock."""
+
+    def read(self, unit: int, address: int, count: int = 1, /) -> list[int]:
+        """Reads words; repeated by the bus's own policy."""
+
+    def read_stamped(self, unit: int, address: int, count: int = 1, /) -> tuple[list[int], float, float]:
+        """Reads words, with the Unix times of request and answer."""
+
+    def write(self, unit: int, address: int, value: int | Sequence[int], /) -> None:
+        """Writes one word or several. Sent once."""
+
+
+class ProfileProtocol(Protocol):
+    """What one family of drives means by its words."""
+
+    @property
+    def name(self) -> str:
+        """The family, such as `"gd350"`."""
+
+    def monitor_names(self) -> list[str]:
+        """The registers worth watching."""
+
+    def describe(self, name: str, /) -> Description:
+        """All that is known of one register or parameter."""
+
+    def address(self, name: str, /, *, store: bool | None = None) -> int:
+        """Where *name* is read, or written to RAM (*store* False) or EEPROM (*store* True)."""
+
+    def decode(self, name: str, raw: int, /) -> int | float:
+        """A word in engineering units."""
+
+    def encode(self, name: str, value: object, /) -> int:
+        """Engineering units as a word."""
+
+    def fields(self, name: str, raw: int, /) -> dict[str, str]:
+        """The bit fields of a word, each with its meaning."""
+
+    def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
+        """The fewest reads that hold all *names*."""
+
+    def command(self, name: str, /) -> tuple[int, int]:
+        """Address and code of a command."""
+
+    def is_command(self, address: int, /) -> bool:
+        """Whether a write to *address* can move a motor."""
+
+    def state(self, raw: int, /) -> str:
+        """The first status word by name."""
+
+    def control(self) -> list[dict[str, Any]]:
+        """What must be set before the drive obeys the bus."""
+
+    def fault(self, code: int, /) -> Fault:
+        """One fault by its number."""
+
+    @property
+    def maximum_frequency(self) -> str | None:
+        """The parameter that holds the drive's highest output frequency, if it has one."""
+
+    @property
+    def fault_history(self) -> Sequence[str]:
+        """The parameters that hold the last faults, the latest first."""

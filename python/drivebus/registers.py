@@ -1,0 +1,190 @@
+"""One unit's registers and parameters by name, in engineering units.
+
+Names become addresses, words become values, and back. What may be written, and where it is kept, is decided here;
+what makes a motor turn is not: commands are refused, `Drive` has methods for them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, overload
+
+from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
+from drivebus.protocols import BusProtocol, ProfileProtocol
+from drivebus.values import Choice, Description, Snapshot, State, Value
+
+__all__ = ["Registers"]
+
+_STORES_BEFORE_WARNING = 5
+"""EEPROM writes of one parameter by one program that are taken for use; more look like a loop."""
+
+
+class _Planned(NamedTuple):
+    name: str
+    address: int
+    raw: int
+
+
+class Registers:
+    """The registers and parameters of one unit.
+
+    Attributes:
+        bus: The line it hangs on.
+        unit: Its address, 1..247.
+        profile: What its words mean.
+    """
+
+    def __init__(self, bus: BusProtocol, unit: int, profile: ProfileProtocol) -> None:
+        self.bus = bus
+        self.unit = unit
+        self.profile = profile
+        self._in_ram: set[str] = set()
+        self._stored: dict[str, int] = {}
+
+    def describe(self, name: str) -> Description:
+        """All that is known of a register or parameter. Nothing is sent.
+
+        Raises:
+            NotAllowed: Unknown name; the message has the closest.
+        """
+        return self.profile.describe(name)
+
+    @overload
+    def read(self, name: str, /) -> Value: ...
+    @overload
+    def read(self, name: str, /, *more: str) -> Any: ...
+    def read(self, *names: str) -> Value | dict[str, Value]:
+        """Reads registers or parameters in the fewest requests.
+
+        One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
+        where the drive counts, and `Choice` where it names.
+
+        Raises:
+            NotAllowed: No name, or an unknown one; nothing was sent.
+            NoAnswer, BadAnswer, Refused: See each.
+        """
+        if not names:
+            raise NotAllowed("read() needs at least one name, such as 'output_current' or 'P00.11'")
+        values = self.snapshot(*names)
+        return values[names[0]] if len(names) == 1 else dict(values)
+
+    def snapshot(self, *names: str) -> Snapshot:
+        """Reads *names* in the fewest requests, under one time stamp."""
+        places = {name: self.profile.address(name) for name in names}
+        words: dict[int, int] = {}
+        started = ended = 0.0
+        for index, (address, count) in enumerate(self.profile.plan(names)):
+            answer, sent, ended = self.bus.read_stamped(self.unit, address, count)
+            started = started if index else sent
+            words.update(enumerate(answer, address))
+        values = {name: self.value(name, words[place]) for name, place in places.items()}
+        units = {name: self.profile.describe(name).unit for name in names}
+        return Snapshot(values, units, started, ended - started)
+
+    def value(self, name: str, raw: int) -> Value:
+        """The word *raw* of *name* in engineering units."""
+        value = self.profile.decode(name, raw)
+        choices = self.profile.describe(name).choices
+        if choices and isinstance(value, int):
+            return Choice(value, choices.get(value, f"{value} (not listed)"))
+        return value
+
+    @overload
+    def write(self, name: str, value: object, store: bool = False) -> None: ...
+    @overload
+    def write(self, name: Mapping[str, object], *, store: bool = False) -> None: ...
+    def write(self, name: str | Mapping[str, object], value: object = None, store: bool = False) -> None:
+        """Writes one value, or several from a mapping, each by its own request, sent once.
+
+        Parameters go to RAM: they are lost when the drive is switched off. With *store* they go to EEPROM, whose
+        write life is limited; one that already has its value is not written again.
+
+        All checks come first: if one value is not allowed, none is sent.
+
+        Args:
+            name: A register name or parameter code, or a mapping of them to values.
+            value: In engineering units, or the label of a choice.
+            store: Keep parameters in EEPROM.
+
+        Raises:
+            NotAllowed: Unknown name, out of range, read-only, a command, or writable only while stopped and the drive
+                runs. Nothing was sent.
+            NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same.
+            Refused: The drive kept what it had.
+
+        Where one of several fails, those before it were written; the error's note names them.
+        """
+        wanted = name if isinstance(name, Mapping) else {name: value}
+        if not isinstance(name, Mapping) and value is None:
+            raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
+        planned = [self._plan_write(key, asked, store) for key, asked in wanted.items()]
+        self._check_state(planned)
+        done: list[str] = []
+        for item in planned:
+            try:
+                self._write_one(item, store)
+            except DrivebusError as error:
+                if done and hasattr(error, "add_note"):
+                    error.add_note(f"written before it: {', '.join(done)}")
+                raise
+            done.append(item.name)
+
+    def _plan_write(self, name: str, value: object, store: bool) -> _Planned:
+        known = self.profile.describe(name)
+        if not known.writable:
+            raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=self.unit)
+        if self.profile.is_command(known.address):
+            raise NotAllowed(
+                f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
+                "or reset_fault()",
+                unit=self.unit,
+            )
+        return _Planned(name, self.profile.address(name, store=store), self.profile.encode(name, value))
+
+    def _check_state(self, planned: Sequence[_Planned]) -> None:
+        only_stopped = [item.name for item in planned if self.profile.describe(item.name).access == "stop"]
+        if not only_stopped:
+            return
+        state = self.state()
+        if state.running:
+            raise NotAllowed(
+                f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {self.unit} runs "
+                f"({state}); nothing was written",
+                unit=self.unit,
+            )
+
+    def _write_one(self, item: _Planned, store: bool) -> None:
+        is_parameter = self.profile.describe(item.name).kind == "parameter"
+        if not is_parameter or not store:
+            self.bus.write(self.unit, item.address, item.raw)
+            if is_parameter:
+                self._in_ram.add(item.name)
+            return
+        # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
+        in_force = self.bus.read(self.unit, self.profile.address(item.name), 1)[0]
+        if in_force == item.raw and item.name not in self._in_ram:
+            return
+        self.bus.write(self.unit, item.address, item.raw)
+        self._in_ram.discard(item.name)
+        self._count_store(item.name)
+
+    def _count_store(self, name: str) -> None:
+        self._stored[name] = times = self._stored.get(name, 0) + 1
+        if times >= _STORES_BEFORE_WARNING:
+            warnings.warn(
+                f"{name} of unit {self.unit} was stored in EEPROM {times} times by this program; "
+                "its write life is limited: write to RAM (store=False) in a loop",
+                StoreWarning,
+                stacklevel=4,
+            )
+
+    def state(self) -> State:
+        """What the drive is doing: one read of its first status word."""
+        return self._state_of(self.bus.read(self.unit, self.profile.address("status_word_1"), 1)[0])
+
+    def _state_of(self, word: int) -> State:
+        try:
+            return State(self.profile.state(word))
+        except ValueError:
+            return State.UNKNOWN

@@ -1,0 +1,69 @@
+"""Modbus RTU frames without a line: encode requests, judge answers, take apart any frame.
+
+Nothing here opens, sends or waits. Frames are whole: unit, PDU and CRC.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from drivebus import _native
+from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
+
+__all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write"]
+
+
+@dataclass(frozen=True, repr=False)
+class Frame:
+    """One frame of either direction, by its fields. Those its kind does not have are None.
+
+    Attributes:
+        kind: `"read"`, `"write"`, `"write_many"`, `"echo"` (requests, and answers that look like them),
+            `"read_answer"`, `"write_many_answer"`, `"exception"` or `"other"`.
+        unit: Unit address, 0 for a broadcast.
+        function: Function code; of an exception, the one that was refused.
+        crc: The CRC it carries, which is right.
+        address: First register address.
+        count: Number of registers.
+        value: The word of a single write.
+        values: The words read or written.
+        word: The word of an echo.
+        code: Exception code.
+        pdu: The PDU of a frame that is none of the above.
+    """
+
+    kind: str
+    unit: int
+    function: int
+    crc: int
+    address: int | None = None
+    count: int | None = None
+    value: int | None = None
+    values: list[int] | None = None
+    word: int | None = None
+    code: int | None = None
+    pdu: bytes | None = None
+
+    def __repr__(self) -> str:
+        shown = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            if field.name in ("address", "crc"):
+                shown.append(f"{field.name}={value:#06x}")
+            elif isinstance(value, bytes):
+                shown.append(f"{field.name}={value.hex(' ')!r}")
+            else:
+                shown.append(f"{field.name}={value!r}")
+        return f"Frame({', '.join(shown)})"
+
+
+def decode(frame: bytes | bytearray | memoryview) -> Frame:
+    """Any frame of either direction, by its fields.
+
+    Raises:
+        CrcError: The CRC does not match; the message names both.
+        BadAnswer: It is too short, too long, or no frame.
+    """
+    return Frame(**_native.decode(frame))

@@ -1,0 +1,209 @@
+"""A drive in the box: a simulated line with simulated drives, behind a pseudo-terminal, a TCP port, or in process.
+
+    with drivebus.sim.Simulator({1: "gd350"}) as simulator, drivebus.Bus(simulator) as bus:
+        bus.drive(1).status()
+
+The line keeps real character times, in real time or in virtual time. `Simulator.line` spoils what it carries on demand;
+`Simulator.drive` is the machine's side: its shaft, its load, its keypad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import TracebackType
+
+from drivebus import _native, checks
+from drivebus._native import SerialFormat, SimulatedLine
+from drivebus.errors import NotAllowed
+from drivebus.profile import Profile, profiles
+
+__all__ = ["SimulatedDrive", "SimulatedLine", "Simulator"]
+
+
+class SimulatedDrive:
+    """One simulated drive, seen from its shaft and its keypad, not from the bus."""
+
+    __slots__ = ("_native", "_profile")
+
+    def __init__(self, native: _native.SimulatedDrive) -> None:
+        self._native = native
+        self._profile = Profile.builtin(native.profile)
+
+    @property
+    def unit(self) -> int:
+        """Its address on the line, 1..247."""
+        return self._native.unit
+
+    @property
+    def profile(self) -> str:
+        """The family it behaves like."""
+        return self._native.profile
+
+    @property
+    def state(self) -> str:
+        """What it does, in the words of `drivebus.State`."""
+        return self._native.state
+
+    @property
+    def frequency(self) -> float:
+        """Output frequency in Hz, negative in reverse."""
+        return self._native.frequency
+
+    @property
+    def speed(self) -> float:
+        """Shaft speed in rpm, negative in reverse."""
+        return self._native.speed
+
+    @property
+    def fault(self) -> int:
+        """The present fault's number, 0 for none."""
+        return self._native.fault
+
+    @property
+    def load(self) -> float:
+        """Load torque as a share of the motor's rated torque, 0.0..4.0. May be set."""
+        return self._native.load
+
+    @load.setter
+    def load(self, share: float) -> None:
+        self._native.load = checks.number("load", share, 0.0, 4.0)
+
+    @property
+    def inputs(self) -> int:
+        """The digital inputs, bit 0 = S1. May be set."""
+        return self._native.inputs
+
+    @inputs.setter
+    def inputs(self, bits: int) -> None:
+        self._native.inputs = checks.whole("inputs", bits, 0, 0xFFFF, hexadecimal=True)
+
+    def trip(self, fault: int | str) -> None:
+        """Trips the drive with *fault*: its number, or what the keypad shows, such as `"OL1"`."""
+        self._native.trip(
+            self._fault_code(fault) if isinstance(fault, str) else checks.whole("fault", fault, 1, 0xFFFF)
+        )
+
+    def _fault_code(self, mnemonic: str) -> int:
+        fault = self._profile.fault_named(mnemonic)
+        if fault is None:
+            hint = checks.closest(mnemonic, [fault.mnemonic for fault in self._profile.faults() if fault.mnemonic])
+            raise NotAllowed(f"{self.profile} has no fault {mnemonic!r}{hint}")
+        return fault.code
+
+    def power_cycle(self) -> None:
+        """Switches the drive off and on: RAM is lost, EEPROM stays."""
+        self._native.power_cycle()
+
+    def register(self, address: int) -> int:
+        """The word at *address* as the drive would answer it now. NotAllowed where it would refuse."""
+        return self._native.register(checks.address(address))
+
+    @property
+    def eeprom_writes(self) -> int:
+        """How often EEPROM was written since the simulation began."""
+        return self._native.eeprom_writes
+
+    def writes(self) -> list[tuple[float, int, int]]:
+        """Every word the drive took from the bus: seconds since the simulation began, address, value."""
+        return self._native.writes()
+
+    def __repr__(self) -> str:
+        return f"<SimulatedDrive {self.unit}: {self.profile}, {self.state}, {self.frequency:.2f} Hz>"
+
+
+class Simulator:
+    """A simulated line with simulated drives on it.
+
+    Args:
+        units: The family on each unit address, such as `{1: "gd350"}`.
+        baudrate: Bits per second on the line.
+        parity: `"N"`, `"E"` or `"O"`.
+        stopbits: 1 or 2.
+        bytesize: 7 or 8.
+        silence: `"spec"`, `"characters"` or seconds, as for `drivebus.SerialFormat`.
+        seed: Makes every random choice repeatable.
+        transport: `"pty"` (a pseudo-terminal, for any program), `"tcp"` (RTU over TCP on 127.0.0.1) or `"process"`
+            (only for `drivebus.Bus(simulator)`).
+        clock: `"real"`, or `"virtual"` (only with `"process"`): time jumps to what happens next, nobody waits.
+        strict_silence: Whether drives ignore requests that come before the silence is over, as real ones do.
+
+    Raises:
+        NotAllowed: An argument is wrong.
+        PortError: The pseudo-terminal or TCP port could not be opened.
+    """
+
+    __slots__ = ("_native", "format", "transport")
+
+    def __init__(
+        self,
+        units: Mapping[int, str],
+        *,
+        baudrate: int = 19200,
+        parity: str = "E",
+        stopbits: int = 1,
+        bytesize: int = 8,
+        silence: str | float = "spec",
+        seed: int = 0,
+        transport: str = "pty",
+        clock: str = "real",
+        strict_silence: bool = False,
+    ) -> None:
+        checks.one_of("transport", transport, ("pty", "tcp", "process"))
+        checks.one_of("clock", clock, ("real", "virtual"))
+        if clock == "virtual" and transport != "process":
+            raise NotAllowed(
+                f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
+            )
+        if not units:
+            raise NotAllowed('no units: give at least one, such as {1: "gd350"}')
+        families = profiles()
+        for unit, family in units.items():
+            checks.unit(unit)
+            checks.one_of("profile", family, families)
+        self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
+        self.transport = transport
+        self._native = _native.Simulator(
+            units,
+            self.format,
+            seed=checks.whole("seed", seed, 0, 2**64 - 1),
+            transport=transport,
+            realtime=clock == "real",
+            strict_silence=strict_silence,
+        )
+
+    @property
+    def port(self) -> str:
+        """What another program opens: a path or `socket://127.0.0.1:N`; `sim:…` in process."""
+        return self._native.port
+
+    @property
+    def line(self) -> SimulatedLine:
+        """The wire: what it saw, and what it is told to spoil."""
+        return self._native.line
+
+    def drive(self, unit: int) -> SimulatedDrive:
+        """The machine's side of one drive."""
+        return SimulatedDrive(self._native.drive(checks.unit(unit)))
+
+    def now(self) -> float:
+        """Seconds since the simulation began."""
+        return self._native.now()
+
+    def advance(self, seconds: float) -> None:
+        """Lets virtual time pass. NotAllowed on a real-time simulation."""
+        self._native.advance(checks.number("seconds", seconds, 0.0))
+
+    def close(self) -> None:
+        """Ends the simulation. Closing again does nothing."""
+        self._native.close()
+
+    def __enter__(self) -> Simulator:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Simulator on {self.port}>"

@@ -1,0 +1,346 @@
+"""What a drive says, as values a program can use: choices, states, faults, snapshots.
+
+Plain data: nothing here reads from a drive or knows how its words are laid out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+__all__ = [
+    "Choice",
+    "Control",
+    "ControlItem",
+    "ControlSource",
+    "Description",
+    "Fault",
+    "Found",
+    "Snapshot",
+    "State",
+    "Stats",
+    "Status",
+    "Value",
+]
+
+
+class Choice(int):
+    """A number that the drive gives a name: an int in every respect, and its label as text.
+
+    `str()` and f-strings show the label, `int()` and comparisons the number.
+    """
+
+    label: str
+
+    def __new__(cls, value: int, label: str) -> Choice:
+        """The number *value*, called *label*."""
+        self = super().__new__(cls, value)
+        self.label = label
+        return self
+
+    def __str__(self) -> str:
+        return self.label
+
+    def __repr__(self) -> str:
+        return f"Choice({int(self)}, {self.label!r})"
+
+    def __getnewargs__(self) -> tuple[int, str]:  # type: ignore[override]
+        return int(self), self.label
+
+
+Value = int | float
+"""A value in engineering units: float where the drive measures, int where it counts, `Choice` where it names."""
+
+
+class State(Enum):
+    """What the drive is doing, from its first status word."""
+
+    FORWARD = "forward"
+    REVERSE = "reverse"
+    STOPPED = "stopped"
+    FAULT = "fault"
+    POWER_OFF = "power_off"
+    PRE_EXCITING = "pre_exciting"
+    UNKNOWN = "unknown"
+
+    @property
+    def running(self) -> bool:
+        """Whether the drive feeds the motor with the aim of turning it."""
+        return self in (State.FORWARD, State.REVERSE)
+
+    def __str__(self) -> str:
+        return self.value.replace("_", " ")
+
+
+class ControlSource(Enum):
+    """Where the drive takes its run command from."""
+
+    KEYPAD = "keypad"
+    TERMINAL = "terminal"
+    COMMUNICATION = "communication"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a drive.
+
+    Attributes:
+        code: The fault's number in the drive.
+        mnemonic: What the keypad shows, such as `"OL1"`.
+        label: What it means, in words.
+        cause: What may have caused it; empty if no manual says so.
+        remedy: What to do about it; empty if no manual says so.
+        verified: Whether number and meaning were printed for this very family.
+    """
+
+    code: int
+    mnemonic: str
+    label: str
+    cause: str = ""
+    remedy: str = ""
+    verified: bool = True
+
+    def __str__(self) -> str:
+        text = f"{self.mnemonic} ({self.code}): {self.label}" if self.mnemonic else f"{self.code}: {self.label}"
+        return text if self.verified else f"{text} [unverified]"
+
+
+@dataclass(frozen=True)
+class Status:
+    """The state of a drive at one moment.
+
+    What the family's status words do not tell is None.
+
+    Attributes:
+        state: What it is doing.
+        ready: Whether it could run now.
+        source: Where it takes its commands from.
+        motor: Which motor's data are in force, 1..4.
+        overload_alarm: Whether it warns that a motor overload is near.
+        frequency: Output frequency in Hz.
+        setpoint: Set frequency in force, in Hz.
+        fault: The present fault, or None.
+        fields: Every field of the status word in the drive's own words.
+        time: Unix time in seconds at which the status words were asked for.
+    """
+
+    state: State
+    ready: bool | None
+    source: ControlSource | None
+    motor: int | None
+    overload_alarm: bool | None
+    frequency: float
+    setpoint: float
+    fault: Fault | None
+    fields: Mapping[str, str]
+    time: float
+
+    def __str__(self) -> str:
+        parts = [str(self.state), f"{self.frequency:.2f} of {self.setpoint:.2f} Hz"]
+        if self.ready is not None:
+            parts.append("ready" if self.ready else "not ready")
+        if self.source is not None:
+            parts.append(f"commands from {self.source}")
+        if self.overload_alarm:
+            parts.append("overload pre-alarm")
+        if self.fault is not None:
+            parts.append(f"fault {self.fault}")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class ControlItem:
+    """One thing that must be set before the drive obeys the bus.
+
+    Attributes:
+        code: The parameter, such as `"P00.01"`.
+        wanted: The value it needs.
+        actual: The value it has.
+        ok: Whether they are equal.
+        verified: Whether a document of this family prints the wanted value.
+        label: The parameter in words.
+        note: What else is known about it.
+    """
+
+    code: str
+    wanted: Value
+    actual: Value
+    ok: bool
+    verified: bool
+    label: str
+    note: str = ""
+
+
+class Control(tuple[ControlItem, ...]):
+    """The list that `Drive.check_control` gives: true when every item is as it must be."""
+
+    __slots__ = ()
+
+    def __bool__(self) -> bool:
+        return all(item.ok for item in self)
+
+    def __str__(self) -> str:
+        lines = []
+        for item in self:
+            verdict = "ok" if item.ok else f"needs {int(item.wanted)}"
+            unverified = "" if item.verified else " [value unverified]"
+            lines.append(f"{item.code} {item.label}: {int(item.actual)}, {verdict}{unverified}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A unit that answered a scan.
+
+    Attributes:
+        unit: Its address, 1..247.
+        profile: The family it was identified as; None if it is unknown or would not tell.
+        identification: Its identification code; None if it would not tell.
+        round_trip: Seconds from the request's first bit to the answer's last.
+        problem: What was wrong with its answer, or None.
+    """
+
+    unit: int
+    profile: str | None
+    identification: int | None
+    round_trip: float
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class Description:
+    """All that is known of one register or parameter.
+
+    Attributes:
+        name: Its name, such as `"output_current"`, or its code if it has no other name.
+        code: The parameter code, such as `"P00.11"`; None for registers.
+        label: What it is, in words.
+        kind: `"register"` or `"parameter"`.
+        address: Where it is read, 0..0xFFFF.
+        unit: Engineering unit, empty for a plain number.
+        scale: Raw counts per unit.
+        signed: Whether the word is two's complement.
+        low, high: Range in engineering units; None where it is not known, text where another parameter limits it.
+        default: Factory value, or None.
+        access: `"rw"`, `"ro"`, `"run"` (writable at any time), `"stop"` (only while stopped) or `"unknown"`.
+        choices: Labels of the values, or None.
+        bits: Labels of bit fields, or None.
+        source: The document that says so.
+        verified: Whether that document is about this very family.
+        note: What else is worth knowing.
+    """
+
+    name: str
+    code: str | None
+    label: str
+    kind: str
+    address: int
+    unit: str
+    scale: int | float
+    signed: bool
+    low: Any
+    high: Any
+    default: Any
+    access: str
+    choices: Mapping[int, str] | None
+    bits: Mapping[str, Mapping[int, str]] | None
+    source: str
+    verified: bool
+    note: str
+
+    @property
+    def writable(self) -> bool:
+        """Whether a write makes sense at all."""
+        return self.access != "ro"
+
+
+class Snapshot(Mapping[str, Value]):
+    """Values read together: a mapping whose names are attributes too.
+
+    Attributes:
+        time: Unix time in seconds at which the first request left.
+        duration: Seconds until the last answer was complete.
+        units: Engineering unit of each name.
+    """
+
+    __slots__ = ("_values", "duration", "time", "units")
+
+    def __init__(self, values: Mapping[str, Value], units: Mapping[str, str], time: float, duration: float) -> None:
+        self._values = dict(values)
+        self.units = dict(units)
+        self.time = time
+        self.duration = duration
+
+    def __getitem__(self, name: str) -> Value:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, name: str) -> Value:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._values[name]
+        except KeyError:
+            raise AttributeError(f"this snapshot holds no {name!r}, only {', '.join(self._values)}") from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._values]
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name}={value} {self.units[name]}".rstrip() for name, value in self._values.items())
+        return f"Snapshot({shown})"
+
+
+class Stats(Mapping[str, Any]):
+    """Counters and latencies: a mapping whose names are attributes too, nested where it is per unit.
+
+    Counters are ints, latencies seconds. `stats.answers`, `stats.units[1].timeouts`.
+    """
+
+    __slots__ = ("_values",)
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values: dict[str, Any] = {
+            key: Stats.nested(value) if isinstance(value, Mapping) else value for key, value in values.items()
+        }
+
+    @staticmethod
+    def nested(values: Mapping[Any, Any]) -> Any:
+        """A mapping by name becomes `Stats`; one by unit stays a dict of `Stats`."""
+        if all(isinstance(key, str) for key in values) and values:
+            return Stats(values)
+        return {key: Stats(value) if isinstance(value, Mapping) else value for key, value in values.items()}
+
+    def __getitem__(self, name: str) -> Any:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._values[name]
+        except KeyError:
+            raise AttributeError(f"no such figure: {name!r}; there are {', '.join(self._values)}") from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._values]
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name}={value!r}" for name, value in self._values.items())
+        return f"Stats({shown})"
