@@ -1,0 +1,75 @@
+"""drivebus as the master of other people's slaves. Register *a* of each holds *a*, so a wrong answer shows at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+import drivebus
+
+HELD = 0x400  # registers each slave has
+
+
+@pytest.fixture(params=["pymodbus", "libmodbus"])
+def slave(
+    request: pytest.FixtureRequest, wire: tuple[str, str], serve: Callable[..., str]
+) -> Iterator[tuple[str, drivebus.Bus]]:
+    """Whose slave it is, and a bus to it."""
+    ours, theirs = wire
+    arguments = [request.getfixturevalue("libmodbus")] if request.param == "libmodbus" else []
+    serve(f"{request.param}_server", theirs, *arguments)
+    with drivebus.Bus(ours, baudrate=19200, parity="N", timeout=2) as bus:
+        yield request.param, bus
+
+
+def test_reads(slave: tuple[str, drivebus.Bus]) -> None:
+    _, bus = slave
+    for address, count in [(0, 1), (100, 10), (0x200, 125), (HELD - 1, 1)]:
+        assert bus.read(1, address, count) == list(range(address, address + count))
+
+
+def test_writes(slave: tuple[str, drivebus.Bus]) -> None:
+    _, bus = slave
+    bus.write(1, 100, 0xFFFF)
+    bus.write(1, 101, [0, 0x1234, 0x8000])
+    assert bus.read(1, 99, 6) == [99, 0xFFFF, 0, 0x1234, 0x8000, 104]
+    bus.write(1, 0x200, list(range(123)))
+    assert bus.read(1, 0x200, 125) == [*range(123), 0x200 + 123, 0x200 + 124]
+
+
+def test_refusals(slave: tuple[str, drivebus.Bus]) -> None:
+    _, bus = slave
+    with pytest.raises(drivebus.Refused) as refused:
+        bus.read(1, HELD, 1)
+    assert refused.value.code == 2
+    with pytest.raises(drivebus.Refused) as refused:
+        bus.write(1, HELD - 1, [1, 2])
+    assert refused.value.code == 2
+    assert bus.read(1, HELD - 1, 1) == [HELD - 1]
+
+
+def test_any_other_function(slave: tuple[str, drivebus.Bus]) -> None:
+    # 16H, mask write: AND 00F2H, OR 0025H on 0012H gives 0017H (Modbus Application Protocol V1.1b3, §6.16).
+    _, bus = slave
+    pdu = bytes.fromhex("16 00 12 00 F2 00 25")
+    assert bus.transact(1, pdu, len(pdu)) == pdu
+    assert bus.read(1, 0x12, 1) == [0x17]
+
+
+def test_loop_back(slave: tuple[str, drivebus.Bus]) -> None:
+    whose, bus = slave
+    if whose == "libmodbus":
+        # It knows no function 08H, and stays silent where it should refuse.
+        with pytest.raises(drivebus.NoAnswer):
+            bus.echo(1, 0x12AB)
+    else:
+        assert bus.echo(1, 0x12AB) > 0.0
+    assert bus.read(1, 7, 1) == [7]
+
+
+def test_a_unit_that_is_not_there(slave: tuple[str, drivebus.Bus]) -> None:
+    _, bus = slave
+    with pytest.raises(drivebus.NoAnswer):
+        bus.read(9, 0, 1)
+    assert bus.read(1, 7, 1) == [7]
