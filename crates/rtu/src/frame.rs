@@ -101,6 +101,9 @@ pub struct Adu {
 }
 
 impl Adu {
+    /// No frame: what a master holds before its first request.
+    pub(crate) const EMPTY: Self = Self { bytes: [0; MAX_ADU], len: 0 };
+
     /// The frame that asks `request` of `destination`.
     ///
     /// ```

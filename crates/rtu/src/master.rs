@@ -1,0 +1,461 @@
+//! One request at a time: keep silence, send, wait, judge.
+//!
+//! The rule of this file: **an answer is accepted only if it can only belong to the request in flight.** RTU has no
+//! transaction number, so after a time-out the answer may still come and look like the answer to a later request. A
+//! unit that left a request open is therefore in *quarantine*: only an echo (08H/0000) with a fresh word is sent to
+//! it, and only the return of that word ends the quarantine.
+//!
+//! What is assumed of a unit: it answers in the order it was asked, at most once each. A gateway that reorders
+//! answers breaks that.
+
+use core::time::Duration;
+
+use crate::answer::{Answer, AnswerError, Expected};
+use crate::frame::{Adu, Frame, FrameError};
+use crate::framer::{Framer, Step};
+use crate::request::Request;
+use crate::{Destination, Instant, SerialFormat, UnitAddress};
+
+/// The turnaround delay after a broadcast that the specification suggests: units need time to act.
+///
+/// Source: *Modbus over Serial Line* V1.02, §2.4.1 (100 ms to 200 ms).
+pub const TURNAROUND: Duration = Duration::from_millis(100);
+
+/// A master with at most one request in flight.
+///
+/// The caller's loop: [`begin`](Self::begin); then [`poll`](Self::poll) until it returns an outcome, waiting for
+/// bytes or for [`deadline`](Self::deadline) whenever it returns `None`. [`Event::Transmit`] hands out the bytes to
+/// send; [`sent`](Self::sent) says when the last of them will have left the wire.
+#[derive(Debug, Clone)]
+pub struct Master {
+    silence: Duration,
+    framer: Framer,
+    state: State,
+    request: Adu,
+    /// Bytes of the request that the adapter has not yet sent back, while it is known to do so.
+    own_echo: usize,
+    strips_echo: bool,
+    /// When the line was last busy, as far as is known.
+    busy: Option<Instant>,
+    quarantine: UnitSet,
+    tally: Tally,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum State {
+    Idle,
+    /// Waiting for the silence before the request.
+    Quiet {
+        job: Job,
+        give_up: Instant,
+    },
+    /// The caller sends.
+    Sending {
+        job: Job,
+    },
+    Waiting {
+        unit: UnitAddress,
+        expected: Expected,
+        until: Instant,
+    },
+    /// After a broadcast: the units act.
+    Turnaround {
+        until: Instant,
+    },
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Job {
+    destination: Destination,
+    expected: Expected,
+    timeout: Duration,
+}
+
+/// What happens to a request. All but [`Transmit`](Self::Transmit) end it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event<'a> {
+    /// The line was silent long enough: send these bytes in one piece, then call [`Master::sent`].
+    Transmit(&'a [u8]),
+    /// The unit answered, or refused with [`Answer::Exception`].
+    Answer(Answer<'a>),
+    /// The unit sent a whole frame that is not the answer. It may have done what was asked.
+    Wrong {
+        /// What is wrong with it.
+        error: AnswerError,
+        /// All of it.
+        frame: &'a [u8],
+    },
+    /// An answer began and did not survive the line. The unit may have done what was asked.
+    Corrupt {
+        /// Why it is no frame.
+        error: FrameError,
+        /// The bytes, with the noise around them.
+        bytes: &'a [u8],
+    },
+    /// The time is over. The unit may have done what was asked.
+    NoAnswer {
+        /// The beginning of an answer, or nothing.
+        bytes: &'a [u8],
+    },
+    /// The broadcast was sent and the turnaround delay is over.
+    BroadcastDone,
+    /// The line was never silent long enough: nothing was sent.
+    Busy,
+}
+
+/// What was seen on the line beside answers, since [`Master::take_tally`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// Whole frames that came when nothing was waited for, or from a unit in quarantine.
+    pub late: u32,
+    /// Whole frames of other units or functions while an answer was waited for.
+    pub foreign: u32,
+    /// Bytes that belong to no frame.
+    pub noise: u32,
+    /// Requests that came back from the adapter itself.
+    pub own_echo: u32,
+}
+
+impl Master {
+    /// A master on a line of `format`.
+    pub const fn new(format: &SerialFormat) -> Self {
+        Self::with_silence(format.t35())
+    }
+
+    /// A master that keeps a silence of its own; zero where frames are delimited by other means.
+    pub const fn with_silence(silence: Duration) -> Self {
+        Self {
+            silence,
+            framer: Framer::new(silence),
+            state: State::Idle,
+            request: Adu::EMPTY,
+            own_echo: 0,
+            strips_echo: false,
+            busy: None,
+            quarantine: UnitSet([0; 4]),
+            tally: Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 },
+        }
+    }
+
+    /// Begins `request`. It goes out when the line was silent for 3.5 characters since the last byte seen or sent,
+    /// and is given up when that takes longer than `timeout`.
+    ///
+    /// For one unit, `timeout` is the longest wait from the end of the request to the end of the answer; for a
+    /// broadcast it is the turnaround delay ([`TURNAROUND`]).
+    ///
+    /// # Errors
+    ///
+    /// [`BeginError`]: nothing is sent.
+    pub fn begin(
+        &mut self,
+        now: Instant,
+        destination: Destination,
+        request: &Request<'_>,
+        timeout: Duration,
+    ) -> Result<(), BeginError> {
+        if !matches!(self.state, State::Idle) {
+            return Err(BeginError::OutOfTurn);
+        }
+        match destination {
+            Destination::Broadcast if !request.is_write() => return Err(BeginError::BroadcastRead),
+            Destination::Unit(unit) if self.in_quarantine(unit) && !matches!(request, Request::Echo { .. }) => {
+                return Err(BeginError::Quarantine { unit });
+            }
+            _ => {}
+        }
+        self.framer.expect_anything();
+        self.request = Adu::request(destination, request);
+        // Nothing is known of a line that was never watched: it may be busy now.
+        self.busy.get_or_insert(now);
+        let job = Job { destination, expected: request.expected(), timeout };
+        self.state = State::Quiet { job, give_up: now + self.silence + timeout };
+        Ok(())
+    }
+
+    /// Says that the bytes of [`Event::Transmit`] are on their way and that the last will have left at `end`.
+    ///
+    /// Out of turn, changes nothing.
+    pub fn sent(&mut self, end: Instant) {
+        let State::Sending { job } = self.state else {
+            return;
+        };
+        self.busy = self.busy.max(Some(end));
+        let until = end + job.timeout;
+        self.state = match job.destination {
+            Destination::Unit(unit) => State::Waiting { unit, expected: job.expected, until },
+            Destination::Broadcast => State::Turnaround { until },
+        };
+    }
+
+    /// Takes bytes that arrived at `now`, as many as there is room for, and returns how many.
+    ///
+    /// After polling until `None` there is room for at least one byte.
+    pub fn receive(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        if !bytes.is_empty() {
+            self.busy = self.busy.max(Some(now));
+        }
+        let own = self.strip_own_echo(bytes);
+        own + self.framer.receive(now, &bytes[own..])
+    }
+
+    /// When to call [`poll`](Self::poll) next although no byte came; `None` while only bytes can change anything.
+    ///
+    /// Earlier is harmless. Later delays what comes next.
+    #[must_use]
+    pub fn deadline(&self) -> Option<Instant> {
+        match self.state {
+            State::Idle => self.framer.deadline(),
+            State::Sending { .. } => None,
+            State::Quiet { give_up, .. } => Some(self.silent_at().min(give_up)),
+            State::Waiting { until, .. } => Some(self.framer.deadline().map_or(until, |silent| silent.min(until))),
+            State::Turnaround { until } => Some(until),
+        }
+    }
+
+    /// What has happened by `now`; `None` when there is nothing to say.
+    pub fn poll(&mut self, now: Instant) -> Option<Event<'_>> {
+        match self.state {
+            State::Idle | State::Sending { .. } => {
+                self.count_strays(now);
+                None
+            }
+            State::Quiet { job, give_up } => {
+                self.count_strays(now);
+                if now >= self.silent_at() {
+                    self.framer.expect_anything();
+                    if let Destination::Unit(unit) = job.destination {
+                        self.framer.expect(unit, job.expected);
+                    }
+                    self.own_echo = if self.strips_echo { self.request.as_bytes().len() } else { 0 };
+                    self.state = State::Sending { job };
+                    Some(Event::Transmit(self.request.as_bytes()))
+                } else if now >= give_up {
+                    self.state = State::Idle;
+                    Some(Event::Busy)
+                } else {
+                    None
+                }
+            }
+            State::Turnaround { until } => {
+                self.count_strays(now);
+                (now >= until).then(|| {
+                    self.state = State::Idle;
+                    Event::BroadcastDone
+                })
+            }
+            State::Waiting { unit, expected, until } => self.await_answer(now, unit, expected, until),
+        }
+    }
+
+    /// Gives the request up. Returns whether the unit may have received it; then it is in quarantine.
+    pub fn abort(&mut self) -> bool {
+        let sent = match self.state {
+            State::Idle | State::Quiet { .. } => false,
+            State::Sending { job } => {
+                if let Destination::Unit(unit) = job.destination {
+                    self.quarantine.insert(unit);
+                }
+                true
+            }
+            State::Waiting { unit, .. } => {
+                self.quarantine.insert(unit);
+                true
+            }
+            State::Turnaround { .. } => true,
+        };
+        self.state = State::Idle;
+        sent
+    }
+
+    /// Whether `unit` left a request open, so that only an echo may be sent to it.
+    pub const fn in_quarantine(&self, unit: UnitAddress) -> bool {
+        self.quarantine.contains(unit)
+    }
+
+    /// Ends the quarantine of `unit` on the caller's own judgement: for a unit that does not know 08H.
+    pub const fn release(&mut self, unit: UnitAddress) {
+        self.quarantine.remove(unit);
+    }
+
+    /// Whether the adapter sends every request back, so that it is to be taken off before the answer.
+    pub const fn strip_echo(&mut self, strip: bool) {
+        self.strips_echo = strip;
+    }
+
+    /// What was seen beside answers since the last call.
+    pub const fn take_tally(&mut self) -> Tally {
+        core::mem::replace(&mut self.tally, Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 })
+    }
+
+    fn silent_at(&self) -> Instant {
+        self.busy.map_or(Instant::ZERO, |busy| busy + self.silence)
+    }
+
+    fn await_answer(
+        &mut self,
+        now: Instant,
+        unit: UnitAddress,
+        expected: Expected,
+        until: Instant,
+    ) -> Option<Event<'_>> {
+        while let Some(step) = self.framer.step(now) {
+            match step {
+                Step::Skipped { range, expected: false, .. } => self.tally.noise += count(&range),
+                Step::Skipped { range, error, expected: true } => {
+                    self.state = State::Idle;
+                    self.quarantine.insert(unit);
+                    return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
+                }
+                Step::Frame(range) => {
+                    let Ok(frame) = Frame::parse(self.framer.held(range.clone())) else {
+                        continue;
+                    };
+                    // A single exception code repeats nothing of the request, so its function is all there is to see.
+                    let judged = if frame.address() == unit.get() {
+                        expected.judge(frame.pdu())
+                    } else {
+                        Err(AnswerError::Unit { asked: unit.get(), came: frame.address() })
+                    };
+                    match judged {
+                        Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => self.count_other(range, unit),
+                        // In quarantine another word than the fresh one is a late answer to an earlier echo.
+                        Err(AnswerError::Echo { .. }) if self.in_quarantine(unit) => self.tally.late += 1,
+                        Err(_) if !expected.repeats_request() && self.is_own(range.clone()) => {
+                            self.tally.own_echo += 1;
+                        }
+                        outcome => {
+                            self.state = State::Idle;
+                            // The answer proves that the request has left the wire, whatever was computed.
+                            self.busy = Some(now);
+                            return Some(self.settle(unit, expected, outcome.err(), range));
+                        }
+                    }
+                }
+            }
+        }
+        if now < until {
+            return None;
+        }
+        self.state = State::Idle;
+        self.quarantine.insert(unit);
+        Some(Event::NoAnswer { bytes: self.framer.pending() })
+    }
+
+    fn settle(
+        &mut self,
+        unit: UnitAddress,
+        expected: Expected,
+        error: Option<AnswerError>,
+        range: core::ops::Range<usize>,
+    ) -> Event<'_> {
+        match error {
+            None => self.quarantine.remove(unit),
+            Some(_) => self.quarantine.insert(unit),
+        }
+        let frame = self.framer.held(range);
+        // Judged twice, because the first verdict could not be kept beside the change of state.
+        let verdict = match Frame::parse(frame) {
+            Ok(parsed) => expected.judge(parsed.pdu()),
+            Err(error) => return Event::Corrupt { error, bytes: frame },
+        };
+        match verdict {
+            Ok(answer) => Event::Answer(answer),
+            Err(error) => Event::Wrong { error, frame },
+        }
+    }
+
+    fn is_own(&self, range: core::ops::Range<usize>) -> bool {
+        self.framer.held(range) == self.request.as_bytes()
+    }
+
+    /// Counts a whole frame that is not the answer.
+    fn count_other(&mut self, range: core::ops::Range<usize>, unit: UnitAddress) {
+        let frame = self.framer.held(range.clone());
+        if frame == self.request.as_bytes() {
+            self.tally.own_echo += 1;
+        } else if frame.first() == Some(&unit.get()) && self.in_quarantine(unit) {
+            self.tally.late += 1;
+        } else {
+            self.tally.foreign += 1;
+        }
+    }
+
+    /// Counts what came while nothing was waited for.
+    fn count_strays(&mut self, now: Instant) {
+        while let Some(step) = self.framer.step(now) {
+            match step {
+                Step::Frame(_) => self.tally.late += 1,
+                Step::Skipped { range, .. } => self.tally.noise += count(&range),
+            }
+        }
+    }
+
+    /// Takes the adapter's echo of the request off the front of `bytes` and returns its length.
+    fn strip_own_echo(&mut self, bytes: &[u8]) -> usize {
+        if self.own_echo == 0 || !matches!(self.state, State::Waiting { .. } | State::Turnaround { .. }) {
+            return 0;
+        }
+        let request = self.request.as_bytes();
+        let rest = &request[request.len() - self.own_echo..];
+        let same = bytes.iter().zip(rest).take_while(|(came, sent)| came == sent).count();
+        if same < bytes.len().min(rest.len()) {
+            // Something else is on the line: what follows is judged as it is.
+            self.own_echo = 0;
+        } else {
+            self.own_echo -= same;
+            if self.own_echo == 0 {
+                self.tally.own_echo += 1;
+            }
+        }
+        same
+    }
+}
+
+fn count(range: &core::ops::Range<usize>) -> u32 {
+    u32::try_from(range.len()).unwrap_or(u32::MAX)
+}
+
+/// Which of the 247 units are in it.
+#[derive(Debug, Clone, Copy)]
+struct UnitSet([u64; 4]);
+
+impl UnitSet {
+    const fn contains(&self, unit: UnitAddress) -> bool {
+        self.0[unit.get() as usize / 64] >> (unit.get() % 64) & 1 == 1
+    }
+
+    const fn insert(&mut self, unit: UnitAddress) {
+        self.0[unit.get() as usize / 64] |= 1 << (unit.get() % 64);
+    }
+
+    const fn remove(&mut self, unit: UnitAddress) {
+        self.0[unit.get() as usize / 64] &= !(1 << (unit.get() % 64));
+    }
+}
+
+/// A request that was not begun. Nothing was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BeginError {
+    /// Another request is in flight.
+    OutOfTurn,
+    /// Nobody answers a broadcast, so nothing can be read by one.
+    BroadcastRead,
+    /// The unit may still answer an earlier request: send it an echo first.
+    Quarantine {
+        /// The unit.
+        unit: UnitAddress,
+    },
+}
+
+impl core::fmt::Display for BeginError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::OutOfTurn => f.write_str("another request is in flight"),
+            Self::BroadcastRead => f.write_str("nobody answers a broadcast: only writes can be sent to unit 0"),
+            Self::Quarantine { unit } => write!(f, "unit {unit} may still answer an earlier request: echo it first"),
+        }
+    }
+}
+
+impl core::error::Error for BeginError {}

@@ -1,0 +1,122 @@
+//! Arbitrary requests and answers, owned so that proptest can keep them.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(unreachable_pub, reason = "a module of several test crates")]
+
+use drivebus_rtu::*;
+use proptest::prelude::*;
+
+#[derive(Debug, Clone)]
+pub enum Owned {
+    Read(u16, u16),
+    Write(u16, u16),
+    Echo(u16),
+    Many(u16, Vec<u16>),
+    Words(Vec<u16>),
+    Confirm(u16, u16),
+    Exception(u8, u8),
+    Custom(Vec<u8>),
+}
+
+pub struct OwnedRequest(pub Owned);
+pub struct OwnedAnswer(pub Owned);
+
+impl std::fmt::Debug for OwnedRequest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::fmt::Debug for OwnedAnswer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl OwnedRequest {
+    pub fn borrow(&self) -> Request<'_> {
+        match &self.0 {
+            Owned::Read(address, count) => Request::read(*address, *count).unwrap(),
+            Owned::Write(address, value) => Request::write(*address, *value),
+            Owned::Echo(data) => Request::echo(*data),
+            Owned::Many(address, words) => Request::write_many(*address, words).unwrap(),
+            Owned::Custom(pdu) => Request::custom(pdu, AnswerLength::BySilence).unwrap(),
+            other => unreachable!("{other:?}"),
+        }
+    }
+}
+
+impl OwnedAnswer {
+    pub fn borrow(&self) -> Answer<'_> {
+        match &self.0 {
+            Owned::Words(words) => Answer::read(words).unwrap(),
+            Owned::Write(address, value) => Answer::confirming(&Request::write(*address, *value)).unwrap(),
+            Owned::Echo(data) => Answer::confirming(&Request::echo(*data)).unwrap(),
+            Owned::Confirm(address, count) => {
+                Answer::confirming(&Request::write_many(*address, &vec![0; usize::from(*count)]).unwrap()).unwrap()
+            }
+            Owned::Exception(function, code) => Answer::exception(*function, ExceptionCode(*code)),
+            Owned::Custom(pdu) => Answer::custom(pdu).unwrap(),
+            other => unreachable!("{other:?}"),
+        }
+    }
+}
+
+fn words(max: usize) -> impl Strategy<Value = Vec<u16>> {
+    prop::collection::vec(any::<u16>(), 1..=max)
+}
+
+fn custom() -> impl Strategy<Value = Owned> {
+    (0x41..=0x48_u8, prop::collection::vec(any::<u8>(), 1..=252))
+        .prop_map(|(function, data)| Owned::Custom([vec![function], data].concat()))
+}
+
+pub fn requests() -> impl Strategy<Value = OwnedRequest> {
+    prop_oneof![
+        (0..=0xFF00_u16, 1..=125_u16).prop_map(|(address, count)| Owned::Read(address, count)),
+        any::<(u16, u16)>().prop_map(|(address, value)| Owned::Write(address, value)),
+        any::<u16>().prop_map(Owned::Echo),
+        (0..=0xFF00_u16, words(123)).prop_map(|(address, words)| Owned::Many(address, words)),
+        custom(),
+    ]
+    .prop_map(OwnedRequest)
+}
+
+pub fn answers() -> impl Strategy<Value = OwnedAnswer> {
+    prop_oneof![
+        words(125).prop_map(Owned::Words),
+        any::<(u16, u16)>().prop_map(|(address, value)| Owned::Write(address, value)),
+        any::<u16>().prop_map(Owned::Echo),
+        (0..=0xFF00_u16, 1..=123_u16).prop_map(|(address, count)| Owned::Confirm(address, count)),
+        (0..0x80_u8, any::<u8>()).prop_map(|(function, code)| Owned::Exception(function, code)),
+        custom(),
+    ]
+    .prop_map(OwnedAnswer)
+}
+
+/// A request with an answer that a unit could give to it. Few addresses and values, so that strangers often fit.
+pub fn exchanges() -> impl Strategy<Value = Exchange> {
+    let small = || 0..3_u16;
+    prop_oneof![
+        (small(), prop::collection::vec(small(), 1..=3)).prop_map(|(address, words)| (
+            Owned::Read(address, u16::try_from(words.len()).unwrap()),
+            Owned::Words(words)
+        )),
+        (small(), small()).prop_map(|(address, value)| (Owned::Write(address, value), Owned::Write(address, value))),
+        small().prop_map(|data| (Owned::Echo(data), Owned::Echo(data))),
+        (small(), prop::collection::vec(small(), 1..=3)).prop_map(|(address, words)| {
+            let count = u16::try_from(words.len()).unwrap();
+            (Owned::Many(address, words), Owned::Confirm(address, count))
+        }),
+    ]
+    .prop_map(|(request, answer)| Exchange(OwnedRequest(request), OwnedAnswer(answer)))
+}
+
+#[derive(Debug)]
+pub struct Exchange(OwnedRequest, OwnedAnswer);
+
+impl Exchange {
+    pub fn borrow(&self) -> (Request<'_>, Answer<'_>) {
+        (self.0.borrow(), self.1.borrow())
+    }
+}

@@ -1,0 +1,219 @@
+//! The master over a scripted line: silence, time-outs, and answers that are not the answer.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use drivebus_rtu::*;
+
+const TIMEOUT: Duration = Duration::from_millis(100);
+
+fn unit(raw: u8) -> UnitAddress {
+    UnitAddress::new(raw).unwrap()
+}
+
+fn at(micros: u64) -> Instant {
+    Instant::from_nanos(micros * 1_000)
+}
+
+fn words(unit_address: u8, words: &[u16]) -> Vec<u8> {
+    Adu::answer(unit(unit_address), &Answer::read(words).unwrap()).as_bytes().to_vec()
+}
+
+/// A master on a 115 200 bit/s line that has sent `request` to unit 1 at 1.75 ms; the request ends at 2.5 ms.
+fn waiting(request: &Request<'_>) -> Master {
+    let format = SerialFormat::new(115_200, DataBits::Eight, Parity::Even, StopBits::One, Silence::Spec).unwrap();
+    let mut master = Master::new(&format);
+    send(&mut master, 0, request);
+    master
+}
+
+/// Begins at `now` and has the request leave after the silence. Returns when its last bit is gone.
+fn send(master: &mut Master, now: u64, request: &Request<'_>) -> u64 {
+    master.begin(at(now), unit(1).into(), request, TIMEOUT).unwrap();
+    let go = master.deadline().unwrap();
+    assert!(matches!(master.poll(go), Some(Event::Transmit(_))), "silence is over at the deadline");
+    let end = go.as_nanos() / 1_000 + 750;
+    master.sent(at(end));
+    end
+}
+
+#[test]
+fn nothing_is_sent_before_the_silence_is_over() {
+    let mut master = Master::with_silence(Duration::from_micros(1_750));
+    let request = Request::read(0x2100, 1).unwrap();
+    master.begin(at(100), unit(1).into(), &request, TIMEOUT).unwrap();
+    assert_eq!(master.poll(at(1_849)), None, "a line never watched may be busy");
+    master.receive(at(1_849), &[0x55]);
+    assert_eq!(master.deadline(), Some(at(3_599)), "counted from the last byte seen");
+    assert_eq!(master.poll(at(3_598)), None);
+    let wire = [0x01, 0x03, 0x21, 0x00, 0x00, 0x01, 0x8E, 0x36];
+    assert_eq!(master.poll(at(3_599)), Some(Event::Transmit(&wire)));
+    assert_eq!(master.take_tally().noise, 1);
+}
+
+#[test]
+fn a_line_that_is_never_silent_is_given_up_with_nothing_sent() {
+    let mut master = Master::with_silence(Duration::from_millis(2));
+    master.begin(at(0), unit(1).into(), &Request::write(0x2000, 1), TIMEOUT).unwrap();
+    for millis in 1..102 {
+        master.receive(at(millis * 1_000), &[0]);
+        assert_eq!(master.poll(at(millis * 1_000)), None);
+    }
+    assert_eq!(master.poll(at(102_000)), Some(Event::Busy));
+    assert!(!master.in_quarantine(unit(1)));
+}
+
+#[test]
+fn the_answer_is_there_at_its_last_byte() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    let answer = words(1, &[3]);
+    for (index, byte) in answer.iter().enumerate() {
+        let now = at(5_000 + 95 * index as u64);
+        assert_eq!(master.poll(now), None);
+        master.receive(now, &[*byte]);
+    }
+    let Some(Event::Answer(Answer::Read { words, .. })) = master.poll(at(5_570)) else { panic!("an answer") };
+    assert_eq!(words, Words::new(&[3]));
+}
+
+#[test]
+fn a_refusal_is_there_at_its_last_byte() {
+    let mut master = waiting(&Request::write(1, 3));
+    master.receive(at(5_000), &[0x01, 0x86, 0x04, 0x43, 0xA3]);
+    assert_eq!(master.poll(at(5_000)), Some(Event::Answer(Answer::exception(6, ExceptionCode::DEVICE_FAILURE))));
+    assert!(!master.in_quarantine(unit(1)));
+}
+
+#[test]
+fn strangers_do_not_stop_the_clock() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    master.receive(at(4_000), &words(2, &[7]));
+    assert_eq!(master.poll(at(4_000)), None, "another unit");
+    let foreign = Adu::answer(unit(1), &Answer::custom(&[0x04, 2, 0, 7]).unwrap());
+    master.receive(at(8_000), foreign.as_bytes());
+    assert_eq!(master.poll(at(8_000)), None, "another function");
+    master.receive(at(12_000), &words(1, &[3]));
+    assert!(matches!(master.poll(at(12_000)), Some(Event::Answer(Answer::Read { .. }))));
+    assert_eq!(master.take_tally().foreign, 2);
+}
+
+#[test]
+fn a_whole_frame_that_cannot_be_right_is_wrong_at_once() {
+    let mut master = waiting(&Request::read(0x2100, 4).unwrap());
+    let short = words(1, &[3]);
+    master.receive(at(5_000), &short);
+    assert_eq!(
+        master.poll(at(5_000)),
+        Some(Event::Wrong { error: AnswerError::Count { asked: 4, came: 1 }, frame: &short })
+    );
+    assert!(master.in_quarantine(unit(1)));
+
+    let mut master = waiting(&Request::write(0x2001, 1000));
+    let other = Adu::request(unit(1).into(), &Request::write(0x2001, 999));
+    master.receive(at(5_000), other.as_bytes());
+    assert!(matches!(master.poll(at(5_000)), Some(Event::Wrong { error: AnswerError::Echo { .. }, .. })));
+}
+
+#[test]
+fn a_corrupt_answer_is_told_when_silence_shows_that_nothing_follows() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    let mut bytes = words(1, &[3]);
+    bytes[3] ^= 0x10;
+    master.receive(at(5_000), &bytes);
+    assert_eq!(master.poll(at(6_749)), None);
+    assert!(matches!(master.poll(at(6_750)), Some(Event::Corrupt { error: FrameError::Crc { .. }, .. })));
+    assert!(master.in_quarantine(unit(1)));
+}
+
+#[test]
+fn a_beginning_of_an_answer_is_handed_over_when_the_time_is_over() {
+    let mut master = waiting(&Request::read(0x2100, 4).unwrap());
+    let bytes = words(1, &[1, 2, 3, 4]);
+    master.receive(at(5_000), &bytes[..6]);
+    assert_eq!(master.poll(at(102_499)), None);
+    assert_eq!(master.poll(at(102_500)), Some(Event::NoAnswer { bytes: &bytes[..6] }));
+}
+
+/// The first row of every comparison: the reply to register 100 arrives while register 200 is read.
+#[test]
+fn a_late_answer_is_never_the_answer_to_another_request() {
+    let mut master = waiting(&Request::read(100, 1).unwrap());
+    assert!(matches!(master.poll(at(102_500)), Some(Event::NoAnswer { .. })));
+    let read = Request::read(200, 1).unwrap();
+    assert_eq!(
+        master.begin(at(102_500), unit(1).into(), &read, TIMEOUT),
+        Err(BeginError::Quarantine { unit: unit(1) })
+    );
+    let end = send(&mut master, 102_500, &Request::echo(0xBEEF));
+    master.receive(at(end + 2_000), &words(1, &[100]));
+    assert_eq!(master.poll(at(end + 2_000)), None, "the late answer");
+    let echo = Adu::answer(unit(1), &Answer::confirming(&Request::echo(0xBEEF)).unwrap());
+    master.receive(at(end + 5_000), echo.as_bytes());
+    assert!(matches!(master.poll(at(end + 5_000)), Some(Event::Answer(Answer::Echo { .. }))));
+    assert_eq!(master.take_tally().late, 1);
+
+    let end = send(&mut master, end + 5_000, &read);
+    master.receive(at(end + 2_000), &words(1, &[200]));
+    let Some(Event::Answer(Answer::Read { words, .. })) = master.poll(at(end + 2_000)) else { panic!("an answer") };
+    assert_eq!(words, Words::new(&[200]));
+}
+
+#[test]
+fn only_the_fresh_word_ends_the_quarantine() {
+    let mut master = waiting(&Request::echo(1));
+    assert!(matches!(master.poll(at(102_500)), Some(Event::NoAnswer { .. })));
+    let end = send(&mut master, 102_500, &Request::echo(2));
+    for (word, over) in [(1, false), (2, true)] {
+        let echo = Adu::answer(unit(1), &Answer::confirming(&Request::echo(word)).unwrap());
+        master.receive(at(end + 2_000), echo.as_bytes());
+        assert_eq!(master.poll(at(end + 2_000)).is_some(), over);
+        assert_eq!(master.in_quarantine(unit(1)), !over);
+    }
+}
+
+#[test]
+fn giving_up_a_request_that_went_out_is_remembered() {
+    let mut master = waiting(&Request::read(0, 1).unwrap());
+    assert!(master.abort());
+    assert!(master.in_quarantine(unit(1)));
+    assert!(!master.in_quarantine(unit(2)));
+    master.release(unit(1));
+    master.begin(at(10_000), unit(1).into(), &Request::read(0, 1).unwrap(), TIMEOUT).unwrap();
+    assert!(!master.abort(), "nothing had been sent");
+    assert!(!master.in_quarantine(unit(1)));
+}
+
+#[test]
+fn a_broadcast_ends_with_the_turnaround_delay() {
+    let mut master = Master::new(&SerialFormat::DEFAULT);
+    assert_eq!(
+        master.begin(at(0), Destination::Broadcast, &Request::read(0, 1).unwrap(), TURNAROUND),
+        Err(BeginError::BroadcastRead)
+    );
+    master.begin(at(0), Destination::Broadcast, &Request::write(0x2000, 5), TURNAROUND).unwrap();
+    assert!(matches!(master.poll(at(3_000)), Some(Event::Transmit(_))));
+    master.sent(at(8_000));
+    assert_eq!(master.deadline(), Some(at(108_000)));
+    assert_eq!(master.poll(at(107_999)), None);
+    assert_eq!(master.poll(at(108_000)), Some(Event::BroadcastDone));
+}
+
+#[test]
+fn the_adapters_own_echo_is_seen_and_then_taken_off() {
+    // A read of 16 words from 2000H: its echo begins like its answer.
+    let request = Request::read(0x2000, 16).unwrap();
+    let own = Adu::request(unit(1).into(), &request);
+    let mut master = waiting(&request);
+    master.receive(at(2_500), own.as_bytes());
+    assert_eq!(master.poll(at(2_500)), None);
+    master.receive(at(6_000), &words(1, &[9; 16]));
+    assert!(matches!(master.poll(at(6_000)), Some(Event::Answer(Answer::Read { .. }))));
+    assert_eq!(master.take_tally(), Tally { own_echo: 1, ..Tally::default() });
+
+    master.strip_echo(true);
+    let write = Request::write(0x2001, 1000);
+    let own = Adu::request(unit(1).into(), &write);
+    let end = send(&mut master, 10_000, &write);
+    master.receive(at(end), own.as_bytes());
+    assert_eq!(master.poll(at(end)), None, "the echo is not the confirmation");
+    master.receive(at(end + 3_000), own.as_bytes());
+    assert!(matches!(master.poll(at(end + 3_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
+}

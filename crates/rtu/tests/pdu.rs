@@ -1,0 +1,108 @@
+//! Every request and answer survives the wire; everything else is refused or taken as it is, never misread.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use common::{answers, exchanges, requests};
+use drivebus_rtu::*;
+use proptest::prelude::*;
+
+proptest! {
+    #[test]
+    fn a_request_survives_the_wire(owned in requests()) {
+        let request = owned.borrow();
+        let adu = Adu::request(Destination::Broadcast, &request);
+        let frame = Frame::parse(adu.as_bytes()).unwrap();
+        prop_assert_eq!(Request::parse(frame.pdu()), Ok(request));
+    }
+
+    #[test]
+    fn an_answer_survives_the_wire(owned in answers()) {
+        let answer = owned.borrow();
+        let adu = Adu::answer(UnitAddress::MAX, &answer);
+        let frame = Frame::parse(adu.as_bytes()).unwrap();
+        prop_assert_eq!(frame.address(), 247);
+        prop_assert_eq!(Answer::parse(frame.pdu()), Ok(answer));
+    }
+
+    #[test]
+    fn what_parses_is_emitted_as_it_came(pdu in prop::collection::vec(any::<u8>(), 0..=260)) {
+        if let Ok(request) = Request::parse(&pdu) {
+            let adu = Adu::request(Destination::Broadcast, &request);
+            prop_assert_eq!(Frame::parse(adu.as_bytes()).unwrap().pdu(), &pdu[..]);
+        }
+        if let Ok(answer) = Answer::parse(&pdu) {
+            let adu = Adu::answer(UnitAddress::MIN, &answer);
+            prop_assert_eq!(Frame::parse(adu.as_bytes()).unwrap().pdu(), &pdu[..]);
+        }
+    }
+
+    #[test]
+    fn one_flipped_bit_never_parses(owned in requests(), bit in 0..2048_usize) {
+        let adu = Adu::request(UnitAddress::MIN.into(), &owned.borrow());
+        let mut bytes = adu.as_bytes().to_vec();
+        let bit = bit % (bytes.len() * 8);
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let refused = matches!(Frame::parse(&bytes), Err(FrameError::Crc { .. }));
+        prop_assert!(refused);
+    }
+
+    #[test]
+    fn the_right_answer_is_taken_and_no_other(owned in exchanges(), other in exchanges()) {
+        let (request, answer) = owned.borrow();
+        let adu = Adu::answer(UnitAddress::MIN, &answer);
+        let pdu = Frame::parse(adu.as_bytes()).unwrap().pdu();
+        prop_assert_eq!(request.expected().judge(pdu), Ok(answer));
+
+        let (_, stranger) = other.borrow();
+        let adu = Adu::answer(UnitAddress::MIN, &stranger);
+        let pdu = Frame::parse(adu.as_bytes()).unwrap().pdu();
+        let fits = match (answer, stranger) {
+            (Answer::Read { words: a, .. }, Answer::Read { words: b, .. }) => a.len() == b.len(),
+            (a, b) => a == b,
+        };
+        prop_assert_eq!(request.expected().judge(pdu).is_ok(), fits);
+    }
+}
+
+#[test]
+fn requests_out_of_range_cannot_be_made() {
+    assert_eq!(Request::read(0, 0), Err(RequestError::Count { count: 0, max: 125 }));
+    assert_eq!(Request::read(0, 126), Err(RequestError::Count { count: 126, max: 125 }));
+    assert_eq!(Request::read(0xFFFF, 2), Err(RequestError::Range { address: 0xFFFF, count: 2 }));
+    assert!(Request::read(0xFFFF, 1).is_ok());
+    assert_eq!(Request::write_many(0, &[]), Err(RequestError::Count { count: 0, max: 123 }));
+    assert_eq!(Request::write_many(0, &[0; 124]), Err(RequestError::Count { count: 124, max: 123 }));
+    assert_eq!(Request::custom(&[], AnswerLength::BySilence), Err(RequestError::PduLength { len: 0 }));
+    assert_eq!(Request::custom(&[0x83], AnswerLength::BySilence), Err(RequestError::Function { function: 0x83 }));
+    assert_eq!(Request::custom(&[7], AnswerLength::Bytes(0)), Err(RequestError::AnswerLength { len: 0 }));
+}
+
+#[test]
+fn a_write_is_known_as_one() {
+    assert!(!Request::read(0, 1).unwrap().is_write());
+    assert!(!Request::echo(0).is_write());
+    assert!(Request::write(0, 0).is_write());
+    assert!(Request::write_many(0, &[0]).unwrap().is_write());
+    for (pdu, write) in [
+        (&[0x03, 0, 0, 0, 1][..], false),
+        (&[0x04, 0, 0, 0, 1], false),
+        (&[0x08, 0, 0, 0, 1], false),
+        (&[0x08, 0, 1, 0, 0], true), // restart communications
+        (&[0x05, 0, 0, 0xFF, 0], true),
+        (&[0x17, 0], true), // read and write at once
+        (&[0x41], true),    // a maker's own: nobody knows
+    ] {
+        assert_eq!(Request::custom(pdu, AnswerLength::BySilence).unwrap().is_write(), write, "{pdu:02X?}");
+    }
+}
+
+#[test]
+fn a_refusal_of_another_function_is_no_answer() {
+    let expected = Request::read(0, 1).unwrap().expected();
+    assert_eq!(expected.judge(&[0x83, 0x02]), Ok(Answer::exception(0x03, ExceptionCode::ILLEGAL_ADDRESS)));
+    assert_eq!(expected.judge(&[0x86, 0x02]), Err(AnswerError::Function { asked: 3, came: 0x86 }));
+    assert_eq!(expected.judge(&[]), Err(AnswerError::Length { len: 0 }));
+    assert_eq!(expected.judge(&[0x03, 4, 0, 1, 0, 2]), Err(AnswerError::Count { asked: 1, came: 2 }));
+    assert_eq!(expected.judge(&[0x03, 2, 0]), Err(AnswerError::Length { len: 3 }));
+}
