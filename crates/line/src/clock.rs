@@ -11,9 +11,6 @@ use drivebus_rtu::{Duration, Instant};
 /// How long before its moment a wait leaves the kernel and spins: the timer slack of Linux and a little more.
 const SPIN: Duration = Duration::from_micros(60);
 
-/// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take no more than 24 days.
-const TURN: Duration = Duration::from_secs(3_600);
-
 /// Now, in nanoseconds of the system's monotonic clock.
 ///
 /// On Linux the same clock as Python's `time.monotonic_ns()`, and the same in every process.
@@ -52,6 +49,9 @@ pub(crate) fn wait_for(
     until: Instant,
 ) -> std::io::Result<Option<rustix::event::PollFlags>> {
     use rustix::event::{PollFd, Timespec, poll};
+
+    /// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take at most 24 days.
+    const TURN: Duration = Duration::from_secs(3_600);
 
     loop {
         let left = until.saturating_duration_since(monotonic());

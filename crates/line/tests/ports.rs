@@ -69,7 +69,7 @@ mod pty {
 
     /// The other side of a pseudo-terminal, and the path to open.
     fn pair() -> (File, String) {
-        let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+        let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&far).unwrap();
         unlockpt(&far).unwrap();
         let path = ptsname(&far, Vec::new()).unwrap().into_string().unwrap();

@@ -22,7 +22,7 @@ pub(super) fn lock(_port: &SerialPort, _pseudo_terminal: bool) -> io::Result<()>
 }
 
 /// Nothing: closing the port unlocks it.
-pub(super) fn unlock(_port: &SerialPort, _pseudo_terminal: bool) {}
+pub(super) fn unlock(_port: &SerialPort) {}
 
 /// There are no pseudo-terminals here.
 pub(super) fn is_pseudo_terminal(_port: &SerialPort, _path: &str) -> bool {
