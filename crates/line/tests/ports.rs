@@ -32,7 +32,7 @@ fn receive_exactly(line: &mut impl Line, count: usize) -> Vec<u8> {
 /// The deadline of an empty line is kept, to the nanosecond on the early side.
 fn check_deadlines(line: &mut impl Line) {
     let mut buffer = [0; 8];
-    for micros in [0, 40, 70, 2_005, 20_000] {
+    for micros in [0, 40, 110, 2_005, 20_000] {
         let until = line.now() + Duration::from_micros(micros);
         assert_eq!(line.receive(&mut buffer, until).unwrap(), 0);
         assert!(line.now() >= until, "receive of {micros} µs came back early");
