@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from types import TracebackType
 
 from drivebus import _native, checks, ports
@@ -225,7 +224,7 @@ class Bus:
             NoAnswer, BadAnswer, Refused: The drive did not tell; only if *profile* is None.
         """
         unit = checks.unit(unit)
-        return Drive(self, unit, self._ask_profile(unit) if profile is None else _find_profile(profile))
+        return Drive(self, unit, self._ask_profile(unit) if profile is None else Profile.find(profile))
 
     def _ask_profile(self, unit: int) -> Profile:
         [code] = self.read(unit, _identification_address())
@@ -246,15 +245,3 @@ class Bus:
 def _identification_address() -> int:
     """Where a drive says what it is. All shipped families use one register."""
     return Profile.builtin(profiles()[0]).address(_IDENTIFICATION)
-
-
-def _find_profile(profile: object) -> Profile:
-    if isinstance(profile, Profile):
-        return profile
-    if isinstance(profile, os.PathLike):
-        return Profile.load(profile)
-    if isinstance(profile, str):
-        if os.sep in profile or Path(profile).is_dir():
-            return Profile.load(profile)
-        return Profile.builtin(checks.one_of("profile", profile, profiles()))
-    raise NotAllowed(f"profile {profile!r} is none; give a name ({', '.join(profiles())}), a folder, or a Profile")

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from drivebus import _native
+from drivebus.errors import NotAllowed
 from drivebus.values import Description, Fault
 
 __all__ = ["Profile", "identify", "profiles"]
@@ -46,6 +48,22 @@ class Profile:
         """
         return cls(_native.Profile.load(path))
 
+    @classmethod
+    def find(cls, profile: str | os.PathLike[str] | Profile) -> Profile:
+        """The profile that *profile* means: itself, a shipped name, or a folder.
+
+        Raises:
+            NotAllowed: There is none; the message has the closest, or what is wrong in the folder.
+        """
+        if isinstance(profile, Profile):
+            return profile
+        if isinstance(profile, str):
+            is_folder = os.sep in profile or Path(profile).is_dir()
+            return cls.load(profile) if is_folder else cls.builtin(profile)
+        if isinstance(profile, os.PathLike):
+            return cls.load(profile)
+        raise NotAllowed(f"profile {profile!r} is none; give a name ({', '.join(profiles())}), a folder, or a Profile")
+
     @property
     def name(self) -> str:
         """The family in one word, such as `"gd350"`."""
@@ -69,7 +87,7 @@ class Profile:
         """The registers that `Drive.monitor` reads when it is given no names."""
         return self._native.monitor_names()
 
-    def name_at(self, address: int) -> str | None:
+    def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address* (0..0xFFFF), or None."""
         return next((name for name in self._names if self._native.address(name) == address), None)
 

@@ -39,6 +39,13 @@ class ProfileProtocol(Protocol):
     def name(self) -> str:
         """The family, such as `"gd350"`."""
 
+    @property
+    def title(self) -> str:
+        """The family as its maker calls it."""
+
+    def name_at(self, address: int, /) -> str | None:
+        """The register or parameter at *address*, or None."""
+
     def monitor_names(self) -> list[str]:
         """The registers worth watching."""
 

@@ -6,6 +6,7 @@ Nothing here opens, sends or waits. Frames are whole: unit, PDU and CRC.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 from drivebus import _native
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
@@ -15,7 +16,9 @@ __all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "en
 
 @dataclass(frozen=True, repr=False)
 class Frame:
-    """One frame of either direction, by its fields. Those its kind does not have are None.
+    """One frame of either direction, by its fields: `frame.address`, or `frame["address"]` where the name is data.
+
+    Fields that its kind does not have are None.
 
     Attributes:
         kind: `"read"`, `"write"`, `"write_many"`, `"echo"` (requests, and answers that look like them),
@@ -26,8 +29,8 @@ class Frame:
         address: First register address.
         count: Number of registers.
         value: The word of a single write.
-        values: The words read or written.
-        word: The word of an echo.
+        words: The words read, or written by a 10H request.
+        data: The word of an echo.
         code: Exception code.
         pdu: The PDU of a frame that is none of the above.
     """
@@ -39,10 +42,15 @@ class Frame:
     address: int | None = None
     count: int | None = None
     value: int | None = None
-    values: list[int] | None = None
-    word: int | None = None
+    words: list[int] | None = None
+    data: int | None = None
     code: int | None = None
     pdu: bytes | None = None
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in _FIELDS:
+            raise KeyError(name)
+        return getattr(self, name)
 
     def __repr__(self) -> str:
         shown = []
@@ -57,6 +65,9 @@ class Frame:
             else:
                 shown.append(f"{field.name}={value!r}")
         return f"Frame({', '.join(shown)})"
+
+
+_FIELDS = frozenset(field.name for field in fields(Frame))
 
 
 def decode(frame: bytes | bytearray | memoryview) -> Frame:

@@ -1,0 +1,6 @@
+"""`python -m drivebus.cli` is the command `drivebus`."""
+
+from drivebus.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+"""The command line as a whole: options before the command, the commands, errors as one line and an exit code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+import drivebus
+from drivebus.cli import look, move, tools
+from drivebus.cli.names import complete_profile
+from drivebus.cli.output import Output
+from drivebus.cli.session import Session, exit_code, parse_format
+
+__all__ = ["cli", "main"]
+
+
+class _Commands(click.Group):
+    """Turns this package's errors into one message on standard error and the exit code of their kind."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Runs the command."""
+        try:
+            return super().invoke(context)
+        except drivebus.DrivebusError as error:
+            click.echo(f"Error: {error}", err=True)
+            context.exit(exit_code(error))
+
+
+@click.group(
+    cls=_Commands,
+    context_settings={
+        "auto_envvar_prefix": "DRIVEBUS",
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+    },
+    epilog="Exit codes: 0 done, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, 6 bad answer, 7 unconfirmed. "
+    "Each option before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
+    "DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
+)
+@click.option(
+    "--port", "-p", metavar="PORT", help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, sim://gd350."
+)
+@click.option("--baud", "-b", type=click.IntRange(1), default=19200, show_default=True, help="Bits per second.")
+@click.option(
+    "--format",
+    "line_format",
+    "-f",
+    default="8E1",
+    show_default=True,
+    metavar="8E1",
+    envvar="DRIVEBUS_FORMAT",
+    callback=parse_format,
+    help="Data bits, parity, stop bits.",
+)
+@click.option("--unit", "-u", type=click.IntRange(1, 247), default=1, show_default=True, help="Unit address.")
+@click.option(
+    "--profile",
+    metavar="NAME",
+    shell_complete=complete_profile,
+    help="Family or folder; without it, the drive is asked.",
+)
+@click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="One JSON object a line.")
+@click.version_option(drivebus.__version__, prog_name="drivebus")
+@click.pass_context
+def cli(
+    context: click.Context,
+    port: str | None,
+    baud: int,
+    line_format: tuple[str, str, str],
+    unit: int,
+    profile: str | None,
+    as_json: bool,
+) -> None:
+    """Control and watch variable-frequency drives over RS-485.
+
+    Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
+    """
+    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json))
+
+
+for command in (*look.COMMANDS, *move.COMMANDS, *tools.COMMANDS):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """The entry point of the command."""
+    cli(prog_name="drivebus")

@@ -1,0 +1,135 @@
+"""Commands that write to a drive. Those that move a motor say so first and ask."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+import drivebus
+from drivebus.cli import names
+from drivebus.cli.session import Session, pass_session, yes_option
+
+__all__ = ["COMMANDS"]
+
+
+@click.command()
+@click.argument("hz", type=float, required=False)
+@click.option("--reverse", is_flag=True, help="Turn the other way.")
+@click.option("--wait", type=click.FloatRange(0), metavar="SECONDS", help="Wait until the speed is reached.")
+@yes_option
+@pass_session
+def run(session: Session, hz: float | None, reverse: bool, wait: float | None, yes: bool) -> None:
+    """Start the motor, at HZ if given. It keeps running when this command has ended."""
+    way = "in reverse" if reverse else "forward"
+    speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
+    with session.drive() as drive:
+        session.ask(f"This starts the motor {way} {speed}", yes)
+        drive.run(hz, reverse=reverse)
+        if wait is not None:
+            drive.wait_for_speed(timeout=wait)
+        _done(session, drive, "run")
+
+
+@click.command()
+@click.option("--wait", type=click.FloatRange(0), metavar="SECONDS", help="Wait until it stands.")
+@pass_session
+def stop(session: Session, wait: float | None) -> None:
+    """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
+    with session.drive() as drive:
+        drive.stop()
+        if wait is not None:
+            drive.wait_until_stopped(timeout=wait)
+        _done(session, drive, "stop")
+
+
+@click.command()
+@pass_session
+def coast(session: Session) -> None:
+    """Take the voltage off the motor; it turns on until friction ends it. Asks nothing."""
+    with session.drive() as drive:
+        drive.coast()
+        _done(session, drive, "coast")
+
+
+@click.command()
+@click.option("--seconds", type=click.FloatRange(0, 60), default=1.0, show_default=True, help="How long.")
+@click.option("--reverse", is_flag=True, help="Turn the other way.")
+@yes_option
+@pass_session
+def jog(session: Session, seconds: float, reverse: bool, yes: bool) -> None:
+    """Jog the motor at the drive's jog frequency, and end the jog, Ctrl-C included."""
+    way = "in reverse" if reverse else "forward"
+    with session.drive() as drive:
+        session.ask(f"This jogs the motor {way} for {seconds:g} s", yes)
+        try:
+            drive.jog(reverse=reverse)
+            drive.bus.sleep(seconds)
+        except (drivebus.NotAllowed, drivebus.Refused):
+            raise
+        except BaseException:
+            drive.jog_stop()
+            raise
+        drive.jog_stop()
+        _done(session, drive, "jog")
+
+
+@click.command()
+@yes_option
+@pass_session
+def reset(session: Session, yes: bool) -> None:
+    """Reset a fault whose cause is gone. A drive whose run command still stands may start again."""
+    with session.drive() as drive:
+        session.ask("This resets the fault; a drive that is still told to run may start", yes)
+        drive.reset_fault()
+        _done(session, drive, "reset")
+
+
+@click.command()
+@click.argument(
+    "assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=names.complete_assignment
+)
+@click.option("--store", is_flag=True, help="Keep parameters in EEPROM, whose write life is limited.")
+@pass_session
+def write(session: Session, assignments: tuple[str, ...], store: bool) -> None:
+    """Write registers or parameters. Parameters go to RAM: lost when the drive is switched off, unless --store.
+
+    All are checked before the first is sent. Registers that move the motor are refused.
+    """
+    asked = [names.parse_assignment(text) for text in assignments]
+    with session.drive() as drive:
+        wanted: dict[str, Any] = {}
+        for text, value in asked:
+            place = names.resolve(drive.profile, text)
+            if isinstance(place, int):
+                raise drivebus.NotAllowed(
+                    f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; "
+                    "`raw` sends what you type"
+                )
+            wanted[place] = value
+        drive.write(wanted, store=store)
+        rows = []
+        for name in wanted:
+            known = drive.describe(name)
+            rows.append([known.name, drive.read(name), known.unit, known.label])
+        session.out.rows(["name", "value", "unit", "label"], rows)
+
+
+def _done(session: Session, drive: drivebus.Drive, command: str) -> None:
+    status = drive.status()
+    if session.out.as_json:
+        session.out.record(
+            {
+                "command": command,
+                "unit": drive.unit,
+                "state": status.state,
+                "frequency": status.frequency,
+                "setpoint": status.setpoint,
+                "fault": status.fault,
+            }
+        )
+    else:
+        session.out.say(f"unit {drive.unit}: {status}")
+
+
+COMMANDS = [run, stop, coast, jog, reset, write]

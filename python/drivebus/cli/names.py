@@ -1,0 +1,94 @@
+"""What people type for a register: its name, a parameter code, or an address; and the values they give it."""
+
+from __future__ import annotations
+
+import re
+
+import click
+from click.shell_completion import CompletionItem
+
+import drivebus
+from drivebus.protocols import ProfileProtocol
+
+__all__ = [
+    "complete_assignment",
+    "complete_name",
+    "complete_profile",
+    "parse_assignment",
+    "parse_hex",
+    "parse_units",
+    "resolve",
+]
+
+_ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
+_PARAMETER = re.compile(r"p\d\d\.\d\d", re.IGNORECASE)
+
+
+def resolve(profile: ProfileProtocol, text: str) -> str | int:
+    """The name that *text* stands for, or the address where the profile has no name for it.
+
+    An unknown name stays what it is: the profile refuses it and names the closest.
+    """
+    match = _ADDRESS.fullmatch(text)
+    if match:
+        address = int(match[1] or match[2], 16)
+        return profile.name_at(address) or address
+    return text.upper() if _PARAMETER.fullmatch(text) else text
+
+
+def parse_assignment(text: str) -> tuple[str, int | float | str]:
+    """Name and value of `NAME=VALUE`; the value a number, or the label of a choice."""
+    name, equals, value = text.partition("=")
+    name, value = name.strip(), value.strip()
+    if not equals or not name or not value:
+        raise click.UsageError(f"{text!r} is no assignment; write NAME=VALUE, such as P00.11=5.0")
+    for kind in (lambda digits: int(digits, 0), float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
+
+
+def parse_hex(parts: tuple[str, ...]) -> bytes:
+    """Bytes typed in any of the usual ways: `01 03 21 00`, `01032100`, `0x01,0x03`."""
+    text = re.sub(r"0x|[\s,:]", "", " ".join(parts), flags=re.IGNORECASE)
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise click.UsageError(
+            f"{' '.join(parts)!r} is not hexadecimal bytes; write two digits each, such as 01 03 21 00 00 01"
+        ) from None
+
+
+def parse_units(text: str) -> list[int]:
+    """Units of a text such as `1-31,40`."""
+    units: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        if match is None:
+            raise click.UsageError(f"{part!r} is no unit address; write 1-247, or a list such as 1-31,40")
+        first, last = int(match[1]), int(match[2] or match[1])
+        units.extend(range(first, last + 1))
+    return units
+
+
+def _names(context: click.Context) -> list[str]:
+    asked = context.find_root().params.get("profile")
+    known = [asked] if asked in drivebus.profiles() else drivebus.profiles()
+    return [name for family in known for name in drivebus.Profile.builtin(family).names()]
+
+
+def complete_name(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names and codes of the shipped profiles, for the shell."""
+    return [CompletionItem(name) for name in _names(context) if name.lower().startswith(incomplete.lower())]
+
+
+def complete_assignment(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """As `complete_name`, up to the equals sign."""
+    return [CompletionItem(f"{item.value}=") for item in complete_name(context, parameter, incomplete)]
+
+
+def complete_profile(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names of the shipped profiles, for the shell."""
+    return [CompletionItem(name) for name in drivebus.profiles() if name.startswith(incomplete)]

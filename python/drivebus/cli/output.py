@@ -1,0 +1,109 @@
+"""Results on standard output: tables for people, one JSON object a line for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+import drivebus
+
+__all__ = ["Output", "plain", "show"]
+
+_PIPE_WIDTH = 200
+"""Characters a line may have where no terminal limits it: nothing is cut."""
+
+
+class Output:
+    """Where results go.
+
+    Attributes:
+        as_json: One object a line and no decoration.
+        console: For people.
+    """
+
+    def __init__(self, as_json: bool) -> None:
+        self.as_json = as_json
+        self.console = Console(highlight=False, soft_wrap=True)
+        if not self.console.is_terminal:
+            self.console.width = _PIPE_WIDTH
+
+    @property
+    def live(self) -> bool:
+        """Whether a person watches: a terminal, and no JSON."""
+        return self.console.is_terminal and not self.as_json
+
+    def record(self, values: Mapping[str, Any]) -> None:
+        """One JSON object."""
+        print(json.dumps({key: plain(value) for key, value in values.items()}, ensure_ascii=False), flush=True)
+
+    def say(self, text: str) -> None:
+        """A line for people; nothing in JSON."""
+        if not self.as_json:
+            self.console.print(text, markup=False)
+
+    def facts(self, values: Mapping[str, Any]) -> None:
+        """Names and values: a JSON object, or two columns."""
+        if self.as_json:
+            self.record(values)
+            return
+        table = Table.grid(padding=(0, 2))
+        for name, value in values.items():
+            if value is not None and value != "":
+                table.add_row(name.replace("_", " "), show(value))
+        self.console.print(table)
+
+    def rows(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+        """Several things of one kind: a JSON object each, or a table."""
+        if self.as_json:
+            for row in rows:
+                self.record(dict(zip(columns, row, strict=True)))
+            return
+        self.console.print(self.table(columns, rows))
+
+    @staticmethod
+    def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:
+        """A table for people, numbers to the right."""
+        kept = [list(row) for row in rows]
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        for index, name in enumerate(columns):
+            numeric = bool(kept) and all(isinstance(row[index], (int, float)) for row in kept)
+            table.add_column(name.replace("_", " "), justify="right" if numeric else "left")
+        for row in kept:
+            table.add_row(*(show(cell) for cell in row))
+        return table
+
+
+def plain(value: Any) -> Any:
+    """*value* as JSON knows it; a choice becomes its number and its label."""
+    if isinstance(value, drivebus.Choice):
+        return {"value": int(value), "label": value.label}
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, bytes):
+        return value.hex(" ").upper()
+    if isinstance(value, drivebus.Fault):
+        return {"code": value.code, "mnemonic": value.mnemonic, "label": value.label}
+    return value
+
+
+def show(value: Any) -> str:
+    """*value* for people. Text with brackets in it is no markup."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, drivebus.Choice):
+        return escape(f"{int(value)} = {value.label}")
+    if isinstance(value, bytes):
+        return value.hex(" ").upper()
+    return escape(str(value))

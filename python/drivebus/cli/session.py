@@ -1,0 +1,116 @@
+"""What every command shares: the options before it, the bus they open, errors as exit codes, and asking first."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+import drivebus
+from drivebus.cli.output import Output
+
+__all__ = ["EXIT_CODES", "Session", "exit_code", "parse_format", "pass_session", "yes_option"]
+
+EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
+    (drivebus.NotAllowed, 2),
+    (drivebus.NoAnswer, 3),
+    (drivebus.Refused, 4),
+    (drivebus.PortError, 5),
+    (drivebus.BadAnswer, 6),
+    (drivebus.Unconfirmed, 7),
+]
+"""What the process ends with, by whose fault it is; 0 is done, 1 anything else."""
+
+
+@dataclass
+class Session:
+    """The options before the command.
+
+    Attributes:
+        port: What to open, or None if it was not given.
+        baud: Bits per second.
+        line_format: Data bits, parity and stop bits, such as `("8", "E", "1")`.
+        unit: Unit address.
+        profile: Name or folder of a profile; None asks the drive.
+        out: Where results go.
+    """
+
+    port: str | None
+    baud: int
+    line_format: tuple[str, str, str]
+    unit: int
+    profile: str | None
+    out: Output
+
+    @contextmanager
+    def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
+        """The bus that the options name, opened."""
+        if self.port is None:
+            raise click.UsageError("no port: give --port or set DRIVEBUS_PORT; `drivebus ports` lists what is there")
+        bits, parity, stop = self.line_format
+        settings: dict[str, Any] = {
+            "baudrate": self.baud,
+            "bytesize": int(bits),
+            "parity": parity,
+            "stopbits": int(stop),
+            **options,
+        }
+        with drivebus.Bus(self.port, **settings) as bus:
+            yield bus
+
+    @contextmanager
+    def drive(self) -> Iterator[drivebus.Drive]:
+        """The drive that the options name."""
+        with self.bus() as bus:
+            yield self.drive_on(bus)
+
+    def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
+        """The drive that the options name, on a bus that is open."""
+        return bus.drive(self.unit, self.profile)
+
+    def known_profile(self) -> drivebus.Profile:
+        """The profile that the options name, from the drive itself only if it has to be asked."""
+        if self.profile is not None:
+            return drivebus.Profile.find(self.profile)
+        with self.drive() as drive:
+            return drivebus.Profile.find(drive.profile.name)
+
+    def ask(self, what: str, yes: bool) -> None:
+        """Says that *what* moves a motor, and goes on only if that is wanted."""
+        click.echo(f"{what} (unit {self.unit} on {self.port}).", err=True)
+        if yes:
+            return
+        if not sys.stdin.isatty():
+            raise click.UsageError("without a terminal this needs --yes; nothing was sent")
+        if not click.confirm("Is the machine clear, and shall it be done?", err=True):
+            raise click.UsageError("nothing was sent")
+
+
+pass_session = click.make_pass_decorator(Session)
+
+
+def yes_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The option that answers the question before it is asked."""
+    return click.option("--yes", "-y", is_flag=True, help="Do not ask first.")(command)
+
+
+def parse_format(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, str, str]:
+    """Data bits, parity and stop bits of a text such as `8E1`."""
+    match = re.fullmatch(r"([78])([NEO])([12])", value.strip().upper())
+    if match is None:
+        raise click.BadParameter(
+            f"{value!r} is no character format; give data bits (7, 8), parity (N, E, O) and stop bits (1, 2): 8E1, 8N1",
+            context,
+            parameter,
+        )
+    return match[1], match[2], match[3]
+
+
+def exit_code(error: drivebus.DrivebusError) -> int:
+    """What the process ends with after *error*."""
+    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), 1)
