@@ -1,1 +1,73 @@
-//! Placeholder.
+//! A simulated RS-485 line with simulated drives on it: everything runs and is tested with no hardware.
+//!
+//! The [`Simulator`] holds one half-duplex wire, on which every character takes its time, and a [`SimulatedDrive`] for
+//! each unit. Masters reach it three ways:
+//!
+//! - [`SimLine`], in process, for everything that drives a [`Line`](drivebus_line::Line); in virtual time, where the
+//!   clock jumps to what happens next, or in real time;
+//! - a pseudo-terminal ([`Simulator::serve_pty`], on Linux), for every program that opens a serial port;
+//! - RTU over TCP on 127.0.0.1 ([`Simulator::serve_tcp`], on Unix).
+//!
+//! [`SimulatedLine`] is the wire as a test bench sees it: counters, trace, faults on demand.
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use drivebus_line::Line;
+//! use drivebus_rtu::{Adu, Destination, Request, UnitAddress};
+//! use drivebus_sim::{Options, Simulator};
+//!
+//! let simulator = Simulator::new([(1, "gd350")], Options::default())?;
+//! let mut line = simulator.line();
+//!
+//! let request = Adu::request(Destination::Unit(UnitAddress::new(1)?), &Request::read(0x2103, 1)?);
+//! let sent = line.send(request.as_bytes())?;
+//! assert_eq!(sent.as_nanos(), 4_583_334); // 8 characters of 11 bits at 19 200 bit/s
+//!
+//! let mut answer = Vec::new();
+//! let mut buffer = [0; 256];
+//! let until = sent + Duration::from_millis(100);
+//! while let count @ 1.. = line.receive(&mut buffer, until)? {
+//!     answer.extend_from_slice(&buffer[..count]);
+//! }
+//! assert_eq!(answer[..5], [0x01, 0x03, 0x02, 0x01, 0xA0]); // a Goodrive350
+//! assert_eq!(line.now(), until); // and nobody has waited for it
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Where it differs from hardware
+//!
+//! - Assumption: a unit takes a request as it is after exactly 3.5 characters of silence. A gap of more than 1.5
+//!   characters inside a frame does not spoil it: behind a pseudo-terminal or TCP the gaps are the operating system's.
+//! - Assumption: where both sides speak at once, each hears the other's characters spoilt by chance (from the seed), and
+//!   nobody hears the third side's.
+//! - Assumption: two units never speak at once; the later one waits.
+//! - Bits, parity and noise levels are not simulated: a character arrives, or it arrives spoilt.
+//! - What a drive does that its manual does not say is marked "Assumption:" in the source, beside the code that does it.
+
+mod clock;
+mod drive;
+mod line;
+mod motor;
+#[cfg(target_os = "linux")]
+mod pty;
+mod ramp;
+mod random;
+#[cfg(unix)]
+mod server;
+mod simulator;
+mod spoil;
+#[cfg(unix)]
+mod tcp;
+mod trace;
+mod wire;
+mod world;
+
+pub use drive::WriteRecord;
+pub use line::SimLine;
+#[cfg(target_os = "linux")]
+pub use pty::PtyServer;
+pub use simulator::{Options, SimError, SimulatedDrive, SimulatedLine, Simulator};
+#[cfg(unix)]
+pub use tcp::TcpServer;
+pub use trace::{Side, Transmission};
