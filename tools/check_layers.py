@@ -33,7 +33,9 @@ LINE_TRAIT = {"Line", "PortError", "PortErrorKind"}
 # What the pure crates must not know. Comments and strings do not count.
 FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "rtu": re.compile(r"\b(?:std|alloc)::|\bextern\s+crate\b|\bunsafe\b|\blog::|println!"),
-    "drives": re.compile(r"\bstd::(?:net|thread|process)\b|\bstd::time::(?!Duration\b)|\bInstant::now\b|\bSystemTime\b|\bunsafe\b"),
+    "drives": re.compile(
+        r"\bstd::(?:net|thread|process)\b|\bstd::time::(?!Duration\b)|\bInstant::now\b|\bSystemTime\b|\bunsafe\b"
+    ),
     "line": re.compile(r"\bunsafe\b"),
     "sim": re.compile(r"\bunsafe\b"),
 }
@@ -54,7 +56,7 @@ PYTHON: dict[str, set[str]] = {
     "ports": {"_native", "checks", "errors", "profile", "sim"},
     "bus": {"_native", "checks", "drive", "errors", "ports", "profile", "sim", "values"},
     "__init__": {"_native", "bus", "drive", "errors", "profile", "rtu", "sim", "values"},
-    "cli": {"drivebus", "rtu", "sim"},
+    "cli": {"drivebus", "protocols", "rtu", "sim"},
 }
 
 

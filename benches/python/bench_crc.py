@@ -1,0 +1,28 @@
+"""CRC-16/MODBUS from Python, beside fastcrc, at sizes that occur. Run by `make bench`."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import fastcrc
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+import drivebus
+
+Engine = Callable[[bytes], int]
+
+ENGINES: dict[str, Engine] = {"drivebus": drivebus.crc16, "fastcrc": fastcrc.crc16.modbus}
+
+# The bodies of a request, of an answer with one, four and sixteen words, the longest body, and a capture.
+SIZES = [6, 5, 11, 35, 254, 65536]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_crc(benchmark: BenchmarkFixture, engine: str, size: int) -> None:
+    benchmark.group = f"crc16, {size} bytes"
+    data = random.Random(size).randbytes(size)
+    crc = benchmark(ENGINES[engine], data)
+    assert {crc} == {other(data) for other in ENGINES.values()}
