@@ -1,1 +1,74 @@
-//! Placeholder.
+//! What variable-frequency drives mean by their registers: pure data and arithmetic.
+//!
+//! A drive speaks in 16-bit words. This crate knows, for a family of drives, which word is the output current and that
+//! it counts tenths of an ampere; that 5 stops the motor and 6 lets it coast; that fault 11 is a motor overload; and how
+//! to ask for many values in the fewest reads. It opens no port, sends nothing and reads no clock. The only input it
+//! does is [`Profile::load`], which reads a folder.
+//!
+//! ```
+//! use drivebus_drives::{Command, Profile, State};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let gd350 = Profile::builtin("gd350")?;
+//!
+//! let current = gd350.find("output_current")?;
+//! assert_eq!(current.address(), 0x3004);
+//! assert_eq!(current.decode(57).to_string(), "5.7");
+//! assert_eq!(current.quantity().unit(), "A");
+//!
+//! assert_eq!(gd350.find("p00.11")?.encode(5.0)?, 50);
+//! assert_eq!(gd350.find("set_frequency")?.encode("12.34")?, 1234);
+//! assert!(gd350.find("set_frequency")?.encode(10.005).is_err(), "the drive counts hundredths");
+//!
+//! assert_eq!(gd350.command(Command::Coast), Some((0x2000, 6)));
+//! assert_eq!(gd350.state(3), State::Stopped);
+//! assert_eq!(gd350.fault(11).label, "Motor overload");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Profiles
+//!
+//! A family is a folder: `profile.toml` holds the rules, `registers.csv`, `parameters.csv` and `faults.csv` the long
+//! tables, each row with its source. Shipped profiles are part of the program; [`Profile::builtin_names`] lists them.
+//!
+//! # Decisions
+//!
+//! * Scaling is decimal arithmetic on digits. A float goes in by its shortest decimal form, so `0.29` means 0.29, and
+//!   no product of floats decides what a motor does.
+//! * What a manual does not print stays empty. Where the scale is missing, the quantity is in counts: its unit is
+//!   `"raw"`, whatever it measures. Rows that rest on another family's manual or on inference are not `verified`.
+//! * A bound that is another parameter (`P00.03` for frequencies) is checked at its own limit here, because this crate
+//!   knows no drive's settings, and named, so that a caller who read the parameter can check further.
+
+mod bits;
+mod command;
+mod decimal;
+mod entry;
+mod fault;
+mod load;
+mod lookup;
+mod plan;
+mod profile;
+mod quantity;
+mod serial;
+mod state;
+mod value;
+
+pub use bits::BitField;
+pub use command::{Command, Control, ParseCommandError};
+pub use entry::{Access, AccessError, Entry, Kind, Store};
+pub use fault::{Exception, Fault};
+pub use load::ProfileError;
+pub use lookup::NameError;
+pub use plan::{ReadCost, ReadSpan, plan_reads};
+pub use profile::{Identification, Profile};
+pub use quantity::Quantity;
+pub use serial::SerialDefaults;
+pub use state::State;
+pub use value::{Input, Limits, Value, ValueError};
+
+/// The examples of the README are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

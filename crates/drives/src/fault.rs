@@ -1,0 +1,65 @@
+//! Faults and exceptions: why a drive tripped, and why it refuses a request.
+
+/// A reason for which a drive trips.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Fault {
+    /// Its number in the fault register.
+    pub code: u16,
+    /// What the keypad shows: `OL1`. Case matters: on the GD350 `STo` is not `STO`. May be empty.
+    pub mnemonic: String,
+    /// What happened.
+    pub label: String,
+    /// What it comes from; may be empty.
+    pub cause: String,
+    /// What to do; may be empty.
+    pub remedy: String,
+    /// Whether number, mnemonic and label rest on documents of this family.
+    pub verified: bool,
+    /// What to know about this row; may be empty.
+    pub note: String,
+    /// Where it is printed; may be empty.
+    pub source: String,
+}
+
+impl Fault {
+    /// The fault that stands for a number which the profile does not know.
+    pub(crate) fn unknown(code: u16) -> Self {
+        Self {
+            code,
+            mnemonic: String::new(),
+            label: format!("Unknown fault {code}"),
+            cause: String::new(),
+            remedy: "Look the number up in the manual of the drive".to_owned(),
+            verified: false,
+            note: "This number is not in the profile.".to_owned(),
+            source: String::new(),
+        }
+    }
+}
+
+/// A reason for which a drive refuses a request: the code of a Modbus exception, in this family's meaning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Exception {
+    /// The exception code.
+    pub code: u8,
+    /// Its name: `operation_failed`.
+    pub name: String,
+    /// What it means, as a clause.
+    pub meaning: String,
+    /// Where it is printed; may be empty.
+    pub source: String,
+}
+
+impl Exception {
+    /// The exception that stands for a code which the profile does not know.
+    pub(crate) fn unknown(code: u8) -> Self {
+        Self {
+            code,
+            name: "unknown".to_owned(),
+            meaning: format!("exception code {code:02X}H is not documented for this drive"),
+            source: String::new(),
+        }
+    }
+}

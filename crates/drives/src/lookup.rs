@@ -1,0 +1,163 @@
+//! Names: registers, parameter codes and addresses as people write them, and the closest match for a misspelt one.
+
+use crate::entry::Entry;
+use crate::profile::Profile;
+
+/// Why a name means nothing here.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NameError {
+    /// Nothing has this name.
+    #[error("{profile} has no \"{name}\"; the closest is \"{closest}\"")]
+    Unknown {
+        /// The profile that was asked.
+        profile: String,
+        /// The name as given.
+        name: String,
+        /// The name closest to it.
+        closest: String,
+    },
+    /// The profile knows nothing at this address.
+    #[error("{profile} knows nothing at {address:04X}H; read it by its address without a profile")]
+    UnknownAddress {
+        /// The profile that was asked.
+        profile: String,
+        /// The address.
+        address: u16,
+    },
+    /// The parameter is in a group that the maker keeps closed.
+    #[error("{name} is in a group that {profile} neither reads nor writes: it is the maker's own")]
+    Closed {
+        /// The profile that was asked.
+        profile: String,
+        /// The name as given.
+        name: String,
+    },
+    /// The address is the one through which a parameter is written to RAM.
+    #[error("{address:04X}H only writes {name} to RAM and cannot be read; name it {name}")]
+    RamOnly {
+        /// The address.
+        address: u16,
+        /// The parameter behind it.
+        name: String,
+    },
+}
+
+impl Profile {
+    /// The entry with this name: a register's name, a parameter's code in upper or lower case (`p00.11`), or an address
+    /// in hex (`0x3004`, `3004H`).
+    ///
+    /// # Errors
+    ///
+    /// [`NameError`]: there is no such entry (the closest is named), or it is closed, or the address only writes.
+    pub fn find(&self, name: &str) -> Result<&Entry, NameError> {
+        let wanted = name.trim();
+        if let Some(entry) = self.entries().find(|entry| entry.name().eq_ignore_ascii_case(wanted)) {
+            return Ok(entry);
+        }
+        if let Some((group, index)) = parse_code(wanted) {
+            let address = parameter_address(group, index);
+            if self.is_closed(address) {
+                return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
+            }
+            // `P0.1` is P00.01.
+            if let Some(entry) = self.entry_at(address).filter(|entry| entry.code().is_some()) {
+                return Ok(entry);
+            }
+        }
+        if let Some(address) = parse_address(wanted) {
+            return self.entry_at(address).ok_or_else(|| self.unknown_address(name, address));
+        }
+        Err(NameError::Unknown {
+            profile: self.name().to_owned(),
+            name: name.to_owned(),
+            closest: closest(wanted, self.entries().map(Entry::name)).unwrap_or_default().to_owned(),
+        })
+    }
+
+    fn unknown_address(&self, name: &str, address: u16) -> NameError {
+        if self.is_closed(address) {
+            return NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() };
+        }
+        match self.stored_address(address).and_then(|stored| self.entry_at(stored)) {
+            Some(entry) => NameError::RamOnly { address, name: entry.name().to_owned() },
+            None => NameError::UnknownAddress { profile: self.name().to_owned(), address },
+        }
+    }
+}
+
+/// Reads a parameter's code, `P05.06` or `p5.6`, as group and index.
+pub(crate) fn parse_code(text: &str) -> Option<(u8, u8)> {
+    let (group, index) = text.strip_prefix(['P', 'p'])?.split_once('.')?;
+    let number = |digits: &str| match digits.len() {
+        1 | 2 if digits.bytes().all(|digit| digit.is_ascii_digit()) => digits.parse().ok(),
+        _ => None,
+    };
+    Some((number(group)?, number(index)?))
+}
+
+/// The address of a parameter by the rule group.index: P05.06 is 0506H, P10.01 is 0A01H.
+pub(crate) fn parameter_address(group: u8, index: u8) -> u16 {
+    u16::from_be_bytes([group, index])
+}
+
+/// Reads an address in hex, `0x3004` or `3004H`.
+pub(crate) fn parse_address(text: &str) -> Option<u16> {
+    let digits =
+        text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).or_else(|| text.strip_suffix(['H', 'h']))?;
+    // `from_str_radix` would take a sign.
+    if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) { u16::from_str_radix(digits, 16).ok() } else { None }
+}
+
+/// The candidate with the fewest edits away from `name`, upper and lower case alike; the first of several.
+pub(crate) fn closest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    // Nobody misspells a name by this much; longer input only costs time.
+    let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
+    candidates.min_by_key(|candidate| distance(&name, &candidate.to_lowercase()))
+}
+
+/// Levenshtein's distance: how many characters to insert, drop or replace.
+fn distance(from: &[char], to: &str) -> usize {
+    let mut row: Vec<usize> = (0..=from.len()).collect();
+    for (line, letter) in to.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = line + 1;
+        for (column, &other) in from.iter().enumerate() {
+            let replaced = diagonal + usize::from(letter != other);
+            diagonal = row[column + 1];
+            row[column + 1] = replaced.min(diagonal + 1).min(row[column] + 1);
+        }
+    }
+    row[from.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{closest, distance, parse_address, parse_code};
+
+    #[test]
+    fn distances_are_levenshteins() {
+        for (from, to, edits) in
+            [("", "", 0), ("", "abc", 3), ("abc", "", 3), ("kitten", "sitting", 3), ("flaw", "lawn", 2)]
+        {
+            assert_eq!(distance(&from.chars().collect::<Vec<_>>(), to), edits, "{from} {to}");
+        }
+        assert_eq!(closest("OUTPUT_CURENT", ["output_voltage", "output_current"].into_iter()), Some("output_current"));
+        assert_eq!(closest("anything", std::iter::empty()), None);
+    }
+
+    #[test]
+    fn codes_and_addresses_are_read_strictly() {
+        assert_eq!(parse_code("P05.06"), Some((5, 6)));
+        assert_eq!(parse_code("p10.1"), Some((10, 1)));
+        for text in ["05.06", "P05", "P.06", "P05.", "P005.06", "P-1.06", "P05.+6", "P05.06.07"] {
+            assert_eq!(parse_code(text), None, "{text}");
+        }
+        assert_eq!(parse_address("0x3004"), Some(0x3004));
+        assert_eq!(parse_address("3004H"), Some(0x3004));
+        assert_eq!(parse_address("ah"), Some(0x000A));
+        for text in ["3004", "0x", "H", "0x13004", "0x+304", "-4H", "0x30H"] {
+            assert_eq!(parse_address(text), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Quantities: what a word measures, counts or names, and exact conversion both ways.
+//!
+//! Knows one word at a time; knows nothing of addresses or of who may write.
+
+use std::collections::BTreeMap;
+
+use crate::decimal::{Counts, Decimal};
+use crate::lookup::{closest, parse_address};
+use crate::value::{Input, Limits, Value, ValueError};
+
+/// What a word means: value = counts / 10^decimals in [`unit`](Self::unit), within a range, or one of some choices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Quantity {
+    pub(crate) unit: String,
+    pub(crate) decimals: Option<u8>,
+    pub(crate) signed: bool,
+    pub(crate) low: Option<i32>,
+    pub(crate) high: Option<i32>,
+    pub(crate) low_from: Option<String>,
+    pub(crate) high_from: Option<String>,
+    pub(crate) choices: BTreeMap<u16, String>,
+}
+
+impl Quantity {
+    /// The unit of its values: `"Hz"`, `"A"`, `"%"` …; empty for plain numbers and choices; `"raw"` where the scale is
+    /// not known and values are counts.
+    pub fn unit(&self) -> &str {
+        if self.decimals.is_some() { &self.unit } else { "raw" }
+    }
+
+    /// Counts per unit (1, 10, 100 …). `None` where the manuals do not say: then values are counts.
+    pub fn scale(&self) -> Option<u32> {
+        self.decimals.map(|decimals| 10_u32.pow(u32::from(decimals)))
+    }
+
+    /// Digits after the point.
+    pub fn decimals(&self) -> u8 {
+        self.decimals.unwrap_or(0)
+    }
+
+    /// Whether words are two's complement.
+    pub fn is_signed(&self) -> bool {
+        self.signed
+    }
+
+    /// Whether its values are measures (with a unit or a fraction), as opposed to counts, choices and bits.
+    pub fn measures(&self) -> bool {
+        self.decimals.is_some_and(|decimals| decimals > 0 || !self.unit.is_empty())
+    }
+
+    /// The lowest value allowed, where it is documented.
+    pub fn low(&self) -> Option<Value> {
+        self.low.map(|count| self.value(count))
+    }
+
+    /// The highest value allowed, where it is documented.
+    pub fn high(&self) -> Option<Value> {
+        self.high.map(|count| self.value(count))
+    }
+
+    /// The parameter that bounds it from below on a given drive, beside [`low`](Self::low): its code.
+    pub fn low_from(&self) -> Option<&str> {
+        self.low_from.as_deref()
+    }
+
+    /// The parameter that bounds it from above on a given drive, beside [`high`](Self::high): its code.
+    pub fn high_from(&self) -> Option<&str> {
+        self.high_from.as_deref()
+    }
+
+    /// The choices that are documented, by word. Others may exist.
+    pub fn choices(&self) -> &BTreeMap<u16, String> {
+        &self.choices
+    }
+
+    /// The value of `raw`. Every word has one, in range or not.
+    pub fn decode(&self, raw: u16) -> Value {
+        self.value(if self.signed { i32::from(raw.cast_signed()) } else { i32::from(raw) })
+    }
+
+    /// The word for `input`; `name` is for the error.
+    pub(crate) fn encode(&self, name: &str, input: &Input<'_>) -> Result<u16, ValueError> {
+        let counts = self.counts(name, input)?;
+        let (low, high) = self.bounds();
+        let within = |count: i64| i64::from(low) <= count && count <= i64::from(high);
+        match counts {
+            // A count within bounds fits the word: the loader checked the bounds.
+            Counts::Whole(count) if within(count) => Ok(to_word(count)),
+            Counts::Above(floor) if within(floor) && within(floor + 1) => Err(ValueError::SurplusDigits {
+                name: name.to_owned(),
+                value: input.to_string(),
+                unit: self.unit().to_owned(),
+                below: self.decode(to_word(floor)),
+                above: self.decode(to_word(floor + 1)),
+            }),
+            _ => Err(ValueError::OutOfRange {
+                name: name.to_owned(),
+                value: input.to_string(),
+                limits: Box::new(Limits {
+                    unit: self.unit().to_owned(),
+                    low: self.value(low),
+                    high: self.value(high),
+                    low_from: self.low_from.clone(),
+                    high_from: self.high_from.clone(),
+                }),
+            }),
+        }
+    }
+
+    /// `input` in counts, whatever the range.
+    fn counts(&self, name: &str, input: &Input<'_>) -> Result<Counts, ValueError> {
+        let text = match input {
+            Input::Integer(number) => number.to_string(),
+            // `{:?}` prints the shortest digits that read back as the same float.
+            Input::Float(number) => format!("{number:?}"),
+            Input::Text(text) | Input::Decimal(text) => text.trim().to_owned(),
+        };
+        // A label comes first: the format 8E1 also reads as the number 80. The loader made sure that no label is the
+        // number of another choice.
+        if matches!(input, Input::Text(_))
+            && let Some((&word, _)) = self.choices.iter().find(|(_, label)| label.eq_ignore_ascii_case(&text))
+        {
+            return Ok(Counts::Whole(i64::from(word)));
+        }
+        if let Some(number) = Decimal::parse(&text) {
+            return Ok(number.counts(self.decimals()));
+        }
+        if let Some(word) = parse_address(&text).filter(|_| !self.measures()) {
+            return Ok(Counts::Whole(i64::from(word)));
+        }
+        let (name, value) = (name.to_owned(), input.to_string());
+        Err(match closest(&text, self.choices.values().map(String::as_str)) {
+            Some(closest) => ValueError::UnknownChoice { name, value, closest: closest.to_owned() },
+            None => ValueError::NotANumber { name, value, unit: self.unit().to_owned() },
+        })
+    }
+
+    /// The lowest and the highest count: as documented, or what a word can hold.
+    fn bounds(&self) -> (i32, i32) {
+        let (least, most) = word_limits(self.signed);
+        (self.low.unwrap_or(least), self.high.unwrap_or(most))
+    }
+
+    fn value(&self, count: i32) -> Value {
+        Value::new(count, self.decimals())
+    }
+}
+
+/// The least and the greatest count that a word holds.
+pub(crate) fn word_limits(signed: bool) -> (i32, i32) {
+    if signed { (i32::from(i16::MIN), i32::from(i16::MAX)) } else { (0, i32::from(u16::MAX)) }
+}
+
+/// The two's complement word of `count`, which must be within -32768..=65535.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits are the word")]
+pub(crate) fn to_word(count: i64) -> u16 {
+    count as u16
+}

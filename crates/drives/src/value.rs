@@ -1,0 +1,184 @@
+//! Values: as a drive means them, as a caller gives them, and why one cannot be the other.
+
+use std::fmt;
+
+/// An exact value: `count / 10^decimals`. `Display` prints every decimal: `10.00`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Value {
+    count: i32,
+    decimals: u8,
+}
+
+impl Value {
+    pub(crate) fn new(count: i32, decimals: u8) -> Self {
+        Self { count, decimals }
+    }
+
+    /// The counts, with their sign.
+    pub fn count(self) -> i32 {
+        self.count
+    }
+
+    /// The float closest to this value. It prints with no more digits than the value has.
+    pub fn to_f64(self) -> f64 {
+        // Both are whole and exact, so the one division is correctly rounded.
+        f64::from(self.count) / f64::from(10_u32.pow(u32::from(self.decimals)))
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scale = 10_u32.pow(u32::from(self.decimals));
+        let magnitude = self.count.unsigned_abs();
+        let sign = if self.count < 0 { "-" } else { "" };
+        if self.decimals == 0 {
+            return write!(f, "{sign}{magnitude}");
+        }
+        write!(f, "{sign}{}.{:0width$}", magnitude / scale, magnitude % scale, width = usize::from(self.decimals))
+    }
+}
+
+/// A value as a caller gives it.
+///
+/// A float counts by its shortest decimal form: `0.57` is 57 hundredths, exactly. Text is the label of a choice in upper
+/// or lower case, a decimal number (`"12.50"`, `"1e2"`), or, for what is not measured, hex (`"0x3F"`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Input<'a> {
+    /// A whole number of units.
+    Integer(i64),
+    /// A number of units.
+    Float(f64),
+    /// A number of units, or a choice.
+    Text(&'a str),
+    /// A number of units from a decimal type, in its text form. Never a choice.
+    Decimal(&'a str),
+}
+
+impl From<i32> for Input<'_> {
+    fn from(number: i32) -> Self {
+        Self::Integer(i64::from(number))
+    }
+}
+
+impl From<i64> for Input<'_> {
+    fn from(number: i64) -> Self {
+        Self::Integer(number)
+    }
+}
+
+impl From<f64> for Input<'_> {
+    fn from(number: f64) -> Self {
+        Self::Float(number)
+    }
+}
+
+impl<'a> From<&'a str> for Input<'a> {
+    fn from(text: &'a str) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl fmt::Display for Input<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        /// Longer text is cut in messages.
+        const SHOWN: usize = 60;
+        match self {
+            Self::Integer(number) => write!(f, "{number}"),
+            Self::Float(number) => write!(f, "{number:?}"),
+            Self::Text(text) | Self::Decimal(text) if text.chars().count() > SHOWN => {
+                write!(f, "{}…", text.chars().take(SHOWN).collect::<String>())
+            }
+            Self::Text(text) | Self::Decimal(text) => f.write_str(text),
+        }
+    }
+}
+
+/// Why a value cannot be a word of its quantity. Nothing was sent.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// The value is no number, and the quantity has no choices.
+    #[error("{name} = {value}: not a number{}", of(unit))]
+    NotANumber {
+        /// What was to be set.
+        name: String,
+        /// The value as given.
+        value: String,
+        /// The unit of the quantity; may be empty.
+        unit: String,
+    },
+    /// The value is neither a number nor one of the choices.
+    #[error("{name} = {value}: neither a number nor a known choice; the closest is \"{closest}\"")]
+    UnknownChoice {
+        /// What was to be set.
+        name: String,
+        /// The value as given.
+        value: String,
+        /// The label closest to it.
+        closest: String,
+    },
+    /// The value lies outside the range.
+    #[error("{name} = {value}{}: out of range, allowed is {limits}", spaced(&limits.unit))]
+    OutOfRange {
+        /// What was to be set.
+        name: String,
+        /// The value as given.
+        value: String,
+        /// What is allowed.
+        limits: Box<Limits>,
+    },
+    /// The value is finer than the drive's steps.
+    #[error(
+        "{name} = {value}{}: finer than the drive counts; the nearest allowed are {below} and {above}{}",
+        spaced(unit),
+        spaced(unit)
+    )]
+    SurplusDigits {
+        /// What was to be set.
+        name: String,
+        /// The value as given.
+        value: String,
+        /// The unit of the quantity; may be empty.
+        unit: String,
+        /// The next allowed value below.
+        below: Value,
+        /// The next allowed value above.
+        above: Value,
+    },
+}
+
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+fn of(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" of {unit}") }
+}
+
+/// The values that a quantity allows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Limits {
+    /// The unit of the quantity; may be empty.
+    pub unit: String,
+    /// The lowest value allowed.
+    pub low: Value,
+    /// The highest value allowed.
+    pub high: Value,
+    /// The parameter that may raise `low` on a given drive.
+    pub low_from: Option<String>,
+    /// The parameter that may lower `high` on a given drive.
+    pub high_from: Option<String>,
+}
+
+impl fmt::Display for Limits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} to {}{}", self.low, self.high, spaced(&self.unit))?;
+        match (&self.low_from, &self.high_from) {
+            (None, None) => Ok(()),
+            (Some(code), None) => write!(f, ", and not below {code}"),
+            (None, Some(code)) => write!(f, ", and not above {code}"),
+            (Some(low), Some(high)) => write!(f, ", and between {low} and {high}"),
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Names as people type them.
+
+use drivebus_drives::{NameError, Profile, ProfileError};
+use proptest::prelude::*;
+
+#[test]
+fn registers_codes_and_addresses_are_found() {
+    let profile = Profile::builtin("gd350").unwrap();
+    for (name, address) in [
+        ("output_current", 0x3004),
+        ("Output_Current", 0x3004),
+        (" output_current ", 0x3004),
+        ("0x3004", 0x3004),
+        ("3004H", 0x3004),
+        ("3004h", 0x3004),
+        ("p00.11", 0x000B),
+        ("P0.11", 0x000B),
+        ("0x000B", 0x000B),
+    ] {
+        assert_eq!(profile.find(name).unwrap().address(), address, "{name:?}");
+    }
+}
+
+#[test]
+fn what_is_not_found_is_explained() {
+    let profile = Profile::builtin("gd350").unwrap();
+    let closest = |name: &str| match profile.find(name) {
+        Err(NameError::Unknown { closest, .. }) => closest,
+        other => panic!("{name}: {other:?}"),
+    };
+    assert_eq!(closest("output_curent"), "output_current");
+    assert_eq!(closest("setfrequency"), "set_frequency");
+    assert_eq!(closest("P00.13"), "P00.03", "the first of those one character away");
+    assert!(!closest("").is_empty());
+    assert_eq!(
+        profile.find("output_curent").unwrap_err().to_string(),
+        "gd350 has no \"output_curent\"; the closest is \"output_current\""
+    );
+    assert!(matches!(profile.find("P99.01"), Err(NameError::Closed { .. })));
+    assert!(matches!(profile.find("0x6301"), Err(NameError::Closed { .. })));
+    assert!(matches!(profile.find("0x1234"), Err(NameError::UnknownAddress { address: 0x1234, .. })));
+    let error = profile.find("8007H").unwrap_err();
+    assert_eq!(error, NameError::RamOnly { address: 0x8007, name: "P00.07".to_owned() });
+}
+
+#[test]
+fn builtin_profiles_go_by_name() {
+    assert_eq!(Profile::builtin_names().collect::<Vec<_>>(), ["gd350"]);
+    assert_eq!(Profile::builtin("GD350").unwrap().title(), "INVT Goodrive350");
+    let unknown = ProfileError::Unknown { name: "gd305".to_owned(), closest: "gd350".to_owned() };
+    assert_eq!(Profile::builtin("gd305").unwrap_err(), unknown);
+    for name in Profile::builtin_names() {
+        assert_eq!(Profile::builtin(name).unwrap().name(), name);
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_name_panics(name in ".*") {
+        let profile = Profile::builtin("gd350").unwrap();
+        if let Err(error) = profile.find(&name) {
+            prop_assert!(!error.to_string().is_empty());
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The planner against a search through every possible plan.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use drivebus_drives::{Profile, ReadCost, ReadSpan, plan_reads};
+use proptest::prelude::*;
+
+/// The least cost and, at that cost, the fewest reads that cover `wanted`, by trying every read that could cover the
+/// lowest address still missing: overlapping reads, reads that begin or end in a hole, everything.
+fn search(wanted: u16, allowed: u16, max_words: u16, cost: ReadCost) -> (u64, usize) {
+    if wanted == 0 {
+        return (0, 0);
+    }
+    let lowest = u16::try_from(wanted.trailing_zeros()).unwrap();
+    let mut best = (u64::MAX, usize::MAX);
+    for first in lowest.saturating_sub(max_words - 1)..=lowest {
+        for count in (lowest - first + 1)..=max_words.min(16 - first) {
+            let read = (u16::MAX >> (16 - count)) << first;
+            if read & !allowed == 0 {
+                let (rest, reads) = search(wanted & !read, allowed, max_words, cost);
+                best = best.min((rest + u64::from(cost.request) + u64::from(cost.word) * u64::from(count), reads + 1));
+            }
+        }
+    }
+    best
+}
+
+fn addresses(bits: u16) -> Vec<u16> {
+    (0..16).filter(|bit| bits & (1 << bit) != 0).collect()
+}
+
+/// Checks one plan: it covers what was asked for, keeps the rules, and costs what the best plan costs.
+fn check(wanted: u16, readable: u16, max_words: u16, cost: ReadCost) {
+    let plan = plan_reads(&addresses(wanted), max_words, cost, |address| readable & (1 << address) != 0);
+    let mut covered = 0_u16;
+    let mut total = 0;
+    for ReadSpan { address, count } in &plan {
+        assert!((1..=max_words).contains(count));
+        for word in *address..address + count {
+            assert_eq!(covered & (1 << word), 0, "{word} is read twice");
+            covered |= 1 << word;
+        }
+        total += u64::from(cost.request) + u64::from(cost.word) * u64::from(*count);
+    }
+    assert_eq!(wanted & !covered, 0, "something is missing");
+    assert_eq!(covered & !(wanted | readable), 0, "something unreadable is read");
+    assert_eq!((total, plan.len()), search(wanted, wanted | readable, max_words, cost), "{wanted:b} {readable:b}");
+    assert!(plan.is_sorted());
+}
+
+#[test]
+fn every_small_plan_is_the_best() {
+    let costs =
+        [ReadCost { request: 5, word: 2 }, ReadCost { request: 100, word: 1 }, ReadCost { request: 0, word: 1 }];
+    for wanted in 0..1 << 6 {
+        for readable in 0..1 << 6 {
+            for max_words in 1..=4 {
+                for cost in costs {
+                    check(wanted, readable, max_words, cost);
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_plan_is_the_best(wanted in 0_u16..1 << 10, readable in 0_u16..1 << 10, max_words in 1_u16..=5, request in 0_u32..30, word in 0_u32..5) {
+        check(wanted, readable, max_words, ReadCost { request, word });
+    }
+
+    #[test]
+    fn order_and_repetition_do_not_matter(wanted in prop::collection::vec(any::<u16>(), 0..40)) {
+        let cost = ReadCost { request: 316, word: 22 };
+        let mut sorted = wanted.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        prop_assert_eq!(plan_reads(&wanted, 16, cost, |_| true), plan_reads(&sorted, 16, cost, |_| true));
+    }
+}
+
+#[test]
+fn the_ends_of_the_address_space_are_reached() {
+    let cost = ReadCost { request: 316, word: 22 };
+    let plan = plan_reads(&[0xFFFF, 0xFFF0, 0x0000], 16, cost, |_| true);
+    assert_eq!(plan, [ReadSpan { address: 0, count: 1 }, ReadSpan { address: 0xFFF0, count: 16 }]);
+}
+
+#[test]
+fn a_gd350_is_read_in_few_requests() {
+    let profile = Profile::builtin("gd350").unwrap();
+    let plan = |names: &[&str]| {
+        let entries: Vec<_> = names.iter().map(|name| profile.find(name).unwrap()).collect();
+        profile.plan(entries).unwrap().iter().map(|span| (span.address, span.count)).collect::<Vec<_>>()
+    };
+    // All 23 monitor registers take two reads of 16 words at most.
+    let monitor = profile.plan(profile.monitor()).unwrap();
+    assert_eq!((monitor.len(), monitor.iter().map(|span| span.count).sum::<u16>()), (2, 23));
+    // Section 9.4.8: six fault types in one read.
+    assert_eq!(plan(&["P07.27", "P07.28", "P07.29", "P07.30", "P07.31", "P07.32"]), [(0x071B, 6)]);
+    assert_eq!(plan(&["output_current", "running_frequency"]), [(0x3000, 5)]);
+    assert_eq!(plan(&["output_current", "output_current"]), [(0x3004, 1)]);
+    // 2104H to 2FFFH are unknown, and so is P00.13.
+    assert_eq!(plan(&["identification_code", "running_frequency"]), [(0x2103, 1), (0x3000, 1)]);
+    assert_eq!(plan(&["P00.12", "P00.14"]), [(0x000C, 1), (0x000E, 1)]);
+    assert_eq!(plan(&[]), []);
+    // At 19200 8E1 with 5 ms delay: 20 characters of 11 bits and 96 bit times for a request, 22 for a word.
+    assert_eq!(profile.serial().read_cost(), ReadCost { request: 316, word: 22 });
+}
