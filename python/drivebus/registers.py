@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, overload
+from typing import NamedTuple, overload
 
 from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
 from drivebus.protocols import BusProtocol, ProfileProtocol
@@ -53,7 +53,7 @@ class Registers:
     @overload
     def read(self, name: str, /) -> Value: ...
     @overload
-    def read(self, name: str, /, *more: str) -> Any: ...
+    def read(self, first: str, second: str, /, *more: str) -> dict[str, Value]: ...
     def read(self, *names: str) -> Value | dict[str, Value]:
         """Reads registers or parameters in the fewest requests.
 

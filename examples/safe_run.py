@@ -1,0 +1,29 @@
+"""Run a motor through a speed profile; whatever goes wrong, Ctrl-C included, it is stopped.
+
+    python safe_run.py                 a simulated GD350
+    python safe_run.py /dev/ttyUSB0    a real one. THE MOTOR TURNS.
+
+This is not a safety function. An emergency stop is a wire.
+"""
+
+import sys
+
+import drivebus
+
+STEPS = [(5.0, 2.0), (15.0, 3.0), (10.0, 2.0)]  # Hz, and seconds to stay there
+
+port = sys.argv[1] if len(sys.argv) > 1 else "sim://gd350?clock=virtual"
+
+with drivebus.Bus(port) as bus:
+    drive = bus.drive(1)
+    drive.prepare_control()
+    drive.write({"P00.11": 5.0, "P00.12": 5.0})  # ramps in seconds; RAM, so a power cut forgets them
+
+    with drive.running(hz=STEPS[0][0]):
+        for hz, seconds in STEPS:
+            drive.setpoint = hz
+            status = drive.wait_for_speed(hz, timeout=30)
+            print(f"{status.frequency:5.2f} Hz, {drive.read('output_current'):.1f} A")
+            bus.sleep(seconds)
+
+    print(drive.wait_until_stopped(timeout=30))

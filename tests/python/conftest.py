@@ -1,0 +1,64 @@
+"""Lines with simulated drives, for every test that wants one.
+
+`line` is every kind of line in turn: the same tests hold on each. `virtual` is the in-process line in virtual time, for
+tests about time and about what the line carries.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+import drivebus
+
+TRANSPORTS = ["process", pytest.param("pty", marks=pytest.mark.skipif(os.name == "nt", reason="no pty")), "tcp"]
+RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
+
+
+@pytest.fixture(params=TRANSPORTS)
+def simulator(request: pytest.FixtureRequest) -> Iterator[drivebus.Simulator]:
+    clock = "virtual" if request.param == "process" else "real"
+    with drivebus.Simulator({1: "gd350", 2: "gd350"}, transport=request.param, clock=clock) as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def bus(simulator: drivebus.Simulator) -> Iterator[drivebus.Bus]:
+    with drivebus.Bus(simulator, timeout=0.25) as bus:
+        yield bus
+
+
+@pytest.fixture
+def drive(bus: drivebus.Bus) -> drivebus.Drive:
+    """A drive that does not obey the bus yet."""
+    return bus.drive(1)
+
+
+@pytest.fixture
+def obedient(drive: drivebus.Drive) -> drivebus.Drive:
+    """A drive that obeys the bus and is quick."""
+    drive.prepare_control()
+    drive.write({"P00.11": RAMP, "P00.12": RAMP})
+    return drive
+
+
+@pytest.fixture
+def virtual() -> Iterator[drivebus.Simulator]:
+    with drivebus.Simulator({1: "gd350", 2: "gd350"}, transport="process", clock="virtual") as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def virtual_bus(virtual: drivebus.Simulator) -> Iterator[drivebus.Bus]:
+    with drivebus.Bus(virtual, timeout=0.25) as bus:
+        yield bus
+
+
+@pytest.fixture
+def virtual_drive(virtual_bus: drivebus.Bus) -> drivebus.Drive:
+    """A drive that obeys the bus, in virtual time."""
+    drive = virtual_bus.drive(1)
+    drive.prepare_control()
+    return drive

@@ -1,0 +1,260 @@
+"""The command line: what it prints, what it refuses, what it exits with."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import drivebus
+from drivebus.cli import cli
+
+SIM = "sim://gd350?clock=virtual"
+
+
+def run(*words: str, port: str | None = SIM, **options: Any) -> Result:
+    """One command in this process; no terminal."""
+    arguments = [*(["--port", port] if port else []), *words]
+    return CliRunner().invoke(cli, arguments, prog_name="drivebus", **options)
+
+
+def rows(result: Result) -> list[dict[str, Any]]:
+    assert result.exit_code == 0, result.output
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+@pytest.fixture
+def pty() -> Iterator[drivebus.Simulator]:
+    with drivebus.Simulator({1: "gd350"}, transport="tcp" if os.name == "nt" else "pty") as simulator:
+        yield simulator
+
+
+class TestLooking:
+    def test_status(self) -> None:
+        [status] = rows(run("--json", "status"))
+        assert status["state"] == "stopped"
+        assert status["frequency"] == 0.0
+        assert status["fault"] is None
+        assert "stopped" in run("status").stdout
+
+    def test_scan_finds_the_drive(self) -> None:
+        [found] = rows(run("--json", "scan", "--units", "1-3"))
+        assert (found["unit"], found["profile"], found["identification"]) == (1, "gd350", 0x01A0)
+        assert "unit 1: gd350" in run("scan", "--units", "1-3").stdout
+
+    def test_scan_without_an_answer_exits_3(self) -> None:
+        result = run("scan", "--units", "5-6")
+        assert result.exit_code == 3
+        assert "no unit answered" in result.stderr
+
+    def test_info(self) -> None:
+        first, *control = rows(run("--json", "info"))
+        assert first["identification"] == "0x01a0"
+        assert first["obeys_bus"] is False
+        assert [item["code"] for item in control] == ["P00.01", "P00.02", "P00.06"]
+
+    @pytest.mark.parametrize("name", ["bus_voltage", "3002H", "0x3002"])
+    def test_read_takes_names_and_addresses(self, name: str) -> None:
+        [row] = rows(run("--json", "read", name))
+        assert (row["name"], row["unit"]) == ("bus_voltage", "V")
+        assert 200 < row["value"] < 800
+
+    @pytest.mark.parametrize("name", ["P00.03", "p00.03", "0003h"])
+    def test_read_takes_parameter_codes(self, name: str) -> None:
+        [row] = rows(run("--json", "read", name))
+        assert (row["name"], row["value"]) == ("P00.03", 50.0)
+
+    def test_an_unknown_name_shows_the_closest(self) -> None:
+        result = run("read", "output_curent")
+        assert result.exit_code == 2
+        assert "output_current" in result.stderr
+        assert "Traceback" not in result.output
+
+    def test_monitor_takes_as_many_samples_as_asked(self) -> None:
+        samples = rows(run("--json", "monitor", "--count", "3", "output_current"))
+        assert len(samples) == 3
+        assert all(sample.keys() == {"time", "output_current"} for sample in samples)
+        lines = run("monitor", "--count", "2").stdout.splitlines()
+        assert len(lines) == 2
+        assert all("output_current=" in line for line in lines)
+
+    def test_describe_needs_no_port_with_a_profile(self) -> None:
+        [known] = rows(run("--profile", "gd350", "--json", "describe", "output_current", port=None))
+        assert (known["address"], known["unit"]) == ("3004H", "A")
+        assert known["source"]
+
+    def test_faults(self) -> None:
+        assert "No fault now." in run("faults").stdout
+        known = rows(run("--profile", "gd350", "--json", "faults", "--all", port=None))
+        assert {row["mnemonic"]: row["code"] for row in known}["OL1"] == 11
+
+    def test_profiles_and_ports(self) -> None:
+        assert [row["name"] for row in rows(run("--json", "profiles", port=None))] == drivebus.profiles()
+        assert run("ports", port=None).exit_code == 0
+
+
+class TestFrames:
+    def test_decode(self) -> None:
+        # GD350 manual, chapter 9.4.1.
+        [frame] = rows(run("--json", "decode", "01 03 00 04 00 02 85 CA", port=None))
+        assert (frame["kind"], frame["unit"], frame["address"], frame["count"]) == ("read", 1, 4, 2)
+        assert run("decode", "01,03,00,04,00,02,85,CA", port=None).exit_code == 0
+
+    def test_decode_refuses_a_wrong_crc(self) -> None:
+        result = run("decode", "01 03 00 04 00 02 85 CB", port=None)
+        assert result.exit_code == 6
+        assert "85 CB" in result.stderr
+        assert "85 CA" in result.stderr
+
+    def test_raw_shows_both_frames(self) -> None:
+        sent, answer = rows(run("--json", "raw", "01", "03", "21", "03", "00", "01"))
+        assert sent["hex"].startswith("01 03 21 03 00 01")
+        assert answer["words"] == [0x01A0]
+
+    def test_raw_shows_a_refusal_and_exits_4(self) -> None:
+        result = run("raw", "01 03 63 00 00 01")
+        assert result.exit_code == 4
+        assert "01 83 02" in result.stdout
+
+    def test_raw_asks_before_it_writes(self) -> None:
+        result = run("raw", "01 06 20 00 00 01")
+        assert result.exit_code == 2
+        assert "--yes" in result.stderr
+
+    @pytest.mark.parametrize("text", ["0", "xyz", "01 0"])
+    def test_what_is_not_hex_is_refused(self, text: str) -> None:
+        assert run("decode", text, port=None).exit_code == 2
+
+
+class TestMoving:
+    def test_without_a_terminal_it_needs_yes(self) -> None:
+        for command in (["run", "10"], ["jog"], ["reset"]):
+            result = run(*command)
+            assert result.exit_code == 2
+            assert "--yes" in result.stderr
+
+    def test_a_drive_that_does_not_obey_is_exit_2(self) -> None:
+        result = run("run", "10", "--yes")
+        assert result.exit_code == 2
+        assert "prepare_control" in result.stderr
+
+    def test_write_checks_before_it_sends(self) -> None:
+        result = run("write", "P00.11=5.0", "P00.12=9999")
+        assert result.exit_code == 2
+        assert "P00.12" in result.stderr
+        result = run("write", "P00.11")
+        assert result.exit_code == 2
+        assert "NAME=VALUE" in result.stderr
+
+    def test_write_shows_what_then_stands_there(self) -> None:
+        written = rows(run("--json", "write", "P00.11=5.0", "P00.12=6"))
+        assert [(row["name"], row["value"]) for row in written] == [("P00.11", 5.0), ("P00.12", 6.0)]
+
+    def test_a_whole_job_through_another_program(self, pty: drivebus.Simulator) -> None:
+        def command(*words: str) -> dict[str, Any]:
+            done = subprocess.run(
+                [sys.executable, "-m", "drivebus.cli", "--json", *words],
+                env={**os.environ, "DRIVEBUS_PORT": pty.port},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, done.stderr
+            [row] = [json.loads(line) for line in done.stdout.splitlines()][-1:]
+            assert isinstance(row, dict)
+            return row
+
+        command("write", "P00.01=2", "P00.02=0", "P00.06=8", "P00.11=1", "P00.12=1")
+        assert command("run", "5", "--yes", "--wait", "10")["state"] == "forward"
+        assert pty.drive(1).frequency == pytest.approx(5.0, abs=0.1)
+        assert command("stop", "--wait", "10")["state"] == "stopped"
+        assert command("jog", "--seconds", "0.1", "--yes")["command"] == "jog"
+        command("coast")
+        assert pty.drive(1).frequency == 0.0
+        pty.drive(1).trip("OL1")
+        assert command("faults")["mnemonic"] == "OL1"
+        assert command("reset", "--yes")["fault"] is None
+
+
+class TestExitCodes:
+    @pytest.mark.parametrize(
+        ("port", "words", "code"),
+        [
+            pytest.param(SIM, ["status"], 0, id="done"),
+            pytest.param(None, ["status"], 2, id="no port"),
+            pytest.param(SIM, ["statsu"], 2, id="no such command"),
+            pytest.param(SIM, ["--unit", "300", "status"], 2, id="no such unit"),
+            pytest.param(SIM, ["--format", "8X1", "status"], 2, id="no such format"),
+            pytest.param(SIM, ["--profile", "gd355", "status"], 2, id="no such profile"),
+            pytest.param(SIM, ["--unit", "9", "status"], 3, id="no answer"),
+            pytest.param("/dev/drivebus-is-not-here", ["status"], 5, id="no such port"),
+        ],
+    )
+    def test_each_says_whose_fault_it_is(self, port: str | None, words: list[str], code: int) -> None:
+        result = run(*words, port=port, env={"DRIVEBUS_PORT": None})
+        assert result.exit_code == code, result.output
+        assert bool(result.stderr) == bool(code)
+        assert "Traceback" not in result.output
+
+    def test_every_error_has_one(self) -> None:
+        from drivebus.cli.session import exit_code
+
+        codes = {
+            drivebus.NotAllowed: 2,
+            drivebus.NoAnswer: 3,
+            drivebus.Refused: 4,
+            drivebus.PortError: 5,
+            drivebus.BadAnswer: 6,
+            drivebus.CrcError: 6,
+            drivebus.Unconfirmed: 7,
+        }
+        assert {kind: exit_code(kind("x")) for kind in codes} == codes
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_scripts(shell: str) -> None:
+    result = run("completion", shell, port=None)
+    assert result.exit_code == 0
+    assert "_DRIVEBUS_COMPLETE" in result.stdout
+
+
+def test_every_command_has_help() -> None:
+    for name in cli.commands:
+        result = run(name, "--help", port=None)
+        assert result.exit_code == 0
+        assert len(result.stdout.splitlines()) > 3
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to a whole console")
+def test_sim_serves_until_ctrl_c() -> None:
+    words = [sys.executable, "-m", "drivebus.cli", "--json", "sim", "--units", "1=gd350,3=gd350"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        port = json.loads(child.stdout.readline())["port"]
+        with drivebus.Bus(port) as bus:
+            assert [found.unit for found in bus.scan(range(1, 5))] == [1, 3]
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=20)
+    assert child.returncode == 0
+
+
+def test_the_demonstration_holds() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "drivebus.cli", "demo"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=110,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "OL1" in done.stdout
+    assert "drivebus --port /dev/ttyUSB0 scan" in done.stdout

@@ -1,0 +1,68 @@
+"""What counts as a port: simulators, paths, URLs, and serial ports that a program already opened."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+
+import pytest
+import serial
+
+from drivebus import Bus, SerialFormat, Simulator
+
+pty_only = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
+
+
+def test_a_simulator_in_process() -> None:
+    with Bus("sim://1=gd350,7=gd350?clock=virtual&seed=1") as bus:
+        assert bus.simulator is not None
+        assert [found.unit for found in bus.scan(range(1, 10))] == [1, 7]
+        assert bus.simulator.drive(7).state == "stopped"
+
+
+def test_a_simulator_in_real_time() -> None:
+    with Bus("sim://gd350") as bus:
+        assert bus.drive(1).profile.name == "gd350"
+
+
+def test_a_simulator_keeps_its_own_format() -> None:
+    with Simulator({1: "gd350"}, baudrate=9600, parity="N", transport="process") as simulator, Bus(simulator) as bus:
+        assert bus.format == SerialFormat(9600, "N")
+        assert bus.simulator is simulator
+        assert bus.read(1, 0x2103) == [0x01A0]
+
+
+@pty_only
+def test_a_path_and_a_path_object() -> None:
+    with Simulator({1: "gd350"}) as simulator:
+        for port in (simulator.port, pathlib.Path(simulator.port)):
+            with Bus(port) as bus:
+                assert bus.read(1, 0x2103) == [0x01A0]
+                assert simulator.port in bus.port
+                assert bus.simulator is None
+
+
+@pty_only
+def test_an_open_serial_port_keeps_its_own_settings() -> None:
+    with (
+        Simulator({1: "gd350"}) as simulator,
+        serial.Serial(simulator.port, 9600, timeout=0) as port,
+        Bus(port) as bus,
+    ):
+        assert bus.format == SerialFormat(9600, "N")
+        assert bus.read(1, 0x2103) == [0x01A0]
+        assert bus.drive(1).read("P00.03") == 50.0
+
+
+@pty_only
+def test_pyserials_urls(tmp_path: pathlib.Path) -> None:
+    log = tmp_path / "spy.txt"
+    with Simulator({1: "gd350"}) as simulator, Bus(f"spy://{simulator.port}?file={log}") as bus:
+        assert bus.read(1, 0x2103) == [0x01A0]
+    assert "TX" in log.read_text(encoding="utf-8")
+
+
+def test_rtu_over_tcp() -> None:
+    with Simulator({1: "gd350"}, transport="tcp") as simulator, Bus(simulator.port) as bus:
+        assert simulator.port.startswith("socket://127.0.0.1:")
+        assert bus.read(1, 0x2103) == [0x01A0]
