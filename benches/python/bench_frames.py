@@ -70,7 +70,7 @@ class Pymodbus:
     def decode(cls, _request: bytes, answer: bytes) -> list[int]:
         _, pdu = cls.framer.handleFrame(answer, UNIT, 0)
         assert pdu is not None
-        return pdu.registers
+        return list(pdu.registers)
 
 
 class Minimalmodbus:

@@ -5,19 +5,14 @@ The format is explained in `tests/vectors/README.md`.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+import tomli
 
 import drivebus
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 FOLDER = Path(__file__).resolve().parent.parent / "vectors"
 FAMILIES = ["gd350", "gd600", "gd3000", "vfd500"]
@@ -41,7 +36,7 @@ class Vector(NamedTuple):
 
 
 def load(name: str) -> dict[str, Any]:
-    return tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    return tomli.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def vector(family: str, exchange: Fields, frame: Fields, asked: Fields | None) -> Vector:
