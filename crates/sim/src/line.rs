@@ -64,6 +64,10 @@ impl Line for SimLine {
     fn name(&self) -> String {
         self.shared.name.clone()
     }
+
+    fn is_virtual(&self) -> bool {
+        !self.shared.clock.is_real()
+    }
 }
 
 impl Drop for SimLine {

@@ -1,0 +1,97 @@
+//! The simulated line behind a pseudo-terminal and TCP, in real time.
+//!
+//! Nothing here judges how long something took, except that no character may be early.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use drivebus_line::Line;
+use drivebus_rtu::Instant;
+use drivebus_sim::{Options, SimError, Simulator};
+
+use crate::bench::{framed, hex, pdu};
+
+/// 8 characters, the silence and 7 characters of 11 bits at 19 200 bit/s.
+const SHORTEST: Duration = Duration::from_nanos(4_583_334 + 2_005_209 + 4_010_417);
+
+fn simulator() -> Simulator {
+    Simulator::new([(1, "gd350")], Options::default().realtime(true)).unwrap()
+}
+
+/// Asks who is there, three times, and reads each answer byte by byte, blocking.
+fn ask_thrice(simulator: &Simulator, port: &mut (impl Read + Write)) {
+    for _ in 0..3 {
+        let sent = simulator.now();
+        port.write_all(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+        let mut answer = [0; 7];
+        port.read_exact(&mut answer).unwrap();
+        assert!(simulator.now() >= sent + SHORTEST, "faster than the wire");
+        assert_eq!(answer[..], hex("01 03 02 01 A0 B9 AC"));
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn open(server: &drivebus_sim::PtyServer) -> File {
+    OpenOptions::new().read(true).write(true).open(server.path()).unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pseudo_terminal_serves_one_program_after_the_other() {
+    let simulator = simulator();
+    let server = simulator.serve_pty().unwrap();
+    ask_thrice(&simulator, &mut open(&server));
+    ask_thrice(&simulator, &mut open(&server));
+    assert_eq!(simulator.wire().requests(), 6);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pseudo_terminal_is_gone_when_its_server_is_dropped() {
+    let simulator = simulator();
+    let server = simulator.serve_pty().unwrap();
+    let mut port = open(&server);
+    drop(server);
+    // The read end of a terminal whose other side is closed: end of file, or EIO.
+    assert!(matches!(port.read(&mut [0; 1]), Ok(0) | Err(_)));
+}
+
+#[test]
+fn tcp_serves_one_client_after_the_other() {
+    let simulator = simulator();
+    let server = simulator.serve_tcp().unwrap();
+    ask_thrice(&simulator, &mut TcpStream::connect(server.address()).unwrap());
+    ask_thrice(&simulator, &mut TcpStream::connect(server.address()).unwrap());
+    let mut port = TcpStream::connect(server.address()).unwrap();
+    ask_thrice(&simulator, &mut port);
+    drop(server);
+    assert!(matches!(port.read(&mut [0; 1]), Ok(0) | Err(_)));
+}
+
+#[test]
+fn the_line_in_process_runs_in_real_time_too() {
+    let simulator = simulator();
+    let mut line = simulator.line();
+    let sent = line.now();
+    line.send(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    let mut answer = Vec::new();
+    let mut buffer = [0; 16];
+    while answer.len() < 7 {
+        let until = line.now() + Duration::from_secs(60);
+        let count = line.receive(&mut buffer, until).unwrap();
+        answer.extend_from_slice(&buffer[..count]);
+    }
+    assert!(line.now() >= sent + SHORTEST, "faster than the wire");
+    assert_eq!(answer, hex("01 03 02 01 A0 B9 AC"));
+}
+
+#[test]
+fn each_clock_allows_what_it_can() {
+    let virtual_time = Simulator::new([(1, "gd350")], Options::default()).unwrap();
+    assert!(matches!(virtual_time.serve_pty(), Err(SimError::VirtualTime)));
+    assert!(matches!(virtual_time.serve_tcp(), Err(SimError::VirtualTime)));
+    assert!(matches!(simulator().advance(Duration::from_secs(1)), Err(SimError::RealTime)));
+    assert_eq!(virtual_time.now(), Instant::ZERO);
+}
