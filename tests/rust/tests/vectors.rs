@@ -15,7 +15,7 @@ use serde::Deserialize;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Family {
+struct Document {
     family: String,
     exchange: Vec<Exchange>,
     #[serde(default)]
@@ -162,7 +162,7 @@ impl Fields {
             Answer::WriteMultiple { address, count, .. } => Self::WriteManyAnswer { unit, address, count },
             Answer::Echo { data, .. } => Self::Echo { unit, data },
             Answer::Exception { function, code, .. } => Self::Exception { unit, function, code: code.0 },
-            other => panic!("no vector is like {other:?}"),
+            other @ Answer::Custom { .. } => panic!("no vector is like {other:?}"),
         }
     }
 }
@@ -185,7 +185,7 @@ fn read<T: serde::de::DeserializeOwned>(name: &str) -> T {
     toml::from_str(&fs::read_to_string(&path).unwrap()).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-fn families() -> Vec<Family> {
+fn families() -> Vec<Document> {
     ["gd350.toml", "gd600.toml", "gd3000.toml", "vfd500.toml"].map(read).into()
 }
 
