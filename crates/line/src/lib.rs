@@ -1,8 +1,25 @@
-//! Ports and the bus owner.
+//! Ports, and the owner of the bus: the layer that blocks, sleeps and reads a clock.
+//!
+//! [`Bus`] drives the state machines of `drivebus-rtu` over any [`Line`]: a serial port, a serial server, a Modbus TCP
+//! gateway, or the simulated line of `drivebus-sim`. It is safe from any thread. One caller at a time owns the line; the
+//! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
+//! over at its last byte.
+
+mod bus;
 pub mod clock;
+mod error;
 pub mod mbap;
+mod owner;
 mod port;
+mod queue;
+mod resync;
 pub mod rs485;
+mod stats;
 pub mod tcp;
 pub mod tty;
+
+pub use bus::{Bus, BusOptions, CallOptions};
+pub use error::{CallError, Failure};
+pub use owner::{AdapterEcho, Done, Opener};
 pub use port::{Line, PortError, PortErrorKind};
+pub use stats::{Counters, Latency, Stats};

@@ -44,6 +44,16 @@ pub trait Line: Send + fmt::Debug {
         false
     }
 
+    /// Whether its clock is a simulation's, which only moves while somebody waits.
+    fn is_virtual(&self) -> bool {
+        false
+    }
+
+    /// Whether an adapter might send our own bytes back to us.
+    fn may_echo(&self) -> bool {
+        false
+    }
+
     /// What the user should know about this line, such as a setting that did not reach the wire.
     fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -56,6 +56,7 @@ pub struct Tty {
     /// When the last character handed over will have left the wire.
     wire_free: Instant,
     exclusive: bool,
+    pseudo_terminal: bool,
     notes: Vec<String>,
 }
 
@@ -84,6 +85,7 @@ impl Tty {
             delay_before: Duration::ZERO,
             wire_free: Instant::ZERO,
             exclusive: options.exclusive,
+            pseudo_terminal,
             notes: Vec::new(),
         };
         let (mut parity, mut data_bits) = (format.parity(), format.data_bits());
@@ -137,6 +139,10 @@ impl Line for Tty {
 
     fn name(&self) -> String {
         self.name.clone()
+    }
+
+    fn may_echo(&self) -> bool {
+        !self.pseudo_terminal
     }
 
     fn notes(&self) -> Vec<String> {

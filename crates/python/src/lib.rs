@@ -1,1 +1,38 @@
-//! Placeholder.
+//! The extension module `drivebus._native`: converts between Python and the core, and decides nothing.
+//!
+//! A rule about Modbus or about drives that stood here would exist for Python only. What this module offers is written
+//! down, with units, ranges and errors, in `python/drivebus/_native.pyi`.
+
+use pyo3::prelude::*;
+
+mod bus;
+mod convert;
+mod errors;
+mod format;
+mod frames;
+mod open;
+mod profile;
+mod pyserial;
+mod sim;
+
+/// Nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
+#[pymodule(gil_used = false)]
+mod _native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::bus::Bus;
+    #[pymodule_export]
+    use crate::format::SerialFormat;
+    #[pymodule_export]
+    use crate::frames::{crc16, decode, decode_answer, encode_echo, encode_read, encode_write};
+    #[pymodule_export]
+    use crate::profile::Profile;
+    #[pymodule_export]
+    use crate::sim::{SimulatedDrive, SimulatedLine, Simulator};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -2,9 +2,10 @@
 
 use core::fmt;
 
-use crate::Words;
+use crate::frame::Frame;
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::request::{AnswerLength, MAX_PDU, MAX_READ, Request, RequestError, put_words};
+use crate::{UnitAddress, Words};
 
 /// The code in an exception: why a unit refused. What a code means beyond 04H differs from family to family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,6 +20,24 @@ impl ExceptionCode {
     pub const ILLEGAL_VALUE: Self = Self(0x03);
     /// 04H: the unit could not do it.
     pub const DEVICE_FAILURE: Self = Self(0x04);
+
+    /// What the specification calls the code; a family of drives may mean something else by it.
+    ///
+    /// Source: *Modbus Application Protocol* V1.1b3, §7.
+    pub const fn standard_name(self) -> &'static str {
+        match self.0 {
+            0x01 => "illegal_function",
+            0x02 => "illegal_data_address",
+            0x03 => "illegal_data_value",
+            0x04 => "server_device_failure",
+            0x05 => "acknowledge",
+            0x06 => "server_device_busy",
+            0x08 => "memory_parity_error",
+            0x0A => "gateway_path_unavailable",
+            0x0B => "gateway_target_failed_to_respond",
+            _ => "not_in_the_specification",
+        }
+    }
 }
 
 /// An answer.
@@ -217,6 +236,18 @@ impl Expected {
     /// Whether the right answer is the request once more, so that an adapter's own echo cannot be told from it.
     pub const fn repeats_request(&self) -> bool {
         matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. })
+    }
+
+    /// `frame` as the answer of `unit` that was expected, or as the refusal of it.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError`]: it comes from another unit, or answers something else.
+    pub fn judge_frame<'a>(&self, unit: UnitAddress, frame: &Frame<'a>) -> Result<Answer<'a>, AnswerError> {
+        if frame.address() != unit.get() {
+            return Err(AnswerError::Unit { asked: unit.get(), came: frame.address() });
+        }
+        self.judge(frame.pdu())
     }
 
     /// `pdu` as the answer that was expected, or as the refusal of it.

@@ -310,13 +310,7 @@ impl Master {
                     let Ok(frame) = Frame::parse(self.framer.held(range.clone())) else {
                         continue;
                     };
-                    // A single exception code repeats nothing of the request, so its function is all there is to see.
-                    let judged = if frame.address() == unit.get() {
-                        expected.judge(frame.pdu())
-                    } else {
-                        Err(AnswerError::Unit { asked: unit.get(), came: frame.address() })
-                    };
-                    match judged {
+                    match expected.judge_frame(unit, &frame) {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => self.count_other(range, unit),
                         // In quarantine another word than the fresh one is a late answer to an earlier echo.
                         Err(AnswerError::Echo { .. }) if self.in_quarantine(unit) => self.tally.late += 1,

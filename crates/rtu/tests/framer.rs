@@ -15,12 +15,12 @@ fn at(micros: u64) -> Instant {
 
 /// Feeds everything at one moment in chunks, then lets silence end it; returns frames and the bytes skipped.
 fn run(framer: &mut Framer, wire: &[u8], cuts: &[usize]) -> (Vec<Vec<u8>>, Vec<u8>) {
-    let (mut frames, mut skipped) = (Vec::new(), Vec::new());
+    let (mut heard, mut noise) = (Vec::new(), Vec::new());
     let mut drain = |framer: &mut Framer, now| {
         while let Some(event) = framer.poll(now) {
             match event {
-                Ok(frame) => frames.push(frame.as_bytes().to_vec()),
-                Err(noise) => skipped.extend_from_slice(noise.bytes),
+                Ok(frame) => heard.push(frame.as_bytes().to_vec()),
+                Err(skip) => noise.extend_from_slice(skip.bytes),
             }
         }
     };
@@ -38,10 +38,10 @@ fn run(framer: &mut Framer, wire: &[u8], cuts: &[usize]) -> (Vec<Vec<u8>>, Vec<u
     }
     drain(framer, at(1_749));
     drain(framer, at(1_750));
-    (frames, skipped)
+    (heard, noise)
 }
 
-/// Bytes as a hostile line has them: frames of both directions, noise, cut frames, flipped bits.
+/// Bytes as a hostile line has them: heard of both directions, noise, cut heard, flipped bits.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let piece = prop_oneof![
         4 => (1..=247_u8, requests()).prop_map(|(unit, owned)| {

@@ -1,0 +1,260 @@
+//! The bus as its callers see it: safe from any thread, one exchange at a time, retries by kind.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use drivebus_rtu::{Adu, Answer, Destination, Instant, Request, SerialFormat};
+
+use crate::clock::{monotonic, sleep_until};
+use crate::error::{CallError, Failure};
+use crate::owner::{AdapterEcho, Ask, Done, Opener, Owner};
+use crate::queue::{LOOK_UP, Queue};
+use crate::stats::Stats;
+use crate::{Line, PortError, PortErrorKind};
+
+/// How a bus behaves.
+#[derive(Debug, Clone, Copy)]
+pub struct BusOptions {
+    /// Characters and silence.
+    pub format: SerialFormat,
+    /// The longest wait from the end of a request to the end of its answer.
+    pub timeout: Duration,
+    /// How often a read is asked once more. A write is never.
+    pub retries: u32,
+    /// Whether every request that may change something in a unit is refused before it is sent.
+    pub read_only: bool,
+    /// What is known about the adapter sending our own bytes back.
+    pub echo: AdapterEcho,
+}
+
+impl BusOptions {
+    /// Half a second, two retries of reads, writing allowed, the adapter's echo found out.
+    pub const fn new(format: SerialFormat) -> Self {
+        Self { format, timeout: Duration::from_millis(500), retries: 2, read_only: false, echo: AdapterEcho::Auto }
+    }
+}
+
+/// What one call wants otherwise than the bus; `None` keeps what the bus has.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CallOptions {
+    /// The longest wait for the answer.
+    pub timeout: Option<Duration>,
+    /// How often a read is asked once more.
+    pub retries: Option<u32>,
+}
+
+/// One line and its owner.
+///
+/// The calling thread works on the line itself when its turn comes; others wait in the order they came. `give_up` is
+/// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
+#[derive(Debug)]
+pub struct Bus {
+    queue: Queue,
+    owner: Mutex<Owner>,
+    options: BusOptions,
+    name: String,
+    closed: AtomicBool,
+    clock: Clock,
+}
+
+/// How to tell the line's time without the line, which another thread may be waiting on.
+#[derive(Debug, Clone, Copy)]
+enum Clock {
+    /// The line's clock is this far ahead of the system's.
+    Real { ahead: Duration },
+    /// The line's clock is this far behind the system's.
+    RealBehind { behind: Duration },
+    /// Only the line knows: its time moves only while somebody waits.
+    Virtual,
+}
+
+impl Clock {
+    fn of(line: &dyn Line) -> Self {
+        if line.is_virtual() {
+            return Self::Virtual;
+        }
+        let (line, system) = (line.now(), monotonic());
+        if line >= system {
+            Self::Real { ahead: line.saturating_duration_since(system) }
+        } else {
+            Self::RealBehind { behind: system.saturating_duration_since(line) }
+        }
+    }
+}
+
+impl Bus {
+    /// Opens a line with `opener`, which is called again whenever the line was lost.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`]: the line cannot be opened.
+    pub fn open(opener: Opener, options: BusOptions) -> Result<Self, PortError> {
+        let mut owner = Owner::open(opener, options.format, options.echo)?;
+        let (name, clock) =
+            owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
+        Ok(Self {
+            queue: Queue::default(),
+            owner: Mutex::new(owner),
+            options,
+            name,
+            closed: AtomicBool::new(false),
+            clock,
+        })
+    }
+
+    /// What was opened, for people.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How the bus behaves.
+    pub fn options(&self) -> &BusOptions {
+        &self.options
+    }
+
+    /// Whether the bus was closed.
+    pub fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
+    }
+
+    /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
+    pub fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+        let _turn = self.queue.turn(&mut || false);
+        self.lock().close();
+    }
+
+    /// Asks `request` of `destination` and gives the answer to `take`.
+    ///
+    /// A read that brings nothing is asked again by policy, and `take` is called for the answer that counts. A write
+    /// and an echo are sent once. Before anything is asked of a unit that left a request open, that unit is echoed with
+    /// a fresh word, so that its late answer is never taken for the new one.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: with [`sent`](CallError::sent) `None` the request never went out, so nothing was done; after any
+    /// other failure but [`Failure::Refused`] the unit may have done what was asked.
+    pub fn call(
+        &self,
+        destination: Destination,
+        request: &Request<'_>,
+        options: CallOptions,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let ask = Ask { destination, request, timeout: options.timeout.unwrap_or(self.options.timeout) };
+        if self.options.read_only && request.is_write() {
+            return Err(unsent(&ask, Failure::ReadOnly { function: request.function() }, self.now()));
+        }
+        let mut give_up = || self.is_closed() || give_up();
+        let Some(_turn) = self.queue.turn(&mut give_up) else {
+            return Err(unsent(&ask, self.given_up(), self.now()));
+        };
+        let mut owner = self.lock();
+        let repeats = match request {
+            Request::ReadHolding { .. } => options.retries.unwrap_or(self.options.retries),
+            _ => 0,
+        };
+        for attempt in 0..=repeats {
+            if self.is_closed() {
+                break;
+            }
+            if let Err(error) = owner.reopen() {
+                return Err(unsent(&ask, Failure::Port(error), owner.now()));
+            }
+            if attempt > 0
+                && let Destination::Unit(unit) = destination
+            {
+                owner.stats.count(Some(unit), |counters| counters.retries += 1);
+            }
+            let result = owner.prepare(&ask, &mut give_up).and_then(|()| owner.exchange(&ask, &mut give_up, take));
+            match result {
+                Err(error) if attempt < repeats && is_passing(&error.failure) => {}
+                Err(mut error) => {
+                    error.failure = match error.failure {
+                        Failure::Interrupted => self.given_up(),
+                        Failure::NoAnswer { timeout, .. } => Failure::NoAnswer { timeout, attempts: attempt + 1 },
+                        other => other,
+                    };
+                    error.request = Adu::request(destination, request).as_bytes().to_vec();
+                    return Err(error);
+                }
+                done => return done,
+            }
+        }
+        Err(unsent(&ask, Failure::Closed, owner.now()))
+    }
+
+    /// A word that no echo still under way carries: for [`Request::echo`].
+    pub fn fresh_word(&self) -> u16 {
+        self.lock().fresh_word()
+    }
+
+    /// Now, on the line's clock.
+    pub fn now(&self) -> Instant {
+        match self.clock {
+            Clock::Real { ahead } => monotonic() + ahead,
+            Clock::RealBehind { behind } => {
+                Instant::ZERO + monotonic().saturating_duration_since(Instant::ZERO + behind)
+            }
+            Clock::Virtual => self.lock().now(),
+        }
+    }
+
+    /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
+    pub fn sleep(&self, time: Duration, give_up: &mut dyn FnMut() -> bool) {
+        let end = self.now() + time;
+        loop {
+            let now = self.now();
+            if now >= end || self.is_closed() {
+                return;
+            }
+            let slice = end.saturating_duration_since(now).min(LOOK_UP);
+            match self.clock {
+                Clock::Virtual => match self.lock().line() {
+                    Some(line) => line.sleep(now + slice),
+                    None => return,
+                },
+                Clock::Real { .. } | Clock::RealBehind { .. } => sleep_until(monotonic() + slice),
+            }
+            if give_up() {
+                return;
+            }
+        }
+    }
+
+    /// What has happened so far.
+    pub fn stats(&self) -> Stats {
+        self.lock().stats.clone()
+    }
+
+    /// What the user should know about the line, such as a setting that did not reach the wire.
+    pub fn notes(&self) -> Vec<String> {
+        self.lock().line().map(|line| line.notes()).unwrap_or_default()
+    }
+
+    fn given_up(&self) -> Failure {
+        if self.is_closed() { Failure::Closed } else { Failure::Interrupted }
+    }
+
+    /// A thread that panicked has left the master in a state that the next `begin` refuses, not in a wrong one.
+    fn lock(&self) -> MutexGuard<'_, Owner> {
+        self.owner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The error of a call whose request never went out.
+fn unsent(ask: &Ask<'_>, failure: Failure, ended: Instant) -> Box<CallError> {
+    let request = Adu::request(ask.destination, ask.request).as_bytes().to_vec();
+    Box::new(CallError { failure, destination: ask.destination, request, raw: Vec::new(), sent: None, ended })
+}
+
+/// Whether the same read may well succeed the next time.
+fn is_passing(failure: &Failure) -> bool {
+    match failure {
+        Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_) | Failure::Busy { .. } => true,
+        Failure::Port(error) => error.kind == PortErrorKind::Lost,
+        _ => false,
+    }
+}

@@ -1,0 +1,142 @@
+//! What can become of a call, and whether the unit may have acted.
+
+use std::fmt;
+use std::time::Duration;
+
+use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request};
+
+use crate::PortError;
+
+/// A call that brought no answer, with all that is known of it.
+///
+/// Displays as one sentence: who was asked what, what came instead, and whether the unit may have acted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct CallError {
+    /// Why.
+    pub failure: Failure,
+    /// Who was asked.
+    pub destination: Destination,
+    /// The whole request frame.
+    pub request: Vec<u8>,
+    /// The bytes that came instead of an answer.
+    pub raw: Vec<u8>,
+    /// When the request went out, on the line's clock; `None`: it never did, so nothing was done.
+    pub sent: Option<Instant>,
+    /// When the call ended, on the line's clock.
+    pub ended: Instant,
+}
+
+impl fmt::Display for CallError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.destination {
+            Destination::Unit(unit) => write!(f, "unit {unit}")?,
+            Destination::Broadcast => f.write_str("broadcast")?,
+        }
+        let request = Frame::parse(&self.request).ok().and_then(|frame| Request::parse(frame.pdu()).ok());
+        if let Some(request) = request {
+            write!(f, ", {}", Asked(request))?;
+        }
+        write!(f, ": {}", self.failure)?;
+        if !self.raw.is_empty() {
+            write!(f, "; came: {}", Hex(&self.raw))?;
+        }
+        match (request, self.sent, &self.failure) {
+            (Some(request), Some(_), failure) if request.is_write() && !matches!(failure, Failure::Refused { .. }) => {
+                f.write_str("; it was sent once, and the unit may have taken it")
+            }
+            (Some(request), None, Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_))
+                if request.is_write() =>
+            {
+                f.write_str(" to an echo, with which an earlier request had to be cleared up; the write was not sent")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A request in words.
+struct Asked<'a>(Request<'a>);
+
+impl fmt::Display for Asked<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Request::ReadHolding { address, count: 1, .. } => write!(f, "read {address:04X}H"),
+            Request::ReadHolding { address, count, .. } => write!(f, "read {count} words from {address:04X}H"),
+            Request::WriteSingle { address, value, .. } => write!(f, "write {value} ({value:04X}H) to {address:04X}H"),
+            Request::WriteMultiple { address, words, .. } => {
+                write!(f, "write {} words from {address:04X}H", words.len())
+            }
+            Request::Echo { data, .. } => write!(f, "echo {data:04X}H"),
+            Request::Custom { pdu, .. } => write!(f, "PDU {}", Hex(pdu)),
+        }
+    }
+}
+
+/// Bytes as they are on the wire.
+struct Hex<'a>(&'a [u8]);
+
+impl fmt::Display for Hex<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, byte) in self.0.iter().enumerate() {
+            let space = if index == 0 { "" } else { " " };
+            write!(f, "{space}{byte:02X}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a call brought no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Failure {
+    /// The port cannot be used.
+    #[error("{0}")]
+    Port(PortError),
+    /// The bus was closed.
+    #[error("the bus is closed")]
+    Closed,
+    /// The caller gave up waiting.
+    #[error("given up by the caller")]
+    Interrupted,
+    /// The bus was opened for reading only. Nothing was sent.
+    #[error("this bus is read-only: function {function:02X}H may change something in the unit, so nothing was sent")]
+    ReadOnly {
+        /// The function asked for.
+        function: u8,
+    },
+    /// The request cannot be sent like this. Nothing was sent.
+    #[error("{0}")]
+    NotBegun(BeginError),
+    /// The unit stayed silent.
+    #[error("no answer within {} ms{}", timeout.as_millis(), times(*attempts))]
+    NoAnswer {
+        /// How long each wait was.
+        timeout: Duration,
+        /// How often it was tried.
+        attempts: u32,
+    },
+    /// The line was never silent long enough to send. Nothing was sent.
+    #[error("the line was never silent for {} ms: another master, or noise from a missing bias", timeout.as_millis())]
+    Busy {
+        /// How long it was waited for silence.
+        timeout: Duration,
+    },
+    /// A whole frame came that is not the answer.
+    #[error("{0}")]
+    Wrong(AnswerError),
+    /// An answer came and did not survive the line.
+    #[error("{0}")]
+    Corrupt(FrameError),
+    /// The unit refused.
+    #[error("refused function {function:02X}H with exception {:02X}H", code.0)]
+    Refused {
+        /// The function asked for.
+        function: u8,
+        /// Why, in the unit's own numbering.
+        code: ExceptionCode,
+    },
+}
+
+fn times(attempts: u32) -> String {
+    if attempts > 1 { format!(", asked {attempts} times") } else { String::new() }
+}

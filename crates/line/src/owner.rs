@@ -1,0 +1,316 @@
+//! Who has the turn: one exchange after the other on an open line.
+//!
+//! Drives the state machine of `drivebus-rtu` with a real line: bytes, the clock, and the wish to give up.
+
+use std::time::Duration;
+
+use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, SerialFormat, TURNAROUND, UnitAddress};
+
+use crate::error::{CallError, Failure};
+use crate::queue::LOOK_UP;
+use crate::resync::Resync;
+use crate::stats::Stats;
+use crate::{Line, PortError};
+
+/// Opens the line, at first and again after it was lost.
+pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Line>, PortError> + Send>;
+
+/// What is known about the adapter sending our own bytes back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AdapterEcho {
+    /// Find out.
+    Auto,
+    /// It does: the request is taken off before every answer.
+    Present,
+    /// It does not.
+    Absent,
+}
+
+/// One request on its way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ask<'a> {
+    pub(crate) destination: Destination,
+    pub(crate) request: &'a Request<'a>,
+    pub(crate) timeout: Duration,
+}
+
+/// When an exchange happened, on the line's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Done {
+    /// The first bit of the request.
+    pub sent: Instant,
+    /// The last byte of the answer.
+    pub ended: Instant,
+}
+
+/// The line, and all that is known about it.
+pub(crate) struct Owner {
+    line: Option<Box<dyn Line>>,
+    opener: Opener,
+    format: SerialFormat,
+    master: Master,
+    echo: AdapterEcho,
+    resync: Resync,
+    pub(crate) stats: Stats,
+}
+
+impl std::fmt::Debug for Owner {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Owner").field("line", &self.line).field("echo", &self.echo).finish_non_exhaustive()
+    }
+}
+
+impl Owner {
+    pub(crate) fn open(mut opener: Opener, format: SerialFormat, echo: AdapterEcho) -> Result<Self, PortError> {
+        let line = opener()?;
+        let mut owner = Self {
+            line: None,
+            opener,
+            format,
+            master: Master::new(&format),
+            echo,
+            resync: Resync::new(),
+            stats: Stats::default(),
+        };
+        owner.take_line(line);
+        Ok(owner)
+    }
+
+    pub(crate) fn close(&mut self) {
+        self.line = None;
+    }
+
+    pub(crate) fn fresh_word(&mut self) -> u16 {
+        self.resync.fresh_word()
+    }
+
+    /// Now, on the line's clock; its start while no line is open.
+    pub(crate) fn now(&self) -> Instant {
+        self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
+    }
+
+    /// The line, if it is open.
+    pub(crate) fn line(&mut self) -> Option<&mut (dyn Line + 'static)> {
+        self.line.as_deref_mut()
+    }
+
+    /// Opens the line again after it was lost.
+    pub(crate) fn reopen(&mut self) -> Result<(), PortError> {
+        if self.line.is_none() {
+            let line = (self.opener)()?;
+            self.take_line(line);
+            self.stats.reconnects += 1;
+        }
+        Ok(())
+    }
+
+    fn take_line(&mut self, line: Box<dyn Line>) {
+        self.master = if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&self.format) };
+        if self.echo == AdapterEcho::Auto && !line.may_echo() {
+            self.echo = AdapterEcho::Absent;
+        }
+        self.master.strip_echo(self.echo == AdapterEcho::Present);
+        self.line = Some(line);
+    }
+
+    /// Makes sure that what comes next can only be the answer to what is asked next.
+    ///
+    /// Nothing is sent where nothing is in doubt. Otherwise a fresh word is echoed; and before a write, whose answer
+    /// looks like the request, one word is read if it is not known yet whether the adapter echoes.
+    pub(crate) fn prepare(&mut self, ask: &Ask<'_>, give_up: &mut dyn FnMut() -> bool) -> Result<(), Box<CallError>> {
+        let Destination::Unit(unit) = ask.destination else {
+            return Ok(());
+        };
+        if self.master.in_quarantine(unit) && !matches!(ask.request, Request::Echo { .. }) {
+            self.probe(unit, ask, give_up)?;
+        }
+        if self.echo == AdapterEcho::Auto && ask.request.expected().repeats_request() {
+            if let Ok(read) = Request::read(0, 1) {
+                let look = Ask { request: &read, ..*ask };
+                match self.exchange(&look, give_up, &mut |_| ()) {
+                    Err(error) if matches!(error.failure, Failure::Port(_) | Failure::Interrupted) => {
+                        return Err(error);
+                    }
+                    // Any other outcome has shown whether the request came back.
+                    _ => {}
+                }
+            }
+            if self.master.in_quarantine(unit) && !matches!(ask.request, Request::Echo { .. }) {
+                self.probe(unit, ask, give_up)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends a fresh word to `unit` and waits for it to come back.
+    fn probe(
+        &mut self,
+        unit: UnitAddress,
+        ask: &Ask<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        let echo = Request::echo(self.resync.fresh_word());
+        self.stats.count(Some(unit), |counters| counters.resyncs += 1);
+        match self.exchange(&Ask { request: &echo, ..*ask }, give_up, &mut |_| ()) {
+            Ok(_) => self.resync.answered(unit),
+            Err(error) if matches!(error.failure, Failure::Refused { .. }) => self.resync.answered(unit),
+            Err(mut error) => {
+                // Two time-outs of silence are over. A unit that never answered an echo may not know it; then what it
+                // owed is taken as never to come.
+                if matches!(error.failure, Failure::NoAnswer { .. }) && self.resync.may_not_echo(unit) {
+                    self.master.release(unit);
+                }
+                error.sent = None;
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends one request and waits for what becomes of it.
+    pub(crate) fn exchange(
+        &mut self,
+        ask: &Ask<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let result = self.run(ask, give_up, take);
+        let unit = match ask.destination {
+            Destination::Unit(unit) => Some(unit),
+            Destination::Broadcast => None,
+        };
+        self.learn(ask, &result);
+        let sent = match &result {
+            Ok(_) => true,
+            Err(error) => error.sent.is_some(),
+        };
+        self.stats.count(unit, |counters| {
+            counters.requests += u64::from(sent);
+            match &result {
+                Ok(done) => counters.answered(done.ended.saturating_duration_since(done.sent)),
+                Err(error) => match error.failure {
+                    Failure::NoAnswer { .. } => counters.timeouts += 1,
+                    Failure::Corrupt(_) => counters.crc_errors += 1,
+                    Failure::Wrong(_) => counters.bad_answers += 1,
+                    Failure::Refused { .. } => counters.refusals += 1,
+                    _ => {}
+                },
+            }
+        });
+        if let Err(error) = &result
+            && matches!(error.failure, Failure::Port(_))
+        {
+            self.line = None;
+        }
+        result
+    }
+
+    /// Keeps what the exchange has shown about the adapter and the line.
+    fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>) {
+        let tally = self.master.take_tally();
+        self.stats.add(tally);
+        if self.echo != AdapterEcho::Auto {
+            return;
+        }
+        let listened = match result {
+            Ok(_) => true,
+            Err(error) => error.sent.is_some() && !matches!(error.failure, Failure::Port(_) | Failure::Interrupted),
+        };
+        if tally.own_echo > 0 {
+            self.echo = AdapterEcho::Present;
+            self.master.strip_echo(true);
+        } else if listened && !ask.request.expected().repeats_request() {
+            self.echo = AdapterEcho::Absent;
+        }
+    }
+
+    fn run(
+        &mut self,
+        ask: &Ask<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut sent = None;
+        let Some(line) = self.line.as_deref_mut() else {
+            return Err(failed(ask, Failure::Closed, sent, Instant::ZERO, &[]));
+        };
+        let master = &mut self.master;
+        let mut now = line.now();
+        let mut looked_up = now;
+        let timeout = match ask.destination {
+            Destination::Unit(_) => ask.timeout,
+            Destination::Broadcast => TURNAROUND,
+        };
+        if let Err(error) = master.begin(now, ask.destination, ask.request, timeout) {
+            return Err(failed(ask, Failure::NotBegun(error), sent, now, &[]));
+        }
+        let mut buffer = [0; 256];
+        loop {
+            if let Some(event) = master.poll(now) {
+                let no_answer = Failure::NoAnswer { timeout, attempts: 1 };
+                match (event, sent) {
+                    (Event::Transmit(frame), _) => {
+                        let end = line
+                            .send(frame)
+                            .map_err(|error| failed(ask, Failure::Port(error), Some(now), line.now(), &[]));
+                        sent = Some(now);
+                        match end {
+                            Ok(end) => master.sent(end),
+                            Err(error) => {
+                                master.abort();
+                                return Err(error);
+                            }
+                        }
+                    }
+                    (Event::Answer(Answer::Exception { function, code, .. }), _) => {
+                        return Err(failed(ask, Failure::Refused { function, code }, sent, now, &[]));
+                    }
+                    (Event::Answer(answer), Some(sent)) => {
+                        take(answer);
+                        return Ok(Done { sent, ended: now });
+                    }
+                    (Event::BroadcastDone, Some(sent)) => return Ok(Done { sent, ended: now }),
+                    (Event::Wrong { error, frame }, _) => {
+                        return Err(failed(ask, Failure::Wrong(error), sent, now, frame));
+                    }
+                    (Event::Corrupt { error, bytes }, _) => {
+                        return Err(failed(ask, Failure::Corrupt(error), sent, now, bytes));
+                    }
+                    (Event::NoAnswer { bytes }, _) => return Err(failed(ask, no_answer, sent, now, bytes)),
+                    (Event::Busy, _) => return Err(failed(ask, Failure::Busy { timeout }, sent, now, &[])),
+                    (Event::Answer(_) | Event::BroadcastDone, None) => {
+                        return Err(failed(ask, no_answer, sent, now, &[]));
+                    }
+                }
+                continue;
+            }
+            if now.saturating_duration_since(looked_up) >= LOOK_UP {
+                looked_up = now;
+                if give_up() {
+                    master.abort();
+                    return Err(failed(ask, Failure::Interrupted, sent, now, &[]));
+                }
+            }
+            let wake = now + LOOK_UP;
+            let until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
+            let received = line.receive(&mut buffer, until);
+            now = line.now();
+            match received {
+                // The framer's room is twice this buffer, and it was just emptied of all but one frame.
+                Ok(count) => {
+                    master.receive(now, &buffer[..count]);
+                }
+                Err(error) => {
+                    master.abort();
+                    return Err(failed(ask, Failure::Port(error), sent, now, &[]));
+                }
+            }
+        }
+    }
+}
+
+fn failed(ask: &Ask<'_>, failure: Failure, sent: Option<Instant>, ended: Instant, raw: &[u8]) -> Box<CallError> {
+    let request = Adu::request(ask.destination, ask.request).as_bytes().to_vec();
+    Box::new(CallError { failure, destination: ask.destination, request, raw: raw.to_vec(), sent, ended })
+}

@@ -1,0 +1,108 @@
+//! Whose turn it is: one owner of the line at a time, in the order they came.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// How often somebody who waits looks up to see whether it should still wait.
+pub(crate) const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// A queue at the line. The calling thread itself works on the line when its turn comes, so that a lone caller pays
+/// for no hand-over.
+#[derive(Debug, Default)]
+pub(crate) struct Queue {
+    waiting: Mutex<Waiting>,
+    moved: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Waiting {
+    next: u64,
+    order: VecDeque<u64>,
+}
+
+/// The right to use the line, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct Turn<'a> {
+    queue: &'a Queue,
+    ticket: u64,
+}
+
+impl Queue {
+    /// Waits for a turn; `None` when `give_up` says so before it comes.
+    pub(crate) fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Option<Turn<'_>> {
+        let mut waiting = self.lock();
+        let ticket = waiting.next;
+        waiting.next += 1;
+        waiting.order.push_back(ticket);
+        let turn = Turn { queue: self, ticket };
+        while waiting.order.front() != Some(&ticket) {
+            let (guard, waited) = self.moved.wait_timeout(waiting, LOOK_UP).unwrap_or_else(PoisonError::into_inner);
+            waiting = guard;
+            if waited.timed_out() {
+                // The caller may need locks of its own to answer.
+                drop(waiting);
+                if give_up() {
+                    return None;
+                }
+                waiting = self.lock();
+            }
+        }
+        Some(turn)
+    }
+
+    /// A thread that panicked cannot have left the order inconsistent: every change is one call.
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        let mut waiting = self.queue.lock();
+        waiting.order.retain(|&ticket| ticket != self.ticket);
+        let others = !waiting.order.is_empty();
+        drop(waiting);
+        if others {
+            self.queue.moved.notify_all();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn turns_come_in_the_order_of_arrival() {
+        let queue = Queue::default();
+        let (done, order) = mpsc::channel();
+        let first = queue.turn(&mut || false).unwrap();
+        std::thread::scope(|scope| {
+            for number in 0..4 {
+                let (queue, done) = (&queue, done.clone());
+                scope.spawn(move || {
+                    let _turn = queue.turn(&mut || false);
+                    done.send(number).unwrap();
+                });
+                // The next one comes only when this one stands in the queue.
+                while queue.lock().order.len() < number + 2 {
+                    std::thread::yield_now();
+                }
+            }
+            drop(first);
+        });
+        assert_eq!(order.try_iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn who_gives_up_leaves_no_gap() {
+        let queue = Queue::default();
+        let first = queue.turn(&mut || false).unwrap();
+        assert!(queue.turn(&mut || true).is_none());
+        drop(first);
+        assert!(queue.turn(&mut || true).is_some());
+    }
+}

@@ -1,0 +1,115 @@
+//! What happened on a bus, in numbers.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use drivebus_rtu::{Tally, UnitAddress};
+
+/// What happened on a bus since it was opened.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Stats {
+    /// Everything that can be told of the exchanges, over all units and broadcasts.
+    pub total: Counters,
+    /// The same for each unit that was asked.
+    pub units: BTreeMap<UnitAddress, Counters>,
+    /// Whole frames that came when nothing was waited for.
+    pub late: u64,
+    /// Whole frames of others while an answer was waited for.
+    pub foreign: u64,
+    /// Bytes that belong to no frame.
+    pub noise_bytes: u64,
+    /// Requests that the adapter sent back to us.
+    pub own_echoes: u64,
+    /// How often the port was opened again after it was lost.
+    pub reconnects: u64,
+}
+
+/// Counts of exchanges, and how long the answers took.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Counters {
+    /// Requests that went out, probes included.
+    pub requests: u64,
+    /// Right answers.
+    pub answers: u64,
+    /// Exceptions.
+    pub refusals: u64,
+    /// Requests without an answer in time.
+    pub timeouts: u64,
+    /// Answers whose CRC was wrong.
+    pub crc_errors: u64,
+    /// Whole frames that could not be the answer.
+    pub bad_answers: u64,
+    /// Requests sent once more.
+    pub retries: u64,
+    /// Echoes sent to find the way back after a request was left open.
+    pub resyncs: u64,
+    /// From the first bit of the request to the last byte of the answer.
+    pub round_trip: Latency,
+}
+
+/// Shortest, longest and mean of a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Latency {
+    /// The shortest; zero while nothing was measured.
+    pub min: Duration,
+    /// The longest.
+    pub max: Duration,
+    sum: Duration,
+    count: u32,
+}
+
+impl Latency {
+    /// The mean; zero while nothing was measured.
+    pub fn mean(&self) -> Duration {
+        self.sum.checked_div(self.count).unwrap_or_default()
+    }
+
+    fn add(&mut self, time: Duration) {
+        self.min = if self.count == 0 { time } else { self.min.min(time) };
+        self.max = self.max.max(time);
+        self.sum = self.sum.saturating_add(time);
+        self.count = self.count.saturating_add(1);
+    }
+}
+
+impl Stats {
+    pub(crate) fn count(&mut self, unit: Option<UnitAddress>, change: impl Fn(&mut Counters)) {
+        change(&mut self.total);
+        if let Some(unit) = unit {
+            change(self.units.entry(unit).or_default());
+        }
+    }
+
+    pub(crate) fn add(&mut self, tally: Tally) {
+        self.late += u64::from(tally.late);
+        self.foreign += u64::from(tally.foreign);
+        self.noise_bytes += u64::from(tally.noise);
+        self.own_echoes += u64::from(tally.own_echo);
+    }
+}
+
+impl Counters {
+    pub(crate) fn answered(&mut self, round_trip: Duration) {
+        self.answers += 1;
+        self.round_trip.add(round_trip);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn latency_keeps_the_ends_and_the_mean() {
+        let mut latency = Latency::default();
+        assert_eq!(latency.mean(), Duration::ZERO);
+        for millis in [5, 2, 11] {
+            latency.add(Duration::from_millis(millis));
+        }
+        assert_eq!((latency.min, latency.max), (Duration::from_millis(2), Duration::from_millis(11)));
+        assert_eq!(latency.mean(), Duration::from_millis(6));
+    }
+}

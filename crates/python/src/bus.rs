@@ -1,0 +1,296 @@
+//! `Bus` for Python: arguments in, one call of the core without the GIL, exceptions out.
+
+use std::sync::Mutex;
+use std::time::{Duration, SystemTime};
+
+use drivebus_line::{AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, PortError, PortErrorKind};
+use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::convert::{bytes_of, one_word, unit_address, words_of};
+use crate::errors::{call_error, not_allowed, port_error, refuse};
+use crate::format::SerialFormat;
+use crate::open;
+
+/// One line and its owner.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Bus {
+    core: CoreBus,
+}
+
+#[pymethods]
+impl Bus {
+    #[new]
+    #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto"))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+    fn new(
+        py: Python<'_>,
+        port: &Bound<'_, PyAny>,
+        format: SerialFormat,
+        timeout: f64,
+        retries: u32,
+        read_only: bool,
+        rs485: Option<&Bound<'_, PyDict>>,
+        echo: &str,
+    ) -> PyResult<Self> {
+        let echo = match echo {
+            "auto" => AdapterEcho::Auto,
+            "yes" => AdapterEcho::Present,
+            "no" => AdapterEcho::Absent,
+            other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
+        };
+        let (opener, format) = open::opener(port, format.0, rs485)?;
+        let options = BusOptions { timeout: seconds("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
+        let core = open::patiently(py, move || CoreBus::open(opener, options))?;
+        Ok(Self { core: core.map_err(|error| port_error(&error))? })
+    }
+
+    #[getter]
+    fn port(&self) -> &str {
+        self.core.name()
+    }
+
+    #[getter]
+    fn closed(&self) -> bool {
+        self.core.is_closed()
+    }
+
+    #[getter]
+    fn read_only(&self) -> bool {
+        self.core.options().read_only
+    }
+
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| self.core.close());
+    }
+
+    fn now(&self, py: Python<'_>) -> f64 {
+        py.detach(|| to_seconds(self.core.now()))
+    }
+
+    #[pyo3(signature = (time, /))]
+    fn sleep(&self, py: Python<'_>, time: f64) -> PyResult<()> {
+        let time = seconds("seconds", time)?;
+        with_signals(py, |give_up| self.core.sleep(time, give_up))
+    }
+
+    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None))]
+    fn read(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
+        timeout: Option<f64>,
+        retries: Option<u32>,
+    ) -> PyResult<Vec<u16>> {
+        let timeout = timeout.map(|time| seconds("timeout", time)).transpose()?;
+        Ok(self.read_words(unit, address, count, CallOptions { timeout, retries })?.0)
+    }
+
+    #[pyo3(signature = (unit, address, count, /))]
+    fn read_stamped(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
+    ) -> PyResult<(Vec<u16>, f64, f64)> {
+        let (words, done) = self.read_words(unit, address, count, CallOptions::default())?;
+        let clock = self.unix_clock(unit.py());
+        Ok((words, clock.at(done.sent), clock.at(done.ended)))
+    }
+
+    #[pyo3(signature = (unit, address, value, /))]
+    fn write(&self, unit: &Bound<'_, PyAny>, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.write_to(unit_address(unit)?.into(), address, value)
+    }
+
+    #[pyo3(signature = (address, value, /))]
+    fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.write_to(Destination::Broadcast, address, value)
+    }
+
+    #[pyo3(signature = (unit, word = None, /, *, timeout = None))]
+    fn echo(
+        &self,
+        py: Python<'_>,
+        unit: &Bound<'_, PyAny>,
+        word: Option<&Bound<'_, PyAny>>,
+        timeout: Option<f64>,
+    ) -> PyResult<f64> {
+        let timeout = timeout.map(|time| seconds("timeout", time)).transpose()?;
+        let word = match word {
+            Some(word) => one_word("word", word)?,
+            None => py.detach(|| self.core.fresh_word()),
+        };
+        let options = CallOptions { timeout, retries: None };
+        let done = self.call(py, unit_address(unit)?.into(), &Request::echo(word), options, &mut |_| ())?;
+        Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
+    }
+
+    #[pyo3(signature = (unit, pdu, reply_length = None, /))]
+    fn transact<'py>(
+        &self,
+        py: Python<'py>,
+        unit: &Bound<'py, PyAny>,
+        pdu: &Bound<'py, PyAny>,
+        reply_length: Option<u8>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
+        let length = reply_length.map_or(AnswerLength::BySilence, AnswerLength::Bytes);
+        // A request that is known by name is checked as one; anything else is carried as it is.
+        let request = match Request::parse(&pdu) {
+            Ok(request) if reply_length.is_none() && !matches!(request, Request::Custom { .. }) => request,
+            _ => Request::custom(&pdu, length).map_err(refuse)?,
+        };
+        let mut reply = Vec::new();
+        self.call(py, unit.into(), &request, CallOptions { timeout: None, retries: Some(0) }, &mut |answer| {
+            let frame = Adu::answer(unit, &answer);
+            if let Ok(frame) = Frame::parse(frame.as_bytes()) {
+                reply = frame.pdu().to_vec();
+            }
+        })?;
+        Ok(PyBytes::new(py, &reply))
+    }
+
+    fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (stats, notes) = py.detach(|| (self.core.stats(), self.core.notes()));
+        let all = counters(py, &stats.total)?;
+        all.set_item("late_replies", stats.late)?;
+        all.set_item("foreign_frames", stats.foreign)?;
+        all.set_item("noise_bytes", stats.noise_bytes)?;
+        all.set_item("own_echoes", stats.own_echoes)?;
+        all.set_item("reconnects", stats.reconnects)?;
+        all.set_item("notes", notes)?;
+        let units = PyDict::new(py);
+        for (unit, figures) in &stats.units {
+            units.set_item(unit.get(), counters(py, figures)?)?;
+        }
+        all.set_item("units", units)?;
+        Ok(all)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<_native.Bus {}>", self.core.name())
+    }
+}
+
+impl Bus {
+    fn read_words(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
+        options: CallOptions,
+    ) -> PyResult<(Vec<u16>, Done)> {
+        let py = unit.py();
+        let request = Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)?;
+        let mut read = Vec::new();
+        let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
+            if let Answer::Read { words, .. } = answer {
+                read = words.iter().collect();
+            }
+        })?;
+        Ok((read, done))
+    }
+
+    fn write_to(&self, to: Destination, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let py = address.py();
+        let address = one_word("address", address)?;
+        let options = CallOptions::default();
+        match words_of(value)? {
+            Err(value) => self.call(py, to, &Request::write(address, value), options, &mut |_| ())?,
+            Ok(words) => {
+                let request = Request::write_many(address, &words).map_err(refuse)?;
+                self.call(py, to, &request, options, &mut |_| ())?
+            }
+        };
+        Ok(())
+    }
+
+    fn call(
+        &self,
+        py: Python<'_>,
+        to: Destination,
+        request: &Request<'_>,
+        options: CallOptions,
+        take: &mut (dyn FnMut(Answer<'_>) + Send),
+    ) -> PyResult<Done> {
+        let result = with_signals(py, |give_up| self.core.call(to, request, options, give_up, take))?;
+        result.map_err(|error| {
+            let clock = self.unix_clock(py);
+            call_error(&error, error.sent.map(|sent| clock.at(sent)), clock.at(error.ended))
+        })
+    }
+
+    fn unix_clock(&self, py: Python<'_>) -> UnixClock {
+        let line = py.detach(|| to_seconds(self.core.now()));
+        let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+        UnixClock { ahead: unix - line }
+    }
+}
+
+/// Runs `work` without the GIL, with a question to ask now and then: has a signal handler of Python raised?
+///
+/// What it raised is what comes back, whatever `work` made of it.
+fn with_signals<T: Send>(py: Python<'_>, work: impl FnOnce(&mut dyn FnMut() -> bool) -> T + Send) -> PyResult<T> {
+    let raised = Mutex::new(None);
+    let result = py.detach(|| {
+        work(&mut || {
+            let error = Python::try_attach(|py| py.check_signals().err()).flatten();
+            let give_up = error.is_some();
+            if let (Ok(mut raised), true) = (raised.lock(), give_up) {
+                *raised = error;
+            }
+            give_up
+        })
+    });
+    match raised.into_inner() {
+        Ok(Some(error)) => Err(error),
+        _ => Ok(result),
+    }
+}
+
+/// The line's clock and the calendar's, at one moment.
+struct UnixClock {
+    ahead: f64,
+}
+
+impl UnixClock {
+    fn at(&self, moment: Instant) -> f64 {
+        to_seconds(moment) + self.ahead
+    }
+}
+
+fn to_seconds(moment: Instant) -> f64 {
+    moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
+}
+
+fn seconds(what: &str, given: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(given)
+        .map_err(|_| not_allowed(format!("{what} {given} is not a number of seconds, 0 or more")))
+}
+
+fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("requests", figures.requests)?;
+    all.set_item("answers", figures.answers)?;
+    all.set_item("refusals", figures.refusals)?;
+    all.set_item("timeouts", figures.timeouts)?;
+    all.set_item("crc_errors", figures.crc_errors)?;
+    all.set_item("bad_answers", figures.bad_answers)?;
+    all.set_item("retries", figures.retries)?;
+    all.set_item("resyncs", figures.resyncs)?;
+    let latency = PyDict::new(py);
+    latency.set_item("min", figures.round_trip.min.as_secs_f64())?;
+    latency.set_item("mean", figures.round_trip.mean().as_secs_f64())?;
+    latency.set_item("max", figures.round_trip.max.as_secs_f64())?;
+    all.set_item("round_trip", latency)?;
+    Ok(all)
+}
+
+/// A port that was handed over open and is gone cannot be opened again by us.
+pub(crate) fn gone(name: &str) -> PortError {
+    PortError::new(PortErrorKind::Lost, name, "it was opened by the program and is gone; open it again and make a new Bus")
+}

@@ -1,0 +1,123 @@
+//! Rust's errors as the exceptions of `drivebus.errors`, which are written in Python so that they have docs and two
+//! bases where it helps.
+
+use drivebus_line::{CallError, Failure, PortError};
+use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBytes, PyDict, PyType};
+
+/// The classes of `drivebus.errors`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Class {
+    Port,
+    NoAnswer,
+    BadAnswer,
+    Crc,
+    Refused,
+    NotAllowed,
+}
+
+impl Class {
+    fn get(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+        static CLASSES: [PyOnceLock<Py<PyType>>; 6] = [const { PyOnceLock::new() }; 6];
+        let (index, name) = match self {
+            Self::Port => (0, "PortError"),
+            Self::NoAnswer => (1, "NoAnswer"),
+            Self::BadAnswer => (2, "BadAnswer"),
+            Self::Crc => (3, "CrcError"),
+            Self::Refused => (4, "Refused"),
+            Self::NotAllowed => (5, "NotAllowed"),
+        };
+        CLASSES[index].import(py, "drivebus.errors", name)
+    }
+
+    /// An exception of this class with `message` and whatever `details` puts among its keyword arguments.
+    pub(crate) fn raise(
+        self,
+        message: String,
+        details: impl for<'py> FnOnce(&Bound<'py, PyDict>) -> PyResult<()>,
+    ) -> PyErr {
+        let built = Python::try_attach(|py| {
+            let keywords = PyDict::new(py);
+            details(&keywords)?;
+            Ok(PyErr::from_value(self.get(py)?.call((message,), Some(&keywords))?))
+        });
+        match built {
+            Some(Ok(error) | Err(error)) => error,
+            // Nobody is left to see it.
+            None => PyErr::new::<PyKeyboardInterrupt, _>(()),
+        }
+    }
+}
+
+/// `NotAllowed`: nothing was sent.
+pub(crate) fn not_allowed(message: String) -> PyErr {
+    Class::NotAllowed.raise(message, |_| Ok(()))
+}
+
+/// `NotAllowed` with an error's own words.
+pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
+    not_allowed(error.to_string())
+}
+
+/// `PortError`: the port cannot be opened or was lost.
+pub(crate) fn port_error(error: &PortError) -> PyErr {
+    Class::Port.raise(error.to_string(), |_| Ok(()))
+}
+
+/// `CrcError` or `BadAnswer` for bytes that are no frame.
+pub(crate) fn frame_error(error: FrameError, raw: &[u8]) -> PyErr {
+    let class = if matches!(error, FrameError::Crc { .. }) { Class::Crc } else { Class::BadAnswer };
+    class.raise(error.to_string(), |keywords| keywords.set_item("raw", PyBytes::new(keywords.py(), raw)))
+}
+
+/// `BadAnswer` for a whole frame that does not answer what was asked.
+pub(crate) fn answer_error(error: AnswerError, request: &[u8], raw: &[u8]) -> PyErr {
+    Class::BadAnswer.raise(error.to_string(), |keywords| {
+        keywords.set_item("request", PyBytes::new(keywords.py(), request))?;
+        keywords.set_item("raw", PyBytes::new(keywords.py(), raw))
+    })
+}
+
+/// `Refused`: the unit answered with exception `code`. What the code means, only a profile can say.
+pub(crate) fn refused(
+    message: String,
+    code: ExceptionCode,
+    details: impl for<'py> FnOnce(&Bound<'py, PyDict>) -> PyResult<()>,
+) -> PyErr {
+    let name = code.standard_name();
+    Class::Refused.raise(format!("{message} ({name} by the specification)"), |keywords| {
+        details(keywords)?;
+        keywords.set_item("code", code.0)?;
+        keywords.set_item("name", name)?;
+        keywords.set_item("meaning", "")
+    })
+}
+
+/// A call that brought no answer. `times` are its beginning and end in Unix seconds.
+pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) -> PyErr {
+    let unit = match error.destination {
+        Destination::Unit(unit) => unit.get(),
+        Destination::Broadcast => 0,
+    };
+    let details = |keywords: &Bound<'_, PyDict>| {
+        let py = keywords.py();
+        keywords.set_item("unit", unit)?;
+        keywords.set_item("request", PyBytes::new(py, &error.request))?;
+        keywords.set_item("raw", PyBytes::new(py, &error.raw))?;
+        keywords.set_item("started", started)?;
+        keywords.set_item("ended", ended)
+    };
+    let message = error.to_string();
+    match error.failure {
+        Failure::Port(_) | Failure::Closed => Class::Port.raise(message, details),
+        Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
+        Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),
+        Failure::Corrupt(FrameError::Crc { .. }) => Class::Crc.raise(message, details),
+        Failure::Refused { code, .. } => refused(message, code, details),
+        // A line that is never silent is full of bytes that are no answer.
+        _ => Class::BadAnswer.raise(message, details),
+    }
+}

@@ -1,0 +1,137 @@
+//! Frames without a line: encode, judge, take apart, and the CRC.
+
+use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, UnitAddress, crc16 as crc, function};
+use pyo3::buffer::PyBuffer;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+
+use crate::convert::{bytes_of, destination, one_word, unit_address, words_of};
+use crate::errors::{answer_error, frame_error, refuse, refused};
+
+/// CRC-16/MODBUS of any bytes-like object.
+#[pyfunction]
+#[pyo3(signature = (data, /))]
+pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
+    // The common case needs no copy.
+    if let Ok(bytes) = data.cast::<PyBytes>() {
+        return Ok(crc(bytes.as_bytes()));
+    }
+    Ok(crc(&PyBuffer::<u8>::get(data)?.to_vec(data.py())?))
+}
+
+#[pyfunction]
+#[pyo3(signature = (unit, address, count, /))]
+pub(crate) fn encode_read<'py>(
+    py: Python<'py>,
+    unit: &Bound<'py, PyAny>,
+    address: &Bound<'py, PyAny>,
+    count: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let request = Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)?;
+    Ok(frame(py, unit_address(unit)?.into(), &request))
+}
+
+#[pyfunction]
+#[pyo3(signature = (unit, address, value, /))]
+pub(crate) fn encode_write<'py>(
+    py: Python<'py>,
+    unit: &Bound<'py, PyAny>,
+    address: &Bound<'py, PyAny>,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let (to, address) = (destination(unit)?, one_word("address", address)?);
+    match words_of(value)? {
+        Err(value) => Ok(frame(py, to, &Request::write(address, value))),
+        Ok(words) => Ok(frame(py, to, &Request::write_many(address, &words).map_err(refuse)?)),
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (unit, word, /))]
+pub(crate) fn encode_echo<'py>(
+    py: Python<'py>,
+    unit: &Bound<'py, PyAny>,
+    word: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    Ok(frame(py, unit_address(unit)?.into(), &Request::echo(one_word("word", word)?)))
+}
+
+fn frame<'py>(py: Python<'py>, to: Destination, request: &Request<'_>) -> Bound<'py, PyBytes> {
+    PyBytes::new(py, Adu::request(to, request).as_bytes())
+}
+
+#[pyfunction]
+#[pyo3(signature = (request, frame, /))]
+pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u16>>> {
+    let (asked, came) = (bytes_of(request)?, bytes_of(frame)?);
+    let request = Frame::parse(&asked).map_err(refuse)?;
+    let unit = UnitAddress::new(request.address()).map_err(refuse)?;
+    let expected = Request::parse(request.pdu()).map_err(refuse)?.expected();
+    let answer = Frame::parse(&came).map_err(|error| frame_error(error, &came))?;
+    match expected.judge_frame(unit, &answer) {
+        Ok(Answer::Read { words, .. }) => Ok(Some(words.iter().collect())),
+        Ok(Answer::Exception { function, code, .. }) => {
+            let message = format!("unit {unit} refused function {function:02X}H with exception {:02X}H", code.0);
+            Err(refused(message, code, |keywords| {
+                keywords.set_item("unit", unit.get())?;
+                keywords.set_item("request", PyBytes::new(keywords.py(), &asked))?;
+                keywords.set_item("raw", PyBytes::new(keywords.py(), &came))
+            }))
+        }
+        Ok(_) => Ok(None),
+        Err(error) => Err(answer_error(error, &asked, &came)),
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (frame, /))]
+pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    let bytes = bytes_of(frame)?;
+    let frame = Frame::parse(&bytes).map_err(|error| frame_error(error, &bytes))?;
+    let fields = PyDict::new(py);
+    fields.set_item("unit", frame.address())?;
+    fields.set_item("crc", crc(&bytes[..bytes.len() - 2]))?;
+    let kind = match (Request::parse(frame.pdu()), Answer::parse(frame.pdu())) {
+        (Ok(Request::ReadHolding { address, count, .. }), _) => {
+            fields.set_item("address", address)?;
+            fields.set_item("count", count)?;
+            "read"
+        }
+        (Ok(Request::WriteSingle { address, value, .. }), _) => {
+            fields.set_item("address", address)?;
+            fields.set_item("value", value)?;
+            "write"
+        }
+        (Ok(Request::Echo { data, .. }), _) => {
+            fields.set_item("data", data)?;
+            "echo"
+        }
+        (Ok(Request::WriteMultiple { address, words, .. }), _) => {
+            fields.set_item("address", address)?;
+            fields.set_item("count", words.len())?;
+            fields.set_item("words", PyList::new(py, words.iter())?)?;
+            "write_many"
+        }
+        (_, Ok(Answer::Read { words, .. })) => {
+            fields.set_item("count", words.len())?;
+            fields.set_item("words", PyList::new(py, words.iter())?)?;
+            "read_answer"
+        }
+        (_, Ok(Answer::WriteMultiple { address, count, .. })) => {
+            fields.set_item("address", address)?;
+            fields.set_item("count", count)?;
+            "write_many_answer"
+        }
+        (_, Ok(Answer::Exception { code, .. })) => {
+            fields.set_item("code", code.0)?;
+            "exception"
+        }
+        _ => {
+            fields.set_item("pdu", PyBytes::new(py, frame.pdu()))?;
+            "other"
+        }
+    };
+    fields.set_item("kind", kind)?;
+    fields.set_item("function", frame.pdu().first().map(|code| code & !function::EXCEPTION_BIT))?;
+    Ok(fields)
+}

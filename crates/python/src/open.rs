@@ -1,0 +1,132 @@
+//! From what the Python package hands over as a port to a line of the core.
+
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
+use drivebus_line::rs485::Rs485;
+use drivebus_line::tcp::RtuOverTcp;
+use drivebus_line::tty::{Tty, TtyOptions};
+use drivebus_line::{Line, Opener, PortError, PortErrorKind};
+use drivebus_rtu::SerialFormat;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::bus::gone;
+use crate::errors::{not_allowed, port_error};
+use crate::pyserial::PySerialLine;
+use crate::sim::Simulator;
+
+/// How long a server may take to accept a connection.
+const CONNECT: Duration = Duration::from_secs(3);
+/// How often Ctrl-C is looked for while a port is opened.
+const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// What opens `port`, and the format its characters have.
+pub(crate) fn opener(
+    port: &Bound<'_, PyAny>,
+    format: SerialFormat,
+    rs485: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Opener, SerialFormat)> {
+    let rs485 = rs485.map(rs485_options).transpose()?;
+    if let Ok(text) = port.cast::<PyString>() {
+        return Ok((named(text.to_str()?, format, rs485)?, format));
+    }
+    if rs485.is_some() {
+        return Err(not_allowed(String::from("rs485 is for a serial port given by its path")));
+    }
+    if let Ok(simulator) = port.cast::<Simulator>() {
+        let simulator = simulator.clone().unbind();
+        let opener = move || {
+            Python::try_attach(|py| simulator.get().sim_line(py))
+                .unwrap_or_else(|| Err(gone("the simulator")))
+        };
+        return Ok((Box::new(opener), format));
+    }
+    let line = PySerialLine::new(port, &format, false).map_err(|error| port_error(&error))?;
+    let (format, name) = (line.format(), line.name());
+    let mut line = Some(line);
+    let opener = move || match line.take() {
+        Some(line) => Ok(Box::new(line) as Box<dyn Line>),
+        None => Err(gone(&name)),
+    };
+    Ok((Box::new(opener), format))
+}
+
+fn named(port: &str, format: SerialFormat, rs485: Option<Rs485>) -> PyResult<Opener> {
+    let port = port.to_owned();
+    let (scheme, rest) = port.split_once("://").unwrap_or(("", &port));
+    match scheme {
+        "" => {
+            let options = TtyOptions { rs485, ..TtyOptions::default() };
+            Ok(Box::new(move || Ok(Box::new(Tty::open(&port, &format, &options)?))))
+        }
+        "socket" => {
+            let (host, number) = host_and_port(&port, rest, None)?;
+            Ok(Box::new(move || Ok(Box::new(RtuOverTcp::connect(&host, number, &format, CONNECT)?))))
+        }
+        "tcp" => {
+            let (host, number) = host_and_port(&port, rest, Some(DEFAULT_PORT))?;
+            Ok(Box::new(move || Ok(Box::new(ModbusTcp::connect(&host, number, CONNECT)?))))
+        }
+        other => Err(not_allowed(format!("port {port:?}: {other}:// is not socket:// or tcp://"))),
+    }
+}
+
+/// `host:port`, `[ipv6]:port`, or only the host where the scheme has a usual port.
+fn host_and_port(url: &str, rest: &str, usual: Option<u16>) -> PyResult<(String, u16)> {
+    let rest = rest.trim_end_matches('/');
+    let (host, number) = match rest.rsplit_once(':') {
+        Some((host, number)) if !number.contains(']') => (host, number.parse().ok()),
+        _ => (rest, usual),
+    };
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    match number {
+        Some(number) if !host.is_empty() => Ok((host.to_owned(), number)),
+        _ => Err(not_allowed(format!("port {url:?} is not scheme://host:port with a port in 0..65535"))),
+    }
+}
+
+fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
+    let mut options = Rs485::default();
+    for (key, value) in given {
+        let key: String = key.extract()?;
+        let bad = |_| not_allowed(format!("rs485: {key} cannot be {value}"));
+        match key.as_str() {
+            "enabled" => options.enabled = value.extract().map_err(bad)?,
+            "rts_on_send" => options.rts_on_send = value.extract().map_err(bad)?,
+            "delay_before_ms" => options.delay_before_ms = value.extract().map_err(bad)?,
+            "delay_after_ms" => options.delay_after_ms = value.extract().map_err(bad)?,
+            _ => {
+                return Err(not_allowed(format!(
+                    "rs485: {key:?} is not known; known are enabled, rts_on_send, delay_before_ms, delay_after_ms"
+                )));
+            }
+        }
+    }
+    Ok(options)
+}
+
+/// Runs `open`, which may block in the system, in a thread of its own, so that Ctrl-C still ends the wait at once.
+pub(crate) fn patiently<T: Send + 'static>(
+    py: Python<'_>,
+    open: impl FnOnce() -> Result<T, PortError> + Send + 'static,
+) -> PyResult<Result<T, PortError>> {
+    let (done, result) = channel();
+    let opening = std::thread::Builder::new().name(String::from("drivebus-open")).spawn(move || {
+        // Nobody takes the port any more after Ctrl-C: it is closed again.
+        let _ = done.send(open());
+    });
+    if let Err(error) = opening {
+        return Ok(Err(PortError::new(PortErrorKind::Other, "port", format!("no thread to open it: {error}"))));
+    }
+    loop {
+        match py.detach(|| result.recv_timeout(LOOK_UP)) {
+            Ok(opened) => return Ok(opened),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Ok(Err(PortError::new(PortErrorKind::Other, "port", "opening it failed unexpectedly")));
+            }
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! The simulator for Python.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use drivebus_line::{Line, PortError, PortErrorKind};
+use drivebus_sim::{self as sim, Options, Side, SimError};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::convert::{bytes_of, one_word, shown, unit_address};
+use crate::errors::{not_allowed, port_error, refuse};
+use crate::format::SerialFormat;
+
+/// What other programs reach the simulated line by. It is served until this is dropped.
+enum Server {
+    InProcess,
+    #[cfg(target_os = "linux")]
+    Pty(sim::PtyServer),
+    #[cfg(unix)]
+    Tcp(sim::TcpServer),
+}
+
+impl Server {
+    fn start(simulator: &sim::Simulator, transport: &str) -> PyResult<Self> {
+        let failed = |error| match error {
+            SimError::Io(error) => {
+                port_error(&PortError::new(PortErrorKind::Other, format!("simulator ({transport})"), error.to_string()))
+            }
+            error => refuse(error),
+        };
+        match transport {
+            "process" => Ok(Self::InProcess),
+            #[cfg(target_os = "linux")]
+            "pty" => simulator.serve_pty().map(Self::Pty).map_err(failed),
+            #[cfg(unix)]
+            "tcp" => simulator.serve_tcp().map(Self::Tcp).map_err(failed),
+            "pty" | "tcp" => Err(not_allowed(format!("transport {transport:?} does not work on this system"))),
+            other => Err(not_allowed(format!("transport {other:?} is not \"pty\", \"tcp\" or \"process\""))),
+        }
+    }
+
+    fn port(&self, simulator: &sim::Simulator) -> String {
+        match self {
+            Self::InProcess => simulator.name().to_owned(),
+            #[cfg(target_os = "linux")]
+            Self::Pty(server) => server.path().display().to_string(),
+            #[cfg(unix)]
+            Self::Tcp(server) => format!("socket://{}", server.address()),
+        }
+    }
+}
+
+/// A simulated line with simulated drives.
+#[pyclass(frozen, module = "drivebus._native")]
+pub(crate) struct Simulator {
+    simulator: sim::Simulator,
+    port: String,
+    /// `None` once it is closed.
+    server: Mutex<Option<Server>>,
+}
+
+impl Simulator {
+    /// A bus's connection to the line, in this process.
+    pub(crate) fn sim_line(&self) -> Result<Box<dyn Line>, PortError> {
+        if self.server().is_none() {
+            let message = "the simulation is closed; make a new Simulator";
+            return Err(PortError::new(PortErrorKind::Closed, &self.port, message));
+        }
+        Ok(Box::new(self.simulator.line()))
+    }
+
+    fn server(&self) -> MutexGuard<'_, Option<Server>> {
+        self.server.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Simulator {
+    #[new]
+    #[pyo3(signature = (units, format, *, seed = None, transport = "pty", realtime = true, strict_silence = false))]
+    fn new(
+        units: &Bound<'_, PyAny>,
+        format: SerialFormat,
+        seed: Option<&Bound<'_, PyAny>>,
+        transport: &str,
+        realtime: bool,
+        strict_silence: bool,
+    ) -> PyResult<Self> {
+        let seed = seed.map_or(Ok(0), |seed| {
+            seed.extract::<u64>().map_err(|_| not_allowed(format!("seed {} is not in 0..2**64-1", shown(seed))))
+        })?;
+        let units = units_of(units)?;
+        let options = Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
+        let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
+        let simulator = sim::Simulator::new(named, options).map_err(refuse)?;
+        let server = Server::start(&simulator, transport)?;
+        let port = server.port(&simulator);
+        Ok(Self { simulator, port, server: Mutex::new(Some(server)) })
+    }
+
+    #[getter]
+    fn port(&self) -> &str {
+        &self.port
+    }
+
+    fn close(&self, py: Python<'_>) {
+        let server = self.server().take();
+        // Ending a server waits for its thread.
+        py.detach(|| drop(server));
+    }
+
+    fn now(&self) -> f64 {
+        seconds(self.simulator.now())
+    }
+
+    #[pyo3(signature = (seconds, /))]
+    fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = duration(seconds)?;
+        py.detach(|| self.simulator.advance(time)).map_err(refuse)
+    }
+
+    #[pyo3(signature = (unit, /))]
+    fn drive(&self, unit: &Bound<'_, PyAny>) -> PyResult<SimulatedDrive> {
+        self.simulator.drive(unit_address(unit)?.get()).map(SimulatedDrive).map_err(refuse)
+    }
+
+    #[getter]
+    fn line(&self) -> SimulatedLine {
+        SimulatedLine(self.simulator.wire())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Simulator {} at {}>", self.simulator.name(), self.port)
+    }
+}
+
+/// One simulated drive, seen from its shaft and its keypad, not from the bus.
+#[pyclass(frozen, module = "drivebus._native")]
+pub(crate) struct SimulatedDrive(sim::SimulatedDrive);
+
+#[pymethods]
+impl SimulatedDrive {
+    #[getter]
+    fn unit(&self) -> u8 {
+        self.0.unit()
+    }
+
+    #[getter]
+    fn profile(&self) -> String {
+        self.0.profile()
+    }
+
+    #[getter]
+    fn state(&self) -> &'static str {
+        self.0.state()
+    }
+
+    #[getter]
+    fn frequency(&self) -> f64 {
+        self.0.frequency()
+    }
+
+    #[getter]
+    fn speed(&self) -> f64 {
+        self.0.speed()
+    }
+
+    #[getter]
+    fn fault(&self) -> u16 {
+        self.0.fault()
+    }
+
+    #[getter]
+    fn load(&self) -> f64 {
+        self.0.load()
+    }
+
+    #[setter]
+    fn set_load(&self, load: f64) -> PyResult<()> {
+        self.0.set_load(load).map_err(refuse)
+    }
+
+    #[getter]
+    fn inputs(&self) -> u16 {
+        self.0.inputs()
+    }
+
+    #[setter]
+    fn set_inputs(&self, inputs: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.set_inputs(one_word("inputs", inputs)?).map_err(refuse)
+    }
+
+    #[pyo3(signature = (code, /))]
+    fn trip(&self, code: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.trip(one_word("fault", code)?).map_err(refuse)
+    }
+
+    fn power_cycle(&self) {
+        self.0.power_cycle();
+    }
+
+    #[pyo3(signature = (address, /))]
+    fn register(&self, address: &Bound<'_, PyAny>) -> PyResult<u16> {
+        let address = one_word("address", address)?;
+        self.0.register(address).map_err(|code| {
+            let unit = self.0.unit();
+            not_allowed(format!("unit {unit} would refuse to read {address:04X}H with exception {:02X}H", code.0))
+        })
+    }
+
+    #[getter]
+    fn eeprom_writes(&self) -> u64 {
+        self.0.eeprom_writes()
+    }
+
+    fn writes(&self) -> Vec<(f64, u16, u16)> {
+        self.0.writes().iter().map(|write| (seconds(write.at), write.address, write.value)).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<SimulatedDrive {}: {}, {}>", self.0.unit(), self.0.profile(), self.0.state())
+    }
+}
+
+/// The wire: what it saw, and what it is told to spoil.
+#[pyclass(frozen, module = "drivebus._native")]
+pub(crate) struct SimulatedLine(sim::SimulatedLine);
+
+#[pymethods]
+impl SimulatedLine {
+    #[getter]
+    fn requests(&self) -> u64 {
+        self.0.requests()
+    }
+
+    #[getter]
+    fn silence_violations(&self) -> u64 {
+        self.0.silence_violations()
+    }
+
+    #[pyo3(signature = (data, /))]
+    fn answer_with(&self, data: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.answer_with(&bytes_of(data)?);
+        Ok(())
+    }
+
+    #[pyo3(signature = (count = 1, /))]
+    fn drop_answers(&self, count: u32) {
+        self.0.drop_answers(count);
+    }
+
+    #[pyo3(signature = (seconds, count = 1, /))]
+    fn delay_answers(&self, seconds: f64, count: u32) -> PyResult<()> {
+        self.0.delay_answers(duration(seconds)?, count);
+        Ok(())
+    }
+
+    #[pyo3(signature = (data, count = 1, /))]
+    fn noise_before(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
+        self.0.noise_before(&bytes_of(data)?, count);
+        Ok(())
+    }
+
+    #[pyo3(signature = (data, count = 1, /))]
+    fn noise_after(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
+        self.0.noise_after(&bytes_of(data)?, count);
+        Ok(())
+    }
+
+    fn clear(&self) {
+        self.0.clear();
+    }
+
+    fn trace<'py>(&self, py: Python<'py>) -> Vec<(f64, &'static str, Bound<'py, PyBytes>)> {
+        let sent = self.0.trace();
+        let side = |side| if side == Side::Master { "master" } else { "unit" };
+        sent.iter().map(|sent| (seconds(sent.begin), side(sent.side), PyBytes::new(py, &sent.bytes))).collect()
+    }
+}
+
+/// A mapping's items as unit address and profile name.
+fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, String)>> {
+    let mistake = || not_allowed(format!("units {} do not map unit addresses to profile names", shown(units)));
+    let items = units.call_method0("items").map_err(|_| mistake())?;
+    items
+        .try_iter()?
+        .map(|item| {
+            let (unit, profile): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item?.extract().map_err(|_| mistake())?;
+            let profile = profile.extract().map_err(|_| mistake())?;
+            Ok((unit_address(&unit)?.get(), profile))
+        })
+        .collect()
+}
+
+/// A moment of the simulation in seconds.
+#[expect(clippy::cast_precision_loss, reason = "a float is what Python counts seconds in; 104 days are exact")]
+fn seconds(moment: drivebus_rtu::Instant) -> f64 {
+    moment.as_nanos() as f64 / 1e9
+}
+
+fn duration(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is no time to wait")))
+}

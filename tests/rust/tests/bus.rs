@@ -1,0 +1,204 @@
+//! The bus against a simulated drive, in virtual time: what the owner of the line promises, to the nanosecond.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::time::Duration;
+
+use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Failure, Line};
+use drivebus_rtu::{Adu, Answer, DataBits, Destination, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress};
+use drivebus_sim::{Options, Side, Simulator};
+
+const STATE: u16 = 0x2100;
+const RESPONSE_DELAY: u16 = 0x0E03; // P14.03
+
+fn unit(raw: u8) -> UnitAddress {
+    UnitAddress::new(raw).unwrap()
+}
+
+fn simulator(format: SerialFormat) -> Simulator {
+    Simulator::new([(1, "gd350"), (2, "gd350")], Options::default().format(format)).unwrap()
+}
+
+fn bus(simulator: &Simulator, options: BusOptions) -> Bus {
+    let line: Box<dyn Line> = Box::new(simulator.line());
+    let mut line = Some(line);
+    Bus::open(Box::new(move || Ok(line.take().unwrap())), options).unwrap()
+}
+
+fn pair() -> (Simulator, Bus) {
+    let simulator = simulator(SerialFormat::DEFAULT);
+    let bus = bus(&simulator, BusOptions::new(SerialFormat::DEFAULT));
+    (simulator, bus)
+}
+
+fn ask(bus: &Bus, unit_address: u8, request: &Request<'_>) -> Result<(Vec<u16>, Done), Box<CallError>> {
+    let mut read = Vec::new();
+    let done = bus.call(unit(unit_address).into(), request, CallOptions::default(), &mut || false, &mut |answer| {
+        if let Answer::Read { words, .. } = answer {
+            read = words.iter().collect();
+        }
+    })?;
+    Ok((read, done))
+}
+
+fn read(bus: &Bus, address: u16, count: u16) -> Result<Vec<u16>, Box<CallError>> {
+    Ok(ask(bus, 1, &Request::read(address, count).unwrap())?.0)
+}
+
+/// The shortest cycle the protocol allows: request, silence, answer, silence. Nothing on top of it, and never less.
+#[test]
+fn the_line_is_idle_only_when_the_protocol_says_so() {
+    for baud_rate in [9_600, 19_200, 115_200] {
+        for count in [1, 16] {
+            let format =
+                SerialFormat::new(baud_rate, DataBits::Eight, Parity::Even, StopBits::One, Silence::Spec).unwrap();
+            let simulator = simulator(format);
+            let bus = bus(&simulator, BusOptions::new(format));
+            ask(&bus, 1, &Request::write(RESPONSE_DELAY, 0)).unwrap();
+            let request = Request::read(0x3000, count).unwrap();
+            let first = ask(&bus, 1, &request).unwrap().1;
+            let mut last = first;
+            for _ in 0..100 {
+                last = ask(&bus, 1, &request).unwrap().1;
+            }
+            let cycle = last.sent.saturating_duration_since(first.sent) / 100;
+            let answer = 5 + 2 * u32::from(count);
+            let shortest = format.chars(8) + format.t35() + format.chars(answer) + format.t35();
+            assert_eq!(cycle, shortest, "{count} words at {format}");
+            assert_eq!(simulator.wire().silence_violations(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_read_is_repeated_and_a_write_is_not() {
+    let (simulator, bus) = pair();
+    simulator.wire().drop_answers(2);
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+    assert_eq!(bus.stats().total.timeouts, 2);
+
+    let accel = 0x800B; // P00.11, RAM
+    simulator.wire().drop_answers(1);
+    let error = ask(&bus, 1, &Request::write(accel, 50)).unwrap_err();
+    assert!(matches!(error.failure, Failure::NoAnswer { attempts: 1, .. }), "{error}");
+    assert!(error.sent.is_some() && error.to_string().contains("the unit may have taken it"), "{error}");
+    let writes = simulator.drive(1).unwrap().writes();
+    assert_eq!(writes.iter().filter(|write| write.address == accel).count(), 1, "{writes:?}");
+}
+
+#[test]
+fn a_reply_that_comes_during_the_next_request_is_never_its_answer() {
+    let (simulator, bus) = pair();
+    simulator.wire().delay_answers(Duration::from_millis(515), 1);
+    let once = CallOptions { timeout: None, retries: Some(0) };
+    let late = bus.call(unit(1).into(), &Request::read(0x2103, 1).unwrap(), once, &mut || false, &mut |_| ());
+    assert!(matches!(late.unwrap_err().failure, Failure::NoAnswer { .. }));
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3], "not 01A0H, the identification asked for before");
+    let stats = bus.stats();
+    assert_eq!((stats.late, stats.total.resyncs), (1, 1), "{stats:?}");
+}
+
+#[test]
+fn a_silent_unit_costs_its_own_time_outs_only() {
+    let (simulator, bus) = pair();
+    let error = ask(&bus, 9, &Request::read(STATE, 1).unwrap()).unwrap_err();
+    assert_eq!(error.to_string(), "unit 9, read 2100H: no answer within 500 ms, asked 3 times",);
+    assert_eq!(error.request, Adu::request(unit(9).into(), &Request::read(STATE, 1).unwrap()).as_bytes());
+    let spent = error.ended.as_nanos();
+    assert!(spent < 3 * 540_000_000, "three time-outs and the requests: {spent} ns");
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+    assert_eq!(bus.stats().units[&unit(1)].requests, 1);
+    assert_eq!(simulator.wire().silence_violations(), 0);
+}
+
+#[test]
+fn what_the_unit_refuses_is_not_asked_again() {
+    let (simulator, bus) = pair();
+    let error = read(&bus, 0x6300, 1).unwrap_err(); // P99.00
+    assert!(matches!(error.failure, Failure::Refused { function: 3, code } if code.0 == 2), "{error}");
+    assert_eq!(simulator.wire().requests(), 1);
+}
+
+#[test]
+fn a_damaged_answer_is_told_with_both_crcs_and_its_bytes() {
+    let (simulator, bus) = pair();
+    let bad = [0x01, 0x03, 0x02, 0x00, 0x03, 0xF8, 0x46];
+    simulator.wire().answer_with(&bad);
+    let once = CallOptions { timeout: None, retries: Some(0) };
+    let request = Request::read(STATE, 1).unwrap();
+    let error = bus.call(unit(1).into(), &request, once, &mut || false, &mut |_| ()).unwrap_err();
+    assert_eq!(error.raw, bad);
+    assert_eq!(
+        error.to_string(),
+        "unit 1, read 2100H: the CRC of the bytes is F8 45, with them came F8 46; came: 01 03 02 00 03 F8 46"
+    );
+}
+
+#[test]
+fn a_read_only_bus_sends_no_write() {
+    let simulator = simulator(SerialFormat::DEFAULT);
+    let options = BusOptions { read_only: true, ..BusOptions::new(SerialFormat::DEFAULT) };
+    let bus = bus(&simulator, options);
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+    for (destination, request) in [
+        (Destination::Unit(unit(1)), Request::write(0x2000, 1)),
+        (Destination::Unit(unit(1)), Request::write_many(0x2000, &[1, 1000]).unwrap()),
+        (Destination::Broadcast, Request::write(0x2000, 5)),
+    ] {
+        let error = bus.call(destination, &request, CallOptions::default(), &mut || false, &mut |_| ()).unwrap_err();
+        assert!(matches!(error.failure, Failure::ReadOnly { .. }), "{error}");
+        assert_eq!(error.sent, None);
+    }
+    assert_eq!(simulator.wire().requests(), 1);
+}
+
+#[test]
+fn a_broadcast_reaches_all_and_waits_for_none() {
+    let (simulator, bus) = pair();
+    let request = Request::write(0x800B, 77);
+    let done = bus.call(Destination::Broadcast, &request, CallOptions::default(), &mut || false, &mut |_| ()).unwrap();
+    let format = SerialFormat::DEFAULT;
+    assert_eq!(done.ended, done.sent + format.chars(8) + Duration::from_millis(100), "the turnaround delay");
+    for address in [1, 2] {
+        assert_eq!(simulator.drive(address).unwrap().register(0x000B), Ok(77));
+    }
+    let answers = simulator.wire().trace().iter().filter(|sent| sent.side == Side::Unit).count();
+    assert_eq!(answers, 0);
+}
+
+#[test]
+fn giving_up_leaves_a_line_that_answers_rightly() {
+    let (simulator, bus) = pair();
+    simulator.wire().delay_answers(Duration::from_millis(200), 1);
+    let request = Request::read(0x2103, 1).unwrap();
+    let error = bus.call(unit(1).into(), &request, CallOptions::default(), &mut || true, &mut |_| ()).unwrap_err();
+    assert_eq!(error.failure, Failure::Interrupted);
+    assert!(error.ended.as_nanos() < 100_000_000, "within 0.1 s");
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+}
+
+#[test]
+fn a_closed_bus_says_so() {
+    let (_simulator, bus) = pair();
+    bus.close();
+    bus.close();
+    assert!(bus.is_closed());
+    assert!(matches!(read(&bus, STATE, 1).unwrap_err().failure, Failure::Closed));
+}
+
+#[test]
+fn threads_take_turns_and_each_gets_its_own_answer() {
+    let (_simulator, bus) = pair();
+    std::thread::scope(|scope| {
+        for thread in 0..8_u16 {
+            let bus = &bus;
+            scope.spawn(move || {
+                for _ in 0..50 {
+                    let (address, expected) = if thread % 2 == 0 { (0x2103, 0x01A0) } else { (STATE, 3) };
+                    assert_eq!(read(bus, address, 1).unwrap(), [expected]);
+                }
+            });
+        }
+    });
+    assert_eq!(bus.stats().total.answers, 400);
+}
