@@ -1,5 +1,6 @@
 //! Bit fields: what single bits or groups of bits in a word mean.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Some neighbouring bits of a word, with a name.
@@ -46,6 +47,12 @@ impl BitField {
     /// Its value within `word`.
     pub fn extract(&self, word: u16) -> u16 {
         (word & self.mask()) >> self.low
+    }
+
+    /// What its value within `word` means; the number itself where that is not documented.
+    pub fn meaning(&self, word: u16) -> Cow<'_, str> {
+        let value = self.extract(word);
+        self.values.get(&value).map_or_else(|| Cow::Owned(value.to_string()), |label| Cow::Borrowed(label.as_str()))
     }
 
     /// `word` with this field set to `value`, whose surplus bits are dropped.

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use drivebus_drives::{Access, Command, Entry, Kind, Profile, State, Store};
+use drivebus_drives::{Access, BitField, Command, Entry, Kind, Profile, State, Store};
 
 fn gd350() -> Arc<Profile> {
     Profile::builtin("gd350").unwrap()
@@ -250,8 +250,12 @@ fn bits_of_status_word_2_are_those_of_the_manual() {
     let channel = &entry.bits()[4];
     assert_eq!(channel.extract(0x0041), 2);
     assert_eq!(channel.values()[&2], "communication");
+    assert_eq!((channel.meaning(0x0041), channel.meaning(0x0061)), ("communication".into(), "3".into()));
     assert_eq!(channel.insert(0x0001, 2), 0x0041);
     assert!(!entry.bits()[7].verified(), "bits 10 and 11 are inferred");
+    let outputs = profile.find("output_state").unwrap();
+    let on: Vec<&str> = outputs.bits().iter().filter(|bit| bit.meaning(0x0009) == "on").map(BitField::name).collect();
+    assert_eq!(on, ["Y1", "RO2"]);
 }
 
 #[test]
