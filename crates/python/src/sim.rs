@@ -35,7 +35,10 @@ impl Server {
             "pty" => simulator.serve_pty().map(Self::Pty).map_err(failed),
             #[cfg(unix)]
             "tcp" => simulator.serve_tcp().map(Self::Tcp).map_err(failed),
-            "pty" | "tcp" => Err(not_allowed(format!("transport {transport:?} does not work on this system"))),
+            #[cfg(not(target_os = "linux"))]
+            "pty" => Err(not_allowed(String::from("transport \"pty\" needs Linux; use \"tcp\" or \"process\""))),
+            #[cfg(not(unix))]
+            "tcp" => Err(not_allowed(String::from("transport \"tcp\" needs a Unix system; use \"process\""))),
             other => Err(not_allowed(format!("transport {other:?} is not \"pty\", \"tcp\" or \"process\""))),
         }
     }
