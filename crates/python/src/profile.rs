@@ -69,7 +69,7 @@ impl Profile {
         let py = name.py();
         let entry = self.find(name)?;
         let quantity = entry.quantity();
-        let value = |value: Option<Value>| value.map(|value| number(py, entry, value)).transpose();
+        let value = |value: Option<Value>| value.map(|value| number(py, entry, value));
         let dict = PyDict::new(py);
         dict.set_item("name", entry.name())?;
         dict.set_item("code", entry.code())?;
@@ -86,9 +86,9 @@ impl Profile {
         // Where the scale is not known the unit is "raw", and there is one count to it.
         dict.set_item("scale", quantity.scale().unwrap_or(1))?;
         dict.set_item("signed", quantity.is_signed())?;
-        dict.set_item("low", value(quantity.low())?)?;
-        dict.set_item("high", value(quantity.high())?)?;
-        dict.set_item("default", value(entry.default_raw().map(|raw| entry.decode(raw)))?)?;
+        dict.set_item("low", value(quantity.low()))?;
+        dict.set_item("high", value(quantity.high()))?;
+        dict.set_item("default", value(entry.default_raw().map(|raw| entry.decode(raw))))?;
         dict.set_item("access", entry.access().name())?;
         dict.set_item("choices", quantity.choices())?;
         dict.set_item("bits", bits(py, entry)?)?;
@@ -111,7 +111,7 @@ impl Profile {
     #[pyo3(signature = (name, raw, /))]
     fn decode<'py>(&self, name: &Bound<'py, PyAny>, raw: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let entry = self.find(name)?;
-        number(name.py(), entry, entry.decode(one_word("raw", raw)?))
+        Ok(number(name.py(), entry, entry.decode(one_word("raw", raw)?)))
     }
 
     #[pyo3(signature = (name, value, /))]
@@ -171,7 +171,7 @@ impl Profile {
             let entry = self.0.find(&row.code).map_err(refuse)?;
             let dict = PyDict::new(py);
             dict.set_item("code", &row.code)?;
-            dict.set_item("value", number(py, entry, entry.decode(row.raw))?)?;
+            dict.set_item("value", number(py, entry, entry.decode(row.raw)))?;
             dict.set_item("label", &row.label)?;
             dict.set_item("verified", row.verified)?;
             dict.set_item("note", &row.note)?;
@@ -210,11 +210,11 @@ fn text(what: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
 }
 
 /// `value` as a float where the drive measures, as an int where it counts or names.
-fn number<'py>(py: Python<'py>, entry: &Entry, value: Value) -> PyResult<Bound<'py, PyAny>> {
+fn number<'py>(py: Python<'py>, entry: &Entry, value: Value) -> Bound<'py, PyAny> {
     if entry.quantity().measures() {
-        Ok(PyFloat::new(py, value.to_f64()).into_any())
+        PyFloat::new(py, value.to_f64()).into_any()
     } else {
-        Ok(PyInt::new(py, value.count()).into_any())
+        PyInt::new(py, value.count()).into_any()
     }
 }
 
