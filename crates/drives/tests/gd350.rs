@@ -149,6 +149,7 @@ fn parameters_of_the_manual_have_its_ranges_defaults_and_access() {
     {
         assert_eq!(profile.find(name).unwrap().quantity().high_from(), Some("P00.03"), "{name}");
     }
+    // The manual only reads the fault history; that it cannot be written is our assumption, and the rows say so.
     for code in ["P07.27", "P07.28", "P07.29", "P07.30", "P07.31", "P07.32"] {
         assert_eq!(profile.find(code).unwrap().access(), Access::Ro, "{code}");
     }
