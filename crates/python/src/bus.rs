@@ -42,7 +42,8 @@ impl Bus {
             other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
         };
         let (opener, format) = open::opener(port, format.0, rs485)?;
-        let options = BusOptions { timeout: seconds("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
+        let options =
+            BusOptions { timeout: seconds("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
         let core = open::patiently(py, move || CoreBus::open(opener, options))?;
         Ok(Self { core: core.map_err(|error| port_error(&error))? })
     }
@@ -138,11 +139,12 @@ impl Bus {
         reply_length: Option<u8>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
+        let pdu = pdu.as_bytes();
         let length = reply_length.map_or(AnswerLength::BySilence, AnswerLength::Bytes);
         // A request that is known by name is checked as one; anything else is carried as it is.
-        let request = match Request::parse(&pdu) {
+        let request = match Request::parse(pdu) {
             Ok(request) if reply_length.is_none() && !matches!(request, Request::Custom { .. }) => request,
-            _ => Request::custom(&pdu, length).map_err(refuse)?,
+            _ => Request::custom(pdu, length).map_err(refuse)?,
         };
         let mut reply = Vec::new();
         self.call(py, unit.into(), &request, CallOptions { timeout: None, retries: Some(0) }, &mut |answer| {
@@ -292,5 +294,9 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
 
 /// A port that was handed over open and is gone cannot be opened again by us.
 pub(crate) fn gone(name: &str) -> PortError {
-    PortError::new(PortErrorKind::Lost, name, "it was opened by the program and is gone; open it again and make a new Bus")
+    PortError::new(
+        PortErrorKind::Lost,
+        name,
+        "it was opened by the program and is gone; open it again and make a new Bus",
+    )
 }

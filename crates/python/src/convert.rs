@@ -1,9 +1,8 @@
 //! Python's numbers and bytes as the core's, or `NotAllowed` that names what was given and what is allowed.
 
 use drivebus_rtu::{Destination, UnitAddress};
-use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyString};
+use pyo3::types::{PyBytes, PyMemoryView, PyString};
 
 use crate::errors::not_allowed;
 
@@ -35,13 +34,13 @@ pub(crate) fn words_of(given: &Bound<'_, PyAny>) -> PyResult<Result<Vec<u16>, u1
     }
 }
 
-/// Any bytes-like object.
-pub(crate) fn bytes_of(given: &Bound<'_, PyAny>) -> PyResult<Vec<u8>> {
+/// Any bytes-like object: what is no `bytes` is copied into one, because Python 3.10 keeps its buffers to itself.
+pub(crate) fn bytes_of<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyBytes>> {
     if let Ok(bytes) = given.cast::<PyBytes>() {
-        return Ok(bytes.as_bytes().to_vec());
+        return Ok(bytes.clone());
     }
-    PyBuffer::<u8>::get(given)
-        .and_then(|buffer| buffer.to_vec(given.py()))
+    PyMemoryView::from(given)
+        .and_then(|view| Ok(view.call_method0("tobytes")?.cast_into::<PyBytes>()?))
         .map_err(|_| not_allowed(format!("{} is not bytes", shown(given))))
 }
 

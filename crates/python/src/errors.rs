@@ -83,7 +83,7 @@ pub(crate) fn answer_error(error: AnswerError, request: &[u8], raw: &[u8]) -> Py
 
 /// `Refused`: the unit answered with exception `code`. What the code means, only a profile can say.
 pub(crate) fn refused(
-    message: String,
+    message: &str,
     code: ExceptionCode,
     details: impl for<'py> FnOnce(&Bound<'py, PyDict>) -> PyResult<()>,
 ) -> PyErr {
@@ -116,7 +116,7 @@ pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) ->
         Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
         Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),
         Failure::Corrupt(FrameError::Crc { .. }) => Class::Crc.raise(message, details),
-        Failure::Refused { code, .. } => refused(message, code, details),
+        Failure::Refused { code, .. } => refused(&message, code, details),
         // A line that is never silent is full of bytes that are no answer.
         _ => Class::BadAnswer.raise(message, details),
     }

@@ -39,7 +39,7 @@ impl SerialFormat {
             "O" => Parity::Odd,
             other => return Err(not_allowed(format!("parity {other} is not \"N\", \"E\" or \"O\""))),
         };
-        let stop_bits = match number(stopbits, 1) {
+        let stops = match number(stopbits, 1) {
             Some(1) => StopBits::One,
             Some(2) => StopBits::Two,
             _ => return Err(not_allowed(format!("stopbits {} is not 1 or 2", shown_or(stopbits)))),
@@ -50,7 +50,7 @@ impl SerialFormat {
             _ => return Err(not_allowed(format!("bytesize {} is not 7 or 8", shown_or(bytesize)))),
         };
         let silence = silence.map_or(Ok(Silence::Spec), silence_rule)?;
-        rtu::SerialFormat::new(baudrate, data_bits, parity, stop_bits, silence).map(Self).map_err(refuse)
+        rtu::SerialFormat::new(baudrate, data_bits, parity, stops, silence).map(Self).map_err(refuse)
     }
 
     #[getter]
@@ -154,10 +154,7 @@ fn text(given: Option<&Bound<'_, PyAny>>, default: &str) -> String {
 fn number(given: Option<&Bound<'_, PyAny>>, default: i64) -> Option<i64> {
     match given {
         None => Some(default),
-        Some(given) => given
-            .extract::<i64>()
-            .ok()
-            .or_else(|| (1..=8).find(|&whole| given.eq(whole).unwrap_or(false))),
+        Some(given) => given.extract::<i64>().ok().or_else(|| (1..=8).find(|&whole| given.eq(whole).unwrap_or(false))),
     }
 }
 

@@ -1,7 +1,6 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
 use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, UnitAddress, crc16 as crc, function};
-use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -12,13 +11,10 @@ use crate::errors::{answer_error, frame_error, refuse, refused};
 #[pyfunction]
 #[pyo3(signature = (data, /))]
 pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
-    // The common case needs no copy.
-    if let Ok(bytes) = data.cast::<PyBytes>() {
-        return Ok(crc(bytes.as_bytes()));
-    }
-    Ok(crc(&PyBuffer::<u8>::get(data)?.to_vec(data.py())?))
+    Ok(crc(bytes_of(data)?.as_bytes()))
 }
 
+/// A whole 03H request frame.
 #[pyfunction]
 #[pyo3(signature = (unit, address, count, /))]
 pub(crate) fn encode_read<'py>(
@@ -31,6 +27,7 @@ pub(crate) fn encode_read<'py>(
     Ok(frame(py, unit_address(unit)?.into(), &request))
 }
 
+/// A whole 06H or 10H request frame.
 #[pyfunction]
 #[pyo3(signature = (unit, address, value, /))]
 pub(crate) fn encode_write<'py>(
@@ -46,6 +43,7 @@ pub(crate) fn encode_write<'py>(
     }
 }
 
+/// A whole 08H/0000 request frame.
 #[pyfunction]
 #[pyo3(signature = (unit, word, /))]
 pub(crate) fn encode_echo<'py>(
@@ -60,34 +58,38 @@ fn frame<'py>(py: Python<'py>, to: Destination, request: &Request<'_>) -> Bound<
     PyBytes::new(py, Adu::request(to, request).as_bytes())
 }
 
+/// The words that a frame answers to a request, or None for a confirmation.
 #[pyfunction]
 #[pyo3(signature = (request, frame, /))]
 pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u16>>> {
     let (asked, came) = (bytes_of(request)?, bytes_of(frame)?);
-    let request = Frame::parse(&asked).map_err(refuse)?;
+    let (asked, came) = (asked.as_bytes(), came.as_bytes());
+    let request = Frame::parse(asked).map_err(refuse)?;
     let unit = UnitAddress::new(request.address()).map_err(refuse)?;
     let expected = Request::parse(request.pdu()).map_err(refuse)?.expected();
-    let answer = Frame::parse(&came).map_err(|error| frame_error(error, &came))?;
+    let answer = Frame::parse(came).map_err(|error| frame_error(error, came))?;
     match expected.judge_frame(unit, &answer) {
         Ok(Answer::Read { words, .. }) => Ok(Some(words.iter().collect())),
         Ok(Answer::Exception { function, code, .. }) => {
             let message = format!("unit {unit} refused function {function:02X}H with exception {:02X}H", code.0);
-            Err(refused(message, code, |keywords| {
+            Err(refused(&message, code, |keywords| {
                 keywords.set_item("unit", unit.get())?;
-                keywords.set_item("request", PyBytes::new(keywords.py(), &asked))?;
-                keywords.set_item("raw", PyBytes::new(keywords.py(), &came))
+                keywords.set_item("request", PyBytes::new(keywords.py(), asked))?;
+                keywords.set_item("raw", PyBytes::new(keywords.py(), came))
             }))
         }
         Ok(_) => Ok(None),
-        Err(error) => Err(answer_error(error, &asked, &came)),
+        Err(error) => Err(answer_error(error, asked, came)),
     }
 }
 
+/// Any frame of either direction as fields.
 #[pyfunction]
 #[pyo3(signature = (frame, /))]
 pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let bytes = bytes_of(frame)?;
-    let frame = Frame::parse(&bytes).map_err(|error| frame_error(error, &bytes))?;
+    let bytes = bytes.as_bytes();
+    let frame = Frame::parse(bytes).map_err(|error| frame_error(error, bytes))?;
     let fields = PyDict::new(py);
     fields.set_item("unit", frame.address())?;
     fields.set_item("crc", crc(&bytes[..bytes.len() - 2]))?;

@@ -1,5 +1,6 @@
 //! From what the Python package hands over as a port to a line of the core.
 
+use std::sync::Mutex;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -37,10 +38,7 @@ pub(crate) fn opener(
     }
     if let Ok(simulator) = port.cast::<Simulator>() {
         let simulator = simulator.clone().unbind();
-        let opener = move || {
-            Python::try_attach(|py| simulator.get().sim_line(py))
-                .unwrap_or_else(|| Err(gone("the simulator")))
-        };
+        let opener = move || simulator.get().sim_line();
         return Ok((Box::new(opener), format));
     }
     let line = PySerialLine::new(port, &format, false).map_err(|error| port_error(&error))?;
@@ -120,8 +118,14 @@ pub(crate) fn patiently<T: Send + 'static>(
     if let Err(error) = opening {
         return Ok(Err(PortError::new(PortErrorKind::Other, "port", format!("no thread to open it: {error}"))));
     }
+    // Nobody else uses the receiver; the lock only says so to the compiler.
+    let result = Mutex::new(result);
+    let wait = || match result.lock() {
+        Ok(result) => result.recv_timeout(LOOK_UP),
+        Err(_) => Err(RecvTimeoutError::Disconnected),
+    };
     loop {
-        match py.detach(|| result.recv_timeout(LOOK_UP)) {
+        match py.detach(wait) {
             Ok(opened) => return Ok(opened),
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
             Err(RecvTimeoutError::Disconnected) => {

@@ -57,7 +57,7 @@ impl Server {
 /// A simulated line with simulated drives.
 #[pyclass(frozen, module = "drivebus._native")]
 pub(crate) struct Simulator {
-    simulator: sim::Simulator,
+    core: sim::Simulator,
     port: String,
     /// `None` once it is closed.
     server: Mutex<Option<Server>>,
@@ -70,7 +70,7 @@ impl Simulator {
             let message = "the simulation is closed; make a new Simulator";
             return Err(PortError::new(PortErrorKind::Closed, &self.port, message));
         }
-        Ok(Box::new(self.simulator.line()))
+        Ok(Box::new(self.core.line()))
     }
 
     fn server(&self) -> MutexGuard<'_, Option<Server>> {
@@ -96,10 +96,10 @@ impl Simulator {
         let units = units_of(units)?;
         let options = Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
         let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
-        let simulator = sim::Simulator::new(named, options).map_err(refuse)?;
-        let server = Server::start(&simulator, transport)?;
-        let port = server.port(&simulator);
-        Ok(Self { simulator, port, server: Mutex::new(Some(server)) })
+        let core = sim::Simulator::new(named, options).map_err(refuse)?;
+        let server = Server::start(&core, transport)?;
+        let port = server.port(&core);
+        Ok(Self { core, port, server: Mutex::new(Some(server)) })
     }
 
     #[getter]
@@ -114,27 +114,27 @@ impl Simulator {
     }
 
     fn now(&self) -> f64 {
-        seconds(self.simulator.now())
+        seconds(self.core.now())
     }
 
     #[pyo3(signature = (seconds, /))]
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = duration(seconds)?;
-        py.detach(|| self.simulator.advance(time)).map_err(refuse)
+        py.detach(|| self.core.advance(time)).map_err(refuse)
     }
 
     #[pyo3(signature = (unit, /))]
     fn drive(&self, unit: &Bound<'_, PyAny>) -> PyResult<SimulatedDrive> {
-        self.simulator.drive(unit_address(unit)?.get()).map(SimulatedDrive).map_err(refuse)
+        self.core.drive(unit_address(unit)?.get()).map(SimulatedDrive).map_err(refuse)
     }
 
     #[getter]
     fn line(&self) -> SimulatedLine {
-        SimulatedLine(self.simulator.wire())
+        SimulatedLine(self.core.wire())
     }
 
     fn __repr__(&self) -> String {
-        format!("<Simulator {} at {}>", self.simulator.name(), self.port)
+        format!("<Simulator {} at {}>", self.core.name(), self.port)
     }
 }
 
@@ -244,7 +244,7 @@ impl SimulatedLine {
 
     #[pyo3(signature = (data, /))]
     fn answer_with(&self, data: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.0.answer_with(&bytes_of(data)?);
+        self.0.answer_with(bytes_of(data)?.as_bytes());
         Ok(())
     }
 
@@ -261,13 +261,13 @@ impl SimulatedLine {
 
     #[pyo3(signature = (data, count = 1, /))]
     fn noise_before(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
-        self.0.noise_before(&bytes_of(data)?, count);
+        self.0.noise_before(bytes_of(data)?.as_bytes(), count);
         Ok(())
     }
 
     #[pyo3(signature = (data, count = 1, /))]
     fn noise_after(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
-        self.0.noise_after(&bytes_of(data)?, count);
+        self.0.noise_after(bytes_of(data)?.as_bytes(), count);
         Ok(())
     }
 

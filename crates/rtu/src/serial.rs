@@ -262,8 +262,6 @@ impl core::error::Error for SerialFormatError {}
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may panic")]
-
     use super::*;
 
     fn format(baud_rate: u32, parity: Parity, silence: Silence) -> SerialFormat {
