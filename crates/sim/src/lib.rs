@@ -47,6 +47,8 @@
 
 mod clock;
 mod drive;
+mod error;
+mod handles;
 mod line;
 mod motor;
 #[cfg(target_os = "linux")]
@@ -64,10 +66,12 @@ mod wire;
 mod world;
 
 pub use drive::WriteRecord;
+pub use error::SimError;
+pub use handles::{SimulatedDrive, SimulatedLine};
 pub use line::SimLine;
 #[cfg(target_os = "linux")]
 pub use pty::PtyServer;
-pub use simulator::{Options, SimError, SimulatedDrive, SimulatedLine, Simulator};
+pub use simulator::{Options, Simulator};
 #[cfg(unix)]
 pub use tcp::TcpServer;
 pub use trace::{Side, Transmission};

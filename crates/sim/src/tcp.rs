@@ -4,9 +4,13 @@ use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::os::fd::AsFd;
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::server::{Ended, Worker, serve, wait_for};
 use crate::simulator::Shared;
+
+/// How long to wait when a connection cannot be taken.
+const RETRY: Duration = Duration::from_millis(100);
 
 /// A TCP port on 127.0.0.1 that is served until this is dropped: one client at a time, the next when it is gone.
 #[derive(Debug)]
@@ -27,7 +31,13 @@ impl TcpServer {
                     Ok((false, false)) => continue,
                     Ok((true, _)) | Err(_) => return,
                 }
-                let Ok((client, _)) = listener.accept() else { continue };
+                let Ok((client, _)) = listener.accept() else {
+                    // The client may have given up; if the system is out of sockets, it may have some again later.
+                    match wait_for(stop.as_fd(), stop.as_fd(), Some(RETRY)) {
+                        Ok((false, _)) => continue,
+                        _ => return,
+                    }
+                };
                 if client.set_nodelay(true).is_err() || client.set_nonblocking(true).is_err() {
                     continue;
                 }

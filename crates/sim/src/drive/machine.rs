@@ -5,7 +5,8 @@
 //!
 //! What the manual leaves open:
 //!
-//! - Assumption: a jog takes place only from standstill, and command 8 ends nothing but a jog.
+//! - Assumption: a jog begins only from standstill or out of another jog, and command 8 ends nothing but a jog. A run
+//!   command does not interrupt a jog.
 //! - Assumption: while it ramps down to stop, a drive still reports the direction it turns in; it reports "stopped"
 //!   when the output reaches 0 Hz, and at once when it coasts.
 //! - Assumption: a run command to a shaft that still turns catches it: the output starts at the shaft's speed.

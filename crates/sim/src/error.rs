@@ -1,0 +1,68 @@
+//! Why a simulation cannot be as asked.
+
+use drivebus_drives::ProfileError;
+use drivebus_rtu::AddressError;
+
+use crate::simulator::SIMULATED;
+
+/// Why a simulation cannot be as asked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// No unit can have this address.
+    #[error(transparent)]
+    Address(#[from] AddressError),
+    /// There is no such profile, or it is broken.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    /// There is a profile, but no behaviour for it.
+    #[error("no simulated drive behaves like \"{profile}\"; \"{SIMULATED}\" is simulated")]
+    NotSimulated {
+        /// The profile asked for.
+        profile: String,
+    },
+    /// Two units were given one address.
+    #[error("unit {unit} is there twice; give each unit an address of its own")]
+    Twice {
+        /// The address.
+        unit: u8,
+    },
+    /// No unit has this address here.
+    #[error("no unit {unit} is simulated; there are {present:?}")]
+    NoUnit {
+        /// The address asked for.
+        unit: u8,
+        /// The addresses there are.
+        present: Vec<u8>,
+    },
+    /// Real time cannot be moved.
+    #[error("this simulation runs in real time; only virtual time can be advanced")]
+    RealTime,
+    /// Other programs live in real time.
+    #[error("this simulation runs in virtual time; a port that other programs open needs real time")]
+    VirtualTime,
+    /// The load is not a share of 0.0..=4.0.
+    #[error("load {load} is not in 0.0..=4.0 of the motor's rated torque")]
+    Load {
+        /// What was given.
+        load: f64,
+    },
+    /// The digital inputs are six bits.
+    #[error("inputs {inputs:#x} are not in 0x00..=0x3f; bit 0 is S1, bit 5 HDIB")]
+    Inputs {
+        /// What was given.
+        inputs: u16,
+    },
+    /// There are four analog inputs.
+    #[error("analog input {input} is not in 1..=4")]
+    Analog {
+        /// What was given.
+        input: u8,
+    },
+    /// 0 is no fault.
+    #[error("0 is no fault; fault numbers are 1..=65535")]
+    NoFault,
+    /// The system has no port to give.
+    #[error("cannot serve the simulated line: {0}")]
+    Io(#[from] std::io::Error),
+}

@@ -1,0 +1,242 @@
+//! Handles to parts of the simulation: one drive, and the wire.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use drivebus_rtu::{ExceptionCode, UnitAddress};
+
+use crate::drive::{Drive, WriteRecord};
+use crate::error::SimError;
+use crate::simulator::Shared;
+use crate::trace::Transmission;
+
+/// The heaviest load, as a share of rated torque.
+const MAX_LOAD: f64 = 4.0;
+/// The highest word of the digital inputs: S1 to S4, HDIA, HDIB.
+const MAX_INPUTS: u16 = 0x3F;
+
+/// One drive, seen from its shaft, its terminals and its keypad, not from the bus.
+#[derive(Debug, Clone)]
+pub struct SimulatedDrive {
+    shared: Arc<Shared>,
+    unit: UnitAddress,
+}
+
+impl SimulatedDrive {
+    pub(crate) fn new(shared: Arc<Shared>, unit: UnitAddress) -> Self {
+        Self { shared, unit }
+    }
+
+    /// Its address on the line.
+    pub fn unit(&self) -> u8 {
+        self.unit.get()
+    }
+
+    /// The name of its profile.
+    pub fn profile(&self) -> String {
+        self.with(|drive| drive.profile().to_owned()).unwrap_or_default()
+    }
+
+    /// What the motor does: `forward`, `reverse`, `stopped` or `fault`.
+    pub fn state(&self) -> &'static str {
+        self.with(|drive| drive.state()).unwrap_or("unknown")
+    }
+
+    /// Output frequency in Hz, negative in reverse; 0 while the output is off.
+    pub fn frequency(&self) -> f64 {
+        self.with(|drive| drive.frequency()).unwrap_or(0.0)
+    }
+
+    /// Shaft speed in rpm, negative in reverse.
+    pub fn speed(&self) -> f64 {
+        self.with(|drive| drive.speed()).unwrap_or(0.0)
+    }
+
+    /// Present fault number, 0 for none.
+    pub fn fault(&self) -> u16 {
+        self.with(|drive| drive.fault()).unwrap_or(0)
+    }
+
+    /// Load torque as a share of the motor's rated torque.
+    pub fn load(&self) -> f64 {
+        self.with(|drive| drive.load()).unwrap_or(0.0)
+    }
+
+    /// Sets the load torque: 0.0..=4.0 of the motor's rated torque.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Load`]: out of range.
+    pub fn set_load(&self, load: f64) -> Result<(), SimError> {
+        if !(0.0..=MAX_LOAD).contains(&load) {
+            return Err(SimError::Load { load });
+        }
+        self.with(|drive| drive.set_load(load));
+        Ok(())
+    }
+
+    /// Digital inputs, bit 0 = S1.
+    pub fn inputs(&self) -> u16 {
+        self.with(|drive| drive.inputs()).unwrap_or(0)
+    }
+
+    /// Sets the digital inputs: bits 0 to 5 are S1 to S4, HDIA, HDIB.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Inputs`]: other bits are set.
+    pub fn set_inputs(&self, inputs: u16) -> Result<(), SimError> {
+        if inputs > MAX_INPUTS {
+            return Err(SimError::Inputs { inputs });
+        }
+        self.with(|drive| drive.set_inputs(inputs));
+        Ok(())
+    }
+
+    /// Sets the word that analog input `input` (1..=4) shows; hundredths of a volt, two's complement.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Analog`]: there is no such input.
+    pub fn set_analog(&self, input: u8, word: u16) -> Result<(), SimError> {
+        match input {
+            1..=4 => {
+                self.with(|drive| drive.set_analog(usize::from(input) - 1, word));
+                Ok(())
+            }
+            _ => Err(SimError::Analog { input }),
+        }
+    }
+
+    /// Trips the drive with fault `code` (1..=65535), whose cause is gone at once.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::NoFault`]: `code` is 0.
+    pub fn trip(&self, code: u16) -> Result<(), SimError> {
+        if code == 0 {
+            return Err(SimError::NoFault);
+        }
+        self.with(|drive| drive.trip(code));
+        Ok(())
+    }
+
+    /// Trips the drive with fault `code` (1..=65535), which cannot be reset before
+    /// [`release_fault`](Self::release_fault).
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::NoFault`]: `code` is 0.
+    pub fn hold_fault(&self, code: u16) -> Result<(), SimError> {
+        if code == 0 {
+            return Err(SimError::NoFault);
+        }
+        self.with(|drive| drive.hold_fault(code));
+        Ok(())
+    }
+
+    /// Takes the cause of a held fault away. The fault stays until it is reset.
+    pub fn release_fault(&self) {
+        self.with(Drive::release_fault);
+    }
+
+    /// Switches the drive off and on: RAM is lost, EEPROM stays, the motor coasts to a stop.
+    pub fn power_cycle(&self) {
+        let mut world = self.shared.present();
+        let now = world.now();
+        if let Some(drive) = world.drive(self.unit) {
+            drive.power_cycle(now);
+        }
+    }
+
+    /// The word at `address` as the drive would answer it now.
+    ///
+    /// # Errors
+    ///
+    /// The exception code with which it would refuse.
+    pub fn register(&self, address: u16) -> Result<u16, ExceptionCode> {
+        self.with(|drive| drive.read(address)).unwrap_or(Err(ExceptionCode::ILLEGAL_ADDRESS))
+    }
+
+    /// Words written to EEPROM from the bus.
+    pub fn eeprom_writes(&self) -> u64 {
+        self.with(|drive| drive.eeprom_writes()).unwrap_or(0)
+    }
+
+    /// Words written to one EEPROM address from the bus.
+    pub fn eeprom_writes_of(&self, address: u16) -> u64 {
+        self.with(|drive| drive.eeprom_writes_of(address)).unwrap_or(0)
+    }
+
+    /// The words that the drive took from the bus, oldest first; the last 100 000.
+    pub fn writes(&self) -> Vec<WriteRecord> {
+        self.with(|drive| drive.writes()).unwrap_or_default()
+    }
+
+    /// A handle is given out only for a unit that exists, and units never go, so `None` does not happen.
+    fn with<T>(&self, ask: impl FnOnce(&mut Drive) -> T) -> Option<T> {
+        self.shared.present().drive(self.unit).map(ask)
+    }
+}
+
+/// The wire: what it saw, and what it is told to spoil.
+#[derive(Debug, Clone)]
+pub struct SimulatedLine {
+    shared: Arc<Shared>,
+}
+
+impl SimulatedLine {
+    pub(crate) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+
+    /// Transmissions of masters, right or wrong, that silence or the next one has told apart.
+    pub fn requests(&self) -> u64 {
+        self.shared.present().wire.requests
+    }
+
+    /// Requests whose first bit came less than 3.5 characters after the last bit on the wire.
+    pub fn silence_violations(&self) -> u64 {
+        self.shared.present().wire.silence_violations
+    }
+
+    /// Characters that were spoilt because both sides spoke at once.
+    pub fn collisions(&self) -> u64 {
+        self.shared.present().wire.collisions
+    }
+
+    /// The next answer on the line is `bytes` instead, as they are. Several wait in order.
+    pub fn answer_with(&self, bytes: &[u8]) {
+        self.shared.present().wire.spoil.answer_with(bytes);
+    }
+
+    /// The next `count` answers are lost.
+    pub fn drop_answers(&self, count: u32) {
+        self.shared.present().wire.spoil.drop_answers(count);
+    }
+
+    /// The next `count` answers come this much later.
+    pub fn delay_answers(&self, delay: Duration, count: u32) {
+        self.shared.present().wire.spoil.delay_answers(delay, count);
+    }
+
+    /// `bytes` come right before the next `count` answers.
+    pub fn noise_before(&self, bytes: &[u8], count: u32) {
+        self.shared.present().wire.spoil.noise_before(bytes, count);
+    }
+
+    /// `bytes` come right after the next `count` answers.
+    pub fn noise_after(&self, bytes: &[u8], count: u32) {
+        self.shared.present().wire.spoil.noise_after(bytes, count);
+    }
+
+    /// Forgets every fault that waits.
+    pub fn clear(&self) {
+        self.shared.present().wire.spoil.clear();
+    }
+
+    /// The last 1000 transmissions, oldest first.
+    pub fn trace(&self) -> Vec<Transmission> {
+        self.shared.present().wire.trace.to_vec()
+    }
+}
