@@ -76,7 +76,7 @@ class Bus:
         target = ports.resolve(port, asked)
         self.format = ports.format_of(target, asked)
         self.simulator = target if isinstance(target, Simulator) else None
-        self._owns_simulator = self.simulator is not None and target is not port
+        self._owned = target if target is not port and not isinstance(target, str) else None
         if isinstance(target, Simulator):
             target = target._native if target.transport == "process" else target.port
         self._native = _native.Bus(
@@ -105,10 +105,13 @@ class Bus:
         return self._timeout
 
     def close(self) -> None:
-        """Closes the port, and ends a simulator that this bus made. Closing again does nothing."""
+        """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
+
+        An open `serial.Serial` that was given stays open: it is its owner's.
+        """
         self._native.close()
-        if self._owns_simulator and self.simulator is not None:
-            self.simulator.close()
+        if self._owned is not None:
+            self._owned.close()
 
     def __enter__(self) -> Bus:
         return self
@@ -136,7 +139,7 @@ class Bus:
 
         Raises:
             NoAnswer, BadAnswer: After the bus's retries.
-            Refused: The drive says why in `meaning`.
+            Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
         return self._native.read(checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125))
 

@@ -99,7 +99,7 @@ class Refused(DrivebusError):
     Attributes:
         code: The exception code, 1..255.
         name: Its short name, such as `"illegal_address"`.
-        meaning: What this family of drives means by it.
+        meaning: What this family of drives means by it; empty from a `Bus`, which knows no family.
     """
 
     code: int

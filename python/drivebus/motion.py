@@ -115,13 +115,14 @@ class Motion(Registers):
 
     @setpoint.setter
     def setpoint(self, hz: float) -> None:
-        self.bus.write(self.unit, self.profile.address("set_frequency"), self._setpoint_word(hz))
+        self._write(self.profile.address("set_frequency"), self._setpoint_word(hz))
 
     def look(self) -> Seen:
         """The status words, in one read."""
         names = ("status_word_1", "status_word_2", "fault_code")
         first, *_ = places = [self.profile.address(name) for name in names]
-        words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1)
+        with self._explained():
+            words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1)
         state, fields, fault = (words[place - first] for place in places)
         return Seen(
             self._state_of(state),
@@ -201,9 +202,9 @@ class Motion(Registers):
             if place == address + 1:
                 words = [code, setpoint]
             else:
-                self.bus.write(self.unit, place, setpoint)
+                self._write(place, setpoint)
         try:
-            self.bus.write(self.unit, address, words)
+            self._write(address, words)
         except _LINE_ERRORS as error:
             raise Unconfirmed(
                 f"{name} was sent to unit {self.unit} and not confirmed ({error}); it may have acted. "

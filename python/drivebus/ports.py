@@ -25,7 +25,7 @@ _PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
 _SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence")
 
 
-def resolve(port: object, line: SerialFormat) -> object:
+def resolve(port: object, line: SerialFormat) -> Any:
     """What to hand to the core for *port*; a `Simulator` stays one.
 
     Raises:
@@ -61,7 +61,7 @@ def format_of(port: object, asked: SerialFormat) -> SerialFormat:
     )
 
 
-def _resolve_text(port: str, line: SerialFormat) -> object:
+def _resolve_text(port: str, line: SerialFormat) -> Any:
     if not port.strip() or "\0" in port:
         raise NotAllowed(f"port {port!r} is no port; give a path such as /dev/ttyUSB0 or COM3, or a URL")
     scheme, separator, _ = port.partition("://")

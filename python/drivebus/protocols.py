@@ -82,6 +82,9 @@ class ProfileProtocol(Protocol):
     def fault(self, code: int, /) -> Fault:
         """One fault by its number."""
 
+    def exception(self, code: int, /) -> tuple[str, str]:
+        """Name and meaning of an exception code in this family."""
+
     @property
     def maximum_frequency(self) -> str | None:
         """The parameter that holds the drive's highest output frequency, if it has one."""

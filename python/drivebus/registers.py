@@ -7,10 +7,11 @@ what makes a motor turn is not: commands are refused, `Drive` has methods for th
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple, overload
 
-from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
+from drivebus.errors import DrivebusError, NotAllowed, Refused, StoreWarning
 from drivebus.protocols import BusProtocol, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value
 
@@ -75,7 +76,8 @@ class Registers:
         words: dict[int, int] = {}
         started = ended = 0.0
         for index, (address, count) in enumerate(self.profile.plan(names)):
-            answer, sent, ended = self.bus.read_stamped(self.unit, address, count)
+            with self._explained():
+                answer, sent, ended = self.bus.read_stamped(self.unit, address, count)
             started = started if index else sent
             words.update(enumerate(answer, address))
         values = {name: self.value(name, words[place]) for name, place in places.items()}
@@ -157,15 +159,15 @@ class Registers:
     def _write_one(self, item: _Planned, store: bool) -> None:
         is_parameter = self.profile.describe(item.name).kind == "parameter"
         if not is_parameter or not store:
-            self.bus.write(self.unit, item.address, item.raw)
+            self._write(item.address, item.raw)
             if is_parameter:
                 self._in_ram.add(item.name)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-        in_force = self.bus.read(self.unit, self.profile.address(item.name), 1)[0]
+        in_force = self._read(self.profile.address(item.name))[0]
         if in_force == item.raw and item.name not in self._in_ram:
             return
-        self.bus.write(self.unit, item.address, item.raw)
+        self._write(item.address, item.raw)
         self._in_ram.discard(item.name)
         self._count_store(item.name)
 
@@ -179,12 +181,50 @@ class Registers:
                 stacklevel=4,
             )
 
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        """A refusal inside says what this family means by its code, and what it was that was refused."""
+        try:
+            yield
+        except Refused as error:
+            name, meaning = self.profile.exception(error.code)
+            raise Refused(
+                f"unit {self.unit} refused {_asked(error.request)}: exception {error.code:02X}H, {name}: {meaning}",
+                code=error.code,
+                name=name,
+                meaning=meaning,
+                unit=error.unit,
+                request=error.request,
+                raw=error.raw,
+                started=error.started,
+                ended=error.ended,
+            ) from None
+
+    def _write(self, address: int, value: int | Sequence[int]) -> None:
+        with self._explained():
+            self.bus.write(self.unit, address, value)
+
+    def _read(self, address: int, count: int = 1) -> list[int]:
+        with self._explained():
+            return self.bus.read(self.unit, address, count)
+
     def state(self) -> State:
         """What the drive is doing: one read of its first status word."""
-        return self._state_of(self.bus.read(self.unit, self.profile.address("status_word_1"), 1)[0])
+        return self._state_of(self._read(self.profile.address("status_word_1"))[0])
 
     def _state_of(self, word: int) -> State:
         try:
             return State(self.profile.state(word))
         except ValueError:
             return State.UNKNOWN
+
+
+def _asked(request: bytes) -> str:
+    """What a request frame asked for, for people."""
+    if len(request) < 6:
+        return "the request"
+    address = f"{int.from_bytes(request[2:4], 'big'):04X}H"
+    number = int.from_bytes(request[4:6], "big")
+    if request[1] == 0x03:
+        return f"to read {number} word{'s' if number != 1 else ''} at {address}"
+    return f"to write {number} at {address}" if request[1] == 0x06 else f"to write {number} words at {address}"

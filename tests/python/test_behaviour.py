@@ -77,11 +77,17 @@ class TestWords:
         error = refused.value
         assert (error.code, error.unit, error.raw[1]) == (code, 1, 0x83)
         assert error.name
-        assert error.meaning
         assert error.started is not None
         assert error.ended is not None
         assert error.started <= error.ended
         assert bus.read(1, 0x2103) == [0x01A0]
+
+    def test_a_drive_knows_what_its_refusals_mean(self, simulator: Simulator, drive: Drive) -> None:
+        simulator.line.answer_with(bytes.fromhex("01 83 09 81 36"))
+        with pytest.raises(drivebus.Refused, match="locked") as refused:
+            drive.read("P00.11")
+        assert (refused.value.code, refused.value.name) == (9, "password_protected")
+        assert "user password" in refused.value.meaning
 
     def test_silence_is_no_answer(self, bus: Bus) -> None:
         with pytest.raises(drivebus.NoAnswer) as silent:
@@ -181,7 +187,8 @@ class TestRunning:
         assert commands(simulator) == [FORWARD, REVERSE]
 
     def test_coasting_takes_the_voltage_off(self, simulator: Simulator, obedient: Drive) -> None:
-        obedient.run(hz=5.0)
+        simulator.drive(1).load = 0.0
+        obedient.run(hz=10.0)
         obedient.wait_for_speed(timeout=10)
         obedient.coast()
         assert simulator.drive(1).frequency == 0.0
@@ -196,7 +203,7 @@ class TestRunning:
         assert commands(simulator) == [JOG, JOG_STOP]
 
     def test_a_setpoint_above_the_drives_own_maximum_is_not_sent(self, simulator: Simulator, obedient: Drive) -> None:
-        obedient.write("P00.03", 40.0)
+        obedient.write({"P00.04": 40.0, "P00.03": 40.0})
         before = len(simulator.drive(1).writes())
         with pytest.raises(drivebus.NotAllowed, match=r"45 Hz .*P00\.03 = 40 Hz"):
             obedient.run(hz=45.0)

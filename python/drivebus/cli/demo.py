@@ -15,7 +15,7 @@ from drivebus.cli.output import Output
 
 __all__ = ["run"]
 
-_RAMP = 5.0
+_RAMP = 15.0
 """Seconds from standstill to the drive's maximum frequency, and back."""
 
 _OVERLOAD = 3.0
@@ -92,7 +92,7 @@ class _Job:
             self.out.say(f"run(10.0) is refused before it is sent: {error}")
         else:
             self.expect(False, "run() is refused")
-        self.title("Set it to obey the bus, in RAM, and its ramps to 5 s")
+        self.title("Set it to obey the bus, in RAM, and its ramps to 15 s")
         after = drive.prepare_control()
         self.out.say(str(after))
         self.expect(bool(after), "now it does")
@@ -110,7 +110,7 @@ class _Job:
             while True:
                 values = drive.monitor("running_frequency", "rotation_speed", "output_current")
                 frequency = float(values.running_frequency)
-                now = f"{frequency:5.2f} Hz  {values.rotation_speed:4d} rpm  {values.output_current:4.1f} A"
+                now = f"{frequency:5.2f} Hz  {values.rotation_speed:4.0f} rpm  {values.output_current:4.1f} A"
                 bar.update(task, completed=frequency - start, now=now)
                 if not self.out.live and int(frequency) // 2 != said:
                     said = int(frequency) // 2
