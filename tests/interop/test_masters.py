@@ -74,7 +74,7 @@ class TestMinimalmodbus:
     def instrument(self, simulator: Simulator) -> Iterator[minimalmodbus.Instrument]:
         instrument = minimalmodbus.Instrument(simulator.port, 1)
         instrument.serial.baudrate = 19200
-        instrument.serial.timeout = 2
+        instrument.serial.timeout = 1  # it waits that long for the rest of an exception, which is shorter
         yield instrument
         instrument.serial.close()
 

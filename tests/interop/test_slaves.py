@@ -69,7 +69,8 @@ def test_loop_back(slave: tuple[str, drivebus.Bus]) -> None:
 
 
 def test_a_unit_that_is_not_there(slave: tuple[str, drivebus.Bus]) -> None:
-    _, bus = slave
-    with pytest.raises(drivebus.NoAnswer):
+    whose, bus = slave
+    # pymodbus answers for units that it is not, with a refusal.
+    with pytest.raises(drivebus.Refused if whose == "pymodbus" else drivebus.NoAnswer):
         bus.read(9, 0, 1)
     assert bus.read(1, 7, 1) == [7]

@@ -109,8 +109,7 @@ def test_requests_encode(vector: Vector) -> None:
 @of(VECTORS)
 def test_frames_decode(vector: Vector) -> None:
     decoded = drivebus.rtu.decode(vector.wire)
-    names = {"words": "values", "data": "word"}
-    assert {name: getattr(decoded, names.get(name, name)) for name in vector.fields} == vector.fields
+    assert {name: getattr(decoded, name) for name in vector.fields} == vector.fields
     assert decoded.crc == int.from_bytes(vector.wire[-2:], "little")
 
 
