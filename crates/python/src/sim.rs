@@ -81,18 +81,18 @@ impl Simulator {
 #[pymethods]
 impl Simulator {
     #[new]
-    #[pyo3(signature = (units, format, *, seed = None, transport = "pty", realtime = true, strict_silence = false))]
+    #[pyo3(
+        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false),
+        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False)"
+    )]
     fn new(
         units: &Bound<'_, PyAny>,
         format: SerialFormat,
-        seed: Option<&Bound<'_, PyAny>>,
+        seed: u64,
         transport: &str,
         realtime: bool,
         strict_silence: bool,
     ) -> PyResult<Self> {
-        let seed = seed.map_or(Ok(0), |seed| {
-            seed.extract::<u64>().map_err(|_| not_allowed(format!("seed {} is not in 0..2**64-1", shown(seed))))
-        })?;
         let units = units_of(units)?;
         let options = Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
         let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
@@ -248,26 +248,27 @@ impl SimulatedLine {
         Ok(())
     }
 
-    #[pyo3(signature = (count = 1, /))]
-    fn drop_answers(&self, count: u32) {
-        self.0.drop_answers(count);
-    }
-
-    #[pyo3(signature = (seconds, count = 1, /))]
-    fn delay_answers(&self, seconds: f64, count: u32) -> PyResult<()> {
-        self.0.delay_answers(duration(seconds)?, count);
+    #[pyo3(signature = (count = None, /), text_signature = "($self, count=1, /)")]
+    fn drop_answers(&self, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.drop_answers(answers(count)?);
         Ok(())
     }
 
-    #[pyo3(signature = (data, count = 1, /))]
-    fn noise_before(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
-        self.0.noise_before(bytes_of(data)?.as_bytes(), count);
+    #[pyo3(signature = (seconds, count = None, /), text_signature = "($self, seconds, count=1, /)")]
+    fn delay_answers(&self, seconds: f64, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.delay_answers(duration(seconds)?, answers(count)?);
         Ok(())
     }
 
-    #[pyo3(signature = (data, count = 1, /))]
-    fn noise_after(&self, data: &Bound<'_, PyAny>, count: u32) -> PyResult<()> {
-        self.0.noise_after(bytes_of(data)?.as_bytes(), count);
+    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
+    fn noise_before(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.noise_before(bytes_of(data)?.as_bytes(), answers(count)?);
+        Ok(())
+    }
+
+    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
+    fn noise_after(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.noise_after(bytes_of(data)?.as_bytes(), answers(count)?);
         Ok(())
     }
 
@@ -294,6 +295,13 @@ fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, String)>> {
             Ok((unit_address(&unit)?.get(), profile))
         })
         .collect()
+}
+
+/// How many answers a fault is for: one, unless it is said.
+fn answers(count: Option<&Bound<'_, PyAny>>) -> PyResult<u32> {
+    count.map_or(Ok(1), |count| {
+        count.extract().map_err(|_| not_allowed(format!("count {} is not in 0..{}", shown(count), u32::MAX)))
+    })
 }
 
 /// A moment of the simulation in seconds.
