@@ -27,7 +27,7 @@ with (
     try:
         bus.read(1, 0x6300)
     except drivebus.Refused as error:
-        print(f"Refused, exception {error.code:02X}H, {error.name}: {error.meaning}")
+        print(f"Refused, exception {error.code:02X}H, {error.name}: {error}")
 
     try:
         bus.read(9, 0x2100)

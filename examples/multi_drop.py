@@ -23,4 +23,7 @@ with drivebus.Bus(port, timeout=0.2, retries=1) as bus:
                 print(f"unit {drive.unit}: {error}")
         bus.sleep(1.0)
 
-    print(bus.stats())
+    stats = bus.stats()
+    print(
+        f"{stats.requests} requests, {stats.answers} answers, {stats.timeouts} time-outs, {stats.crc_errors} bad CRCs"
+    )

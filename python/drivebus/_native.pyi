@@ -11,6 +11,21 @@ from typing import Any, Final, final
 from typing_extensions import Buffer
 
 __version__: Final[str]
+__all__ = [
+    "Bus",
+    "Profile",
+    "SerialFormat",
+    "SimulatedDrive",
+    "SimulatedLine",
+    "Simulator",
+    "__version__",
+    "crc16",
+    "decode",
+    "decode_answer",
+    "encode_echo",
+    "encode_read",
+    "encode_write",
+]
 
 def crc16(data: Buffer, /) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""

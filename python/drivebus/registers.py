@@ -59,7 +59,7 @@ class Registers:
         """Reads registers or parameters in the fewest requests.
 
         One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
-        where the drive counts, and `Choice` where it names.
+        where the drive counts, and `Choice` where the profile has a name for what came.
 
         Raises:
             NotAllowed: No name, or an unknown one; nothing was sent.
@@ -88,8 +88,8 @@ class Registers:
         """The word *raw* of *name* in engineering units."""
         value = self.profile.decode(name, raw)
         choices = self.profile.describe(name).choices
-        if choices and isinstance(value, int):
-            return Choice(value, choices.get(value, f"{value} (not listed)"))
+        if choices and isinstance(value, int) and value in choices:
+            return Choice(value, choices[value])
         return value
 
     @overload

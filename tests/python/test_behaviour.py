@@ -262,11 +262,13 @@ class TestFaults:
 
 class TestParameters:
     def test_values_have_the_type_of_what_they_are(self, drive: Drive) -> None:
-        values = drive.read("bus_voltage", "rotation_speed", "P00.01", "P00.03")
-        assert list(values) == ["bus_voltage", "rotation_speed", "P00.01", "P00.03"]
+        drive.prepare_control()
+        values = drive.read("bus_voltage", "external_count", "P00.01", "P00.03")
+        assert list(values) == ["bus_voltage", "external_count", "P00.01", "P00.03"]
         assert type(values["bus_voltage"]) is float
-        assert type(values["rotation_speed"]) is int
+        assert type(values["external_count"]) is int
         assert type(values["P00.01"]) is Choice
+        assert str(values["P00.01"]) == "communication"
         assert values["P00.03"] == 50.0
 
     def test_a_monitor_snapshot(self, drive: Drive) -> None:

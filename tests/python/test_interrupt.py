@@ -6,7 +6,6 @@ A process of its own is interrupted, because that is what a person does.
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 
@@ -15,7 +14,7 @@ import pytest
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to a whole console")
 
 PROGRAM = """
-import sys, time, drivebus
+import os, signal, threading, drivebus
 
 waits = {{
     "read": lambda bus: bus.read(9, 0x2100),
@@ -26,8 +25,16 @@ waits = {{
 with drivebus.Simulator({{1: "gd350"}}, transport="{transport}") as simulator:
     with drivebus.Bus(simulator, timeout=60, retries=0) as bus:
         bus.read(1, 0x2103)
-        print("waiting", flush=True)
+        before = simulator.line.requests
+
+        def interrupt():
+            # Once the wait has sent something it has begun; one that sends nothing may be met at its beginning.
+            while "{wait}" != "sleep" and simulator.line.requests == before:
+                pass
+            os.kill(os.getpid(), signal.SIGINT)
+
         try:
+            threading.Thread(target=interrupt).start()
             waits["{wait}"](bus)
         except KeyboardInterrupt:
             print("interrupted", flush=True)
@@ -39,11 +46,7 @@ with drivebus.Simulator({{1: "gd350"}}, transport="{transport}") as simulator:
 @pytest.mark.parametrize("wait", ["read", "sleep", "scan", "speed"])
 def test_ctrl_c_ends_a_wait_and_leaves_the_port_usable(transport: str, wait: str) -> None:
     program = PROGRAM.format(transport=transport, wait=wait)
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as child:
-        assert child.stdout is not None
-        assert child.stdout.readline() == "waiting\n"
-        child.send_signal(signal.SIGINT)
-        # The wait itself would last 30 s or more; the time-out only ends a test that has failed.
-        output, _ = child.communicate(timeout=20)
-    assert output.splitlines() == ["interrupted", "[416]"]
-    assert child.returncode == 0
+    # The wait itself would last 30 s or more; the time-out only ends a test that has failed.
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False)
+    assert done.stdout.splitlines() == ["interrupted", "[416]"], done.stderr
+    assert done.returncode == 0

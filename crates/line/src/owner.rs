@@ -263,8 +263,14 @@ impl Owner {
                             }
                         }
                     }
-                    (Event::Answer(Answer::Exception { function, code, .. }), _) => {
-                        return Err(failed(ask, Failure::Refused { function, code }, sent, now, &[]));
+                    (Event::Answer(answer @ Answer::Exception { function, code, .. }), _) => {
+                        // An exception is known by its two bytes: the frame that came is the one that is made here.
+                        let came = match ask.destination {
+                            Destination::Unit(unit) => Some(Adu::answer(unit, &answer)),
+                            Destination::Broadcast => None,
+                        };
+                        let raw = came.as_ref().map_or(&[][..], Adu::as_bytes);
+                        return Err(failed(ask, Failure::Refused { function, code }, sent, now, raw));
                     }
                     (Event::Answer(answer), Some(sent)) => {
                         take(answer);
