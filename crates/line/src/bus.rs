@@ -156,12 +156,14 @@ impl Bus {
             Request::ReadHolding { .. } => options.retries.unwrap_or(self.options.retries),
             _ => 0,
         };
+        let mut lost = None;
         for attempt in 0..=repeats {
             if self.is_closed() {
                 break;
             }
             if let Err(error) = owner.reopen() {
-                return Err(unsent(&ask, Failure::Port(error), owner.now()));
+                // How the port was lost tells more than that it is still not there.
+                return Err(lost.unwrap_or_else(|| unsent(&ask, Failure::Port(error), owner.now())));
             }
             if attempt > 0
                 && let Destination::Unit(unit) = destination
@@ -170,7 +172,7 @@ impl Bus {
             }
             let result = owner.prepare(&ask, &mut give_up).and_then(|()| owner.exchange(&ask, &mut give_up, take));
             match result {
-                Err(error) if attempt < repeats && is_passing(&error.failure) => {}
+                Err(error) if attempt < repeats && is_passing(&error.failure) => lost = Some(error),
                 Err(mut error) => {
                     error.failure = match error.failure {
                         Failure::Interrupted => self.given_up(),

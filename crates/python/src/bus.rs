@@ -43,7 +43,7 @@ impl Bus {
         };
         let (opener, format) = open::opener(port, format.0, rs485)?;
         let options =
-            BusOptions { timeout: seconds("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
+            BusOptions { timeout: duration("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
         let core = open::patiently(py, move || CoreBus::open(opener, options))?;
         Ok(Self { core: core.map_err(|error| port_error(&error))? })
     }
@@ -71,9 +71,9 @@ impl Bus {
         py.detach(|| to_seconds(self.core.now()))
     }
 
-    #[pyo3(signature = (time, /))]
-    fn sleep(&self, py: Python<'_>, time: f64) -> PyResult<()> {
-        let time = seconds("seconds", time)?;
+    #[pyo3(signature = (seconds, /))]
+    fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = duration("seconds", seconds)?;
         with_signals(py, |give_up| self.core.sleep(time, give_up))
     }
 
@@ -86,7 +86,7 @@ impl Bus {
         timeout: Option<f64>,
         retries: Option<u32>,
     ) -> PyResult<Vec<u16>> {
-        let timeout = timeout.map(|time| seconds("timeout", time)).transpose()?;
+        let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         Ok(self.read_words(unit, address, count, CallOptions { timeout, retries })?.0)
     }
 
@@ -120,7 +120,7 @@ impl Bus {
         word: Option<&Bound<'_, PyAny>>,
         timeout: Option<f64>,
     ) -> PyResult<f64> {
-        let timeout = timeout.map(|time| seconds("timeout", time)).transpose()?;
+        let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         let word = match word {
             Some(word) => one_word("word", word)?,
             None => py.detach(|| self.core.fresh_word()),
@@ -269,7 +269,7 @@ fn to_seconds(moment: Instant) -> f64 {
     moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
 }
 
-fn seconds(what: &str, given: f64) -> PyResult<Duration> {
+fn duration(what: &str, given: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(given)
         .map_err(|_| not_allowed(format!("{what} {given} is not a number of seconds, 0 or more")))
 }

@@ -18,7 +18,10 @@ pub(crate) struct SerialFormat(pub(crate) rtu::SerialFormat);
 #[pymethods]
 impl SerialFormat {
     #[new]
-    #[pyo3(signature = (baudrate = None, parity = None, stopbits = None, bytesize = None, silence = None))]
+    #[pyo3(
+        signature = (baudrate = None, parity = None, stopbits = None, bytesize = None, silence = None),
+        text_signature = "(baudrate=19200, parity='E', stopbits=1, bytesize=8, silence='spec')"
+    )]
     fn new(
         baudrate: Option<&Bound<'_, PyAny>>,
         parity: Option<&Bound<'_, PyAny>>,

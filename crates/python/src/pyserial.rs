@@ -14,8 +14,10 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// Longest wait inside the object, so that a signal handler of Python runs soon.
+/// Longest wait in one go, so that a signal handler of Python runs soon.
 const SLICE: Duration = Duration::from_millis(50);
+/// The time-out of an object that has no descriptor to wait on: how fine its waits are.
+const STEP: Duration = Duration::from_millis(1);
 
 /// A port that lives in Python.
 #[derive(Debug)]
@@ -25,17 +27,34 @@ pub(crate) struct PySerialLine {
     format: SerialFormat,
     /// When the last character handed over will have left the wire.
     wire_free: Instant,
-    at_end: AtEnd,
+    wait: Wait,
+    owned: bool,
     notes: Vec<String>,
 }
 
-/// What becomes of the object when the bus lets go of it.
+/// How to wait for bytes without asking the object for more than it has.
 #[derive(Debug)]
-enum AtEnd {
-    /// It was opened for the bus.
-    Close,
-    /// It is the user's: it gets back the time-out it had.
-    Restore(Py<PyAny>),
+enum Wait {
+    /// Python's `select.select`, on the object's descriptor.
+    Select(Py<PyAny>),
+    /// Its own time-out, set once: pyserial sets up the whole port anew each time it is set. The user's is given back.
+    Timeout(Py<PyAny>),
+}
+
+impl Wait {
+    fn of(port: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = port.py();
+        if port.call_method0(intern!(py, "fileno")).is_ok() {
+            let select = py.import(intern!(py, "select"))?.getattr(intern!(py, "select"))?;
+            // Not every descriptor can be selected: on Windows only sockets can.
+            if select.call1((vec![port], Vec::<u8>::new(), Vec::<u8>::new(), 0)).is_ok() {
+                return Ok(Self::Select(select.unbind()));
+            }
+        }
+        let before = port.getattr(intern!(py, "timeout"))?.unbind();
+        port.setattr(intern!(py, "timeout"), STEP.as_secs_f64())?;
+        Ok(Self::Timeout(before))
+    }
 }
 
 impl PySerialLine {
@@ -62,11 +81,7 @@ impl PySerialLine {
             let message = "it is not open; call its open() first";
             return Err(PortError::new(PortErrorKind::Closed, name, message));
         }
-        let at_end = if owned {
-            AtEnd::Close
-        } else {
-            AtEnd::Restore(port.getattr("timeout").map_err(|error| lost(&name, &error))?.unbind())
-        };
+        let wait = Wait::of(port).map_err(|error| lost(&name, &error))?;
         let format = own_format(port, asked).unwrap_or(*asked);
         let notes = if format == *asked {
             Vec::new()
@@ -74,7 +89,7 @@ impl PySerialLine {
             vec![format!("timed as {format}, as {name} was opened, not as {asked}")]
         };
         let port = port.clone().unbind();
-        Ok(Self { port, name, format, wire_free: Instant::ZERO, at_end, notes })
+        Ok(Self { port, name, format, wire_free: Instant::ZERO, wait, owned, notes })
     }
 
     /// How the characters of this line look: the object's own settings, where it tells.
@@ -117,7 +132,7 @@ impl Line for PySerialLine {
             sleep_until(until);
             return Ok(0);
         }
-        let count = self.attached(|port| read_some(port, buffer, until))?;
+        let count = self.attached(|port| read_some(port, &self.wait, buffer, until))?;
         Ok(count.unwrap_or_else(|| {
             sleep_until(until); // 0 means that `until` was reached, so it has to be
             0
@@ -142,9 +157,10 @@ impl Drop for PySerialLine {
         // What the object raises now, it raises because it is gone; an interpreter that ends closes it itself.
         let _ = Python::try_attach(|py| {
             let port = self.port.bind(py);
-            match &self.at_end {
-                AtEnd::Close => port.call_method0(intern!(py, "close")).map(drop),
-                AtEnd::Restore(timeout) => port.setattr(intern!(py, "timeout"), timeout),
+            match &self.wait {
+                _ if self.owned => port.call_method0(intern!(py, "close")).map(drop),
+                Wait::Select(_) => Ok(()),
+                Wait::Timeout(before) => port.setattr(intern!(py, "timeout"), before),
             }
         });
     }
@@ -166,7 +182,8 @@ fn write_all(port: &Bound<'_, PyAny>, bytes: &[u8]) -> PyResult<()> {
 }
 
 /// What is there, or the first that comes until `until`; 0 when nothing does.
-fn read_some(port: &Bound<'_, PyAny>, buffer: &mut [u8], until: Instant) -> PyResult<usize> {
+fn read_some(port: &Bound<'_, PyAny>, wait: &Wait, buffer: &mut [u8], until: Instant) -> PyResult<usize> {
+    let py = port.py();
     loop {
         let count = read_waiting(port, buffer)?;
         if count > 0 {
@@ -176,11 +193,24 @@ fn read_some(port: &Bound<'_, PyAny>, buffer: &mut [u8], until: Instant) -> PyRe
         if left.is_zero() {
             return Ok(0);
         }
-        port.setattr(intern!(port.py(), "timeout"), left.min(SLICE).as_secs_f64())?;
-        // One byte, as pyserial waits for all it is asked for.
-        let (first, rest) = buffer.split_at_mut(1);
-        if read(port, first)? == 1 {
-            return Ok(1 + read_waiting(port, rest)?);
+        match wait {
+            Wait::Select(select) => {
+                let seconds = left.min(SLICE).as_secs_f64();
+                let (ready, ..): (Vec<Py<PyAny>>, Py<PyAny>, Py<PyAny>) =
+                    select.call1(py, (vec![port], Vec::<u8>::new(), Vec::<u8>::new(), seconds))?.extract(py)?;
+                if !ready.is_empty() {
+                    let count = read_waiting(port, buffer)?;
+                    // Readable and nothing there is the end of the port; its own read says how.
+                    return if count > 0 { Ok(count) } else { read(port, &mut buffer[..1]) };
+                }
+            }
+            Wait::Timeout(_) => {
+                // One byte, as pyserial waits for all it is asked for.
+                let (first, rest) = buffer.split_at_mut(1);
+                if read(port, first)? == 1 {
+                    return Ok(1 + read_waiting(port, rest)?);
+                }
+            }
         }
     }
 }
