@@ -1,1 +1,117 @@
-fn main() {}
+//! CRC, encode, decode, framer and master, at sizes that occur on the line.
+//!
+//! Bodies: 6 bytes are a request, 8 the longest short frame, 11 an answer with 4 registers, 37 one with 16, 254 the
+//! longest there is; 64 KiB is a capture.
+#![allow(missing_docs, reason = "what criterion's macros make")]
+#![allow(clippy::unwrap_used, reason = "a benchmark may panic")]
+
+use std::hint::black_box;
+
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use drivebus_rtu::crc::{START, crc16, update_bitwise};
+use drivebus_rtu::{Adu, Answer, Duration, Event, Frame, Framer, Instant, Master, Request, SerialFormat, UnitAddress};
+
+const SILENCE: Duration = Duration::from_micros(1_750);
+
+/// What a CRC is computed with.
+type Engine = fn(&[u8]) -> u16;
+
+fn bitwise(data: &[u8]) -> u16 {
+    data.iter().fold(START, |crc, &byte| update_bitwise(crc, byte))
+}
+
+fn by_crc_crate(data: &[u8]) -> u16 {
+    const MODBUS: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
+    MODBUS.checksum(data)
+}
+
+fn checksum(c: &mut Criterion) {
+    let engines: [(&str, Engine); 3] = [("drivebus", crc16), ("crc crate", by_crc_crate), ("bitwise", bitwise)];
+    let data: Vec<u8> = (0..65_536_u32).map(|n| n.wrapping_mul(0x9E37_79B9).to_le_bytes()[3]).collect();
+    let mut group = c.benchmark_group("crc");
+    for len in [6, 8, 11, 37, 254, 65_536] {
+        group.throughput(Throughput::Bytes(len as u64));
+        for (name, engine) in engines {
+            group.bench_with_input(BenchmarkId::new(name, len), &data[..len], |b, data| {
+                b.iter(|| engine(black_box(data)));
+            });
+        }
+    }
+}
+
+fn frames(c: &mut Criterion) {
+    let unit = UnitAddress::MIN;
+    let words: Vec<u16> = (0..16).map(|n| n * 4_099).collect();
+    let mut group = c.benchmark_group("frame");
+    group.bench_function("encode a read", |b| {
+        b.iter(|| Adu::request(black_box(unit).into(), &Request::read(black_box(0x3000), 16).unwrap()));
+    });
+    group.bench_function("encode a write of 16 words", |b| {
+        b.iter(|| Adu::request(black_box(unit).into(), &Request::write_many(0x2000, black_box(&words)).unwrap()));
+    });
+    let answer = Adu::answer(unit, &Answer::read(&words).unwrap());
+    let expected = Request::read(0x3000, 16).unwrap().expected();
+    let mut target = [0_u16; 16];
+    group.bench_function("decode an answer of 16 words", |b| {
+        b.iter(|| {
+            let frame = Frame::parse(black_box(answer.as_bytes())).unwrap();
+            let Ok(Answer::Read { words, .. }) = expected.judge_frame(unit, &frame) else { return 0 };
+            words.iter().zip(&mut target).for_each(|(word, place)| *place = word);
+            target[15]
+        });
+    });
+}
+
+fn framer(c: &mut Criterion) {
+    let unit = UnitAddress::MIN;
+    let answer = Adu::answer(unit, &Answer::read(&[7; 16]).unwrap());
+    let expected = Request::read(0x3000, 16).unwrap().expected();
+    let noisy = [&[0x00, 0xFF][..], answer.as_bytes()].concat();
+    let now = Instant::from_nanos(0);
+    let mut group = c.benchmark_group("framer, answer of 16 words");
+    for (name, wire, cut) in [
+        ("whole", answer.as_bytes(), 64),
+        ("byte by byte", answer.as_bytes(), 1),
+        ("after two bytes of noise", &noisy[..], 64),
+    ] {
+        group.throughput(Throughput::Bytes(wire.len() as u64));
+        group.bench_function(name, |b| {
+            let mut framer = Framer::new(SILENCE);
+            b.iter(|| {
+                framer.expect(unit, expected);
+                let mut found = 0;
+                for chunk in wire.chunks(cut) {
+                    framer.receive(now, black_box(chunk));
+                    while let Some(event) = framer.poll(now) {
+                        found += usize::from(event.is_ok());
+                    }
+                }
+                found
+            });
+        });
+    }
+}
+
+fn master(c: &mut Criterion) {
+    let unit = UnitAddress::MIN;
+    let answer = Adu::answer(unit, &Answer::read(&[7; 16]).unwrap());
+    let request = Request::read(0x3000, 16).unwrap();
+    c.bench_function("master, a read of 16 words from begin to answer", |b| {
+        b.iter_batched_ref(
+            || Master::new(&SerialFormat::DEFAULT),
+            |master| {
+                let begin = Instant::from_nanos(0);
+                master.begin(begin, unit.into(), &request, Duration::from_millis(500)).unwrap();
+                let go = master.deadline().unwrap_or(begin);
+                assert!(matches!(master.poll(go), Some(Event::Transmit(_))));
+                master.sent(go);
+                master.receive(go, answer.as_bytes());
+                matches!(master.poll(go), Some(Event::Answer(_)))
+            },
+            BatchSize::SmallInput,
+        );
+    });
+}
+
+criterion_group!(benches, checksum, frames, framer, master);
+criterion_main!(benches);
