@@ -158,6 +158,15 @@ impl SimulatedDrive {
         self.with(|drive| drive.read(address)).unwrap_or(Err(ExceptionCode::ILLEGAL_ADDRESS))
     }
 
+    /// Sets the parameter at `address` at the keypad, for good. The bus's own counters do not see it.
+    ///
+    /// # Errors
+    ///
+    /// The exception code with which a write from the bus would be refused.
+    pub fn set_parameter(&self, address: u16, word: u16) -> Result<(), ExceptionCode> {
+        self.with(|drive| drive.set_parameter(address, word)).unwrap_or(Err(ExceptionCode::ILLEGAL_ADDRESS))
+    }
+
     /// Words written to EEPROM from the bus.
     pub fn eeprom_writes(&self) -> u64 {
         self.with(|drive| drive.eeprom_writes()).unwrap_or(0)

@@ -9,7 +9,7 @@ use super::addresses as at;
 use super::machine::Command;
 use super::map::Access;
 use super::refusal::Refusal;
-use super::{Drive, WRITES_KEPT, WriteRecord, settings};
+use super::{Drive, WRITES_KEPT, WriteRecord};
 
 /// Most words of one read or write (operation manual, sections 9.4.1 and 9.4.4).
 const MAX_WORDS: u16 = 16;
@@ -48,6 +48,18 @@ impl Drive {
     /// The word at `address` as the bus would read it at this moment, or the exception code.
     pub(crate) fn read(&self, address: u16) -> Result<u16, ExceptionCode> {
         self.check_unlocked().and_then(|()| self.word(address).ok_or(Refusal::Address)).map_err(Refusal::code)
+    }
+
+    /// Sets a parameter at the keypad, for good: checked as on the bus, but no password is asked, and neither the
+    /// record of writes nor the EEPROM counter moves.
+    pub(crate) fn set_parameter(&mut self, address: u16, word: u16) -> Result<(), ExceptionCode> {
+        if !self.map.is_parameter(address) {
+            return Err(Refusal::Address.code());
+        }
+        self.check_write(address, word).map_err(Refusal::code)?;
+        self.store.keep(address, word);
+        self.settings_may_have_changed();
+        Ok(())
     }
 
     fn carry_out<'a>(
@@ -152,17 +164,13 @@ impl Drive {
         if address & !at::RAM_BIT == at::PASSWORD {
             self.unlocked = false;
         }
-        let settings = settings::settings(&self.store, &self.control);
-        if settings != self.settings {
-            self.settings = settings;
-            self.machine.update(&settings);
-        }
+        self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if address == at::CONTROL_COMMAND
             && self.obeys_bus()
             && let Some(command) = Command::from_code(word)
         {
-            self.machine.command(command, &settings);
+            self.machine.command(command, &self.settings);
         }
     }
 }

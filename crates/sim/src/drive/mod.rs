@@ -209,6 +209,15 @@ impl Drive {
         self.control.get(usize::from(address.wrapping_sub(at::CONTROL_COMMAND))).copied().unwrap_or(0)
     }
 
+    /// Tells the machine what a parameter or setpoint now asks of it.
+    fn settings_may_have_changed(&mut self) {
+        let settings = settings::settings(&self.store, &self.control);
+        if settings != self.settings {
+            self.settings = settings;
+            self.machine.update(&settings);
+        }
+    }
+
     fn run_machine(&mut self, to: Instant) {
         if let Some(code) = self.machine.advance(to) {
             self.remember_fault(code);

@@ -5,6 +5,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+mod anything;
 mod bench;
 mod memory;
 mod ports;

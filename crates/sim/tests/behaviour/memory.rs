@@ -1,6 +1,8 @@
 //! Two memories, and what a power cycle does to them.
 
-use crate::bench::Bench;
+use drivebus_rtu::ExceptionCode;
+
+use crate::bench::{Bench, pdu};
 
 #[test]
 fn a_plain_address_writes_both_memories_and_wears_one() {
@@ -59,4 +61,22 @@ fn faults_stay_in_the_history_without_wearing_the_counter() {
     assert_eq!(bench.read::<6>(0x071B), [18, 11, 4, 0, 0, 0], "newest first");
     assert_eq!(bench.read::<1>(0x2102), [0], "no fault outlives the power");
     assert_eq!(bench.drive().eeprom_writes(), 0);
+}
+
+#[test]
+fn the_keypad_sets_parameters_within_their_rules() {
+    let mut bench = Bench::new();
+    let drive = bench.drive();
+    assert_eq!(drive.set_parameter(0x0E03, 0), Ok(()));
+    assert_eq!(drive.set_parameter(0x0E03, 201), Err(ExceptionCode(0x04)));
+    assert_eq!(drive.set_parameter(0x071B, 0), Err(ExceptionCode(0x07)));
+    assert_eq!(drive.set_parameter(0x2001, 0), Err(ExceptionCode(0x02)), "no parameter");
+    assert_eq!((drive.eeprom_writes(), drive.writes()), (0, vec![]));
+    drive.power_cycle();
+    assert_eq!(bench.read::<1>(0x0E03), [0]);
+
+    assert_eq!(drive.set_parameter(0x0700, 1_234), Ok(()), "a password");
+    assert_eq!(bench.ask(1, &pdu(0x03, &[0x0E03, 1])), Some(vec![0x83, 0x09]));
+    assert_eq!(drive.set_parameter(0x0700, 0), Ok(()), "the keypad needs none");
+    assert_eq!(bench.read::<1>(0x0E03), [0]);
 }
