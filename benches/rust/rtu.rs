@@ -26,7 +26,8 @@ fn by_crc_crate(data: &[u8]) -> u16 {
 }
 
 fn checksum(c: &mut Criterion) {
-    let engines: [(&str, Engine); 3] = [("drivebus", crc16), ("crc crate", by_crc_crate), ("bitwise", bitwise)];
+    let engines: [(&str, Engine); 3] =
+        [("drivebus", crc16), ("crc crate", by_crc_crate), ("bit by bit, as compiled", bitwise)];
     let data: Vec<u8> = (0..65_536_u32).map(|n| n.wrapping_mul(0x9E37_79B9).to_le_bytes()[3]).collect();
     let mut group = c.benchmark_group("crc");
     for len in [6, 8, 11, 37, 254, 65_536] {

@@ -126,15 +126,17 @@ impl Adu {
     }
 
     fn build(address: u8, put: impl FnOnce(&mut [u8; MAX_PDU]) -> usize) -> Self {
-        let mut bytes = [0; MAX_ADU];
-        bytes[0] = address;
-        let body = match bytes[1..].first_chunk_mut::<MAX_PDU>() {
+        // Made in place: a frame is as large as 256 bytes, and copying it costs more than making it.
+        let mut adu = Self::EMPTY;
+        adu.bytes[0] = address;
+        let body = match adu.bytes[1..].first_chunk_mut::<MAX_PDU>() {
             Some(pdu) => 1 + put(pdu),
             None => 1,
         };
-        let crc = crc16(&bytes[..body]).to_le_bytes();
-        bytes[body..body + CRC_LEN].copy_from_slice(&crc);
-        Self { bytes, len: body + CRC_LEN }
+        let crc = crc16(&adu.bytes[..body]).to_le_bytes();
+        adu.bytes[body..body + CRC_LEN].copy_from_slice(&crc);
+        adu.len = body + CRC_LEN;
+        adu
     }
 
     /// The bytes in the order of the wire.

@@ -54,6 +54,7 @@ impl Span {
 /// An answer that waits for its moment.
 #[derive(Debug)]
 struct Waiting {
+    unit: u8,
     begin: Instant,
     bytes: Vec<u8>,
 }
@@ -157,15 +158,18 @@ impl Wire {
         end
     }
 
-    /// A unit answers, from `begin` on, after whatever the wire was told to do to answers.
-    pub(crate) fn answer(&mut self, begin: Instant, answer: &[u8]) {
+    /// `unit` answers, from `begin` on, after whatever the wire was told to do to answers.
+    ///
+    /// Assumption: a unit answers in the order it was asked, so an answer that is held back holds back those after it.
+    pub(crate) fn answer(&mut self, unit: u8, begin: Instant, answer: &[u8]) {
         let Some((bytes, delay)) = self.spoil.apply(answer) else { return };
         if bytes.is_empty() {
             return;
         }
-        let begin = begin + delay;
+        let earlier = self.waiting.iter().rfind(|waiting| waiting.unit == unit).map(|waiting| waiting.begin);
+        let begin = earlier.map_or(begin + delay, |earlier| earlier.max(begin + delay));
         let place = self.waiting.partition_point(|waiting| waiting.begin <= begin);
-        self.waiting.insert(place, Waiting { begin, bytes });
+        self.waiting.insert(place, Waiting { unit, begin, bytes });
     }
 
     /// What happens next, not later than `to`. `None`: nothing does.

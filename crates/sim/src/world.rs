@@ -119,7 +119,7 @@ impl World {
                 let Some(drive) = self.drives.get_mut(&unit.get()) else { return };
                 let Some(answer) = drive.handle(silent, frame.pdu()) else { return };
                 let delay: Duration = drive.response_delay();
-                self.wire.answer(silent + delay, answer.as_bytes());
+                self.wire.answer(unit.get(), silent + delay, answer.as_bytes());
             }
             Err(_) => {}
         }

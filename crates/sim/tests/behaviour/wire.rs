@@ -164,16 +164,16 @@ fn faults_spoil_the_answers_they_were_meant_for() {
 }
 
 #[test]
-fn a_late_answer_can_come_after_the_next_request_and_both_arrive() {
+fn a_late_answer_comes_after_the_next_request_and_holds_back_its_answer() {
     let mut bench = Bench::new();
     let wire = bench.simulator.wire();
     wire.delay_answers(Duration::from_millis(30), 1);
     bench.line.send(&read_identification()).unwrap();
     bench.line.sleep(at(20_000_000));
     bench.line.send(&framed(1, &pdu(0x03, &[0x2100, 1]))).unwrap();
-    // The second answer, due at 20 + 4.58 + 2.01 + 5 ms, is over before the late one begins at 41.59 ms.
+    // The second answer is due at 20 + 4.58 + 2.01 + 5 ms, the late one at 41.59 ms: a unit has one buffer.
     let heard: Vec<u8> = bench.listen(at(1_000_000_000)).into_iter().map(|(_, byte)| byte).collect();
-    assert_eq!(heard, [hex("01 03 02 00 03 F8 45"), hex("01 03 02 01 A0 B9 AC")].concat());
+    assert_eq!(heard, [hex("01 03 02 01 A0 B9 AC"), hex("01 03 02 00 03 F8 45")].concat());
     assert_eq!(wire.collisions(), 0);
 }
 
