@@ -27,6 +27,11 @@ def nanoseconds(value: float) -> str:
     return f"{value:.3g} ns"
 
 
+def by_number(name: str) -> list[tuple[int, str]]:
+    """Sorts `crc/8` before `crc/11`."""
+    return [(int(part), "") if part.isdigit() else (0, part) for part in name.split("/")]
+
+
 def run(*command: str) -> None:
     """Runs *command* in the repository, and fails with it."""
     print("$", " ".join(command), flush=True)
@@ -53,12 +58,12 @@ def machine() -> str:
 def rust() -> str:
     """Criterion's medians."""
     run("cargo", "bench", "--locked", "--quiet", "-p", "drivebus-benches")
-    rows = ["| benchmark | median |", "| --- | ---: |"]
-    for path in sorted(CRITERION.glob("**/new/benchmark.json")):
+    medians = {}
+    for path in CRITERION.glob("**/new/benchmark.json"):
         name = json.loads(path.read_text())["full_id"]
-        median = json.loads((path.parent / "estimates.json").read_text())["median"]["point_estimate"]
-        rows.append(f"| {name} | {nanoseconds(median)} |")
-    return "\n".join(rows)
+        medians[name] = json.loads((path.parent / "estimates.json").read_text())["median"]["point_estimate"]
+    rows = [f"| {name} | {nanoseconds(medians[name])} |" for name in sorted(medians, key=by_number)]
+    return "\n".join(["| benchmark | median |", "| --- | ---: |", *rows])
 
 
 def python(folder: Path) -> str:

@@ -15,8 +15,8 @@ Engine = Callable[[bytes], int]
 
 ENGINES: dict[str, Engine] = {"drivebus": drivebus.crc16, "fastcrc": fastcrc.crc16.modbus}
 
-# The bodies of a request, of an answer with one, four and sixteen words, the longest body, and a capture.
-SIZES = [6, 5, 11, 35, 254, 65536]
+# The bodies of an answer of one word, a request, answers of four and sixteen words, the longest body, and a capture.
+SIZES = [5, 6, 11, 35, 254, 65536]
 
 
 @pytest.mark.parametrize("size", SIZES)
