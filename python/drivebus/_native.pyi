@@ -135,8 +135,8 @@ class Bus:
         """03H: *count* words (1..=125) of *unit* (1..=247) from *address*."""
     def read_stamped(self, unit: int, address: int, count: int, /) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and the answer was complete."""
-    def write(self, unit: int, address: int, value: int | Sequence[int], /) -> None:
-        """06H (an int) or 10H (a sequence). Sent once."""
+    def write(self, unit: int, address: int, value: int | Sequence[int], /, *, urgent: bool = False) -> None:
+        """06H (an int) or 10H (a sequence). Sent once; *urgent* before all who wait, whatever is in doubt."""
     def broadcast(self, address: int, value: int | Sequence[int], /) -> None:
         """06H or 10H to every unit; returns after the turnaround delay."""
     def echo(self, unit: int, word: int | None = None, /, *, timeout: float | None = None) -> float:

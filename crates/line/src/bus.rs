@@ -42,6 +42,9 @@ pub struct CallOptions {
     pub timeout: Option<Duration>,
     /// How often a read is asked once more.
     pub retries: Option<u32>,
+    /// Before all who wait, and whatever is in doubt about the unit: for a stop, which must not wait for an echo to come
+    /// back. Its confirmation may then belong to the very same request, sent before.
+    pub urgent: bool,
 }
 
 /// One line and its owner.
@@ -121,7 +124,7 @@ impl Bus {
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);
-        let _turn = self.queue.turn(&mut || false);
+        let _turn = self.queue.turn(true, &mut || false);
         self.lock().close();
     }
 
@@ -143,12 +146,13 @@ impl Bus {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let ask = Ask { destination, request, timeout: options.timeout.unwrap_or(self.options.timeout) };
+        let timeout = options.timeout.unwrap_or(self.options.timeout);
+        let ask = Ask { destination, request, timeout, urgent: options.urgent };
         if self.options.read_only && request.is_write() {
             return Err(unsent(&ask, Failure::ReadOnly { function: request.function() }, self.now()));
         }
         let mut give_up = || self.is_closed() || give_up();
-        let Some(_turn) = self.queue.turn(&mut give_up) else {
+        let Some(_turn) = self.queue.turn(options.urgent, &mut give_up) else {
             return Err(unsent(&ask, self.given_up(), self.now()));
         };
         let mut owner = self.lock();

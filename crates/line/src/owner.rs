@@ -32,6 +32,8 @@ pub(crate) struct Ask<'a> {
     pub(crate) destination: Destination,
     pub(crate) request: &'a Request<'a>,
     pub(crate) timeout: Duration,
+    /// Whether it goes out at once, even to a unit that left a request open.
+    pub(crate) urgent: bool,
 }
 
 /// When an exchange happened, on the line's clock.
@@ -122,6 +124,9 @@ impl Owner {
         let Destination::Unit(unit) = ask.destination else {
             return Ok(());
         };
+        if ask.urgent {
+            return Ok(());
+        }
         if self.master.in_quarantine(unit) && !matches!(ask.request, Request::Echo { .. }) {
             self.probe(unit, ask, give_up)?;
         }
@@ -242,7 +247,8 @@ impl Owner {
             Destination::Unit(_) => ask.timeout,
             Destination::Broadcast => TURNAROUND,
         };
-        if let Err(error) = master.begin(now, ask.destination, ask.request, timeout) {
+        let begin = if ask.urgent { Master::begin_in_doubt } else { Master::begin };
+        if let Err(error) = begin(master, now, ask.destination, ask.request, timeout) {
             return Err(failed(ask, Failure::NotBegun(error), sent, now, &[]));
         }
         let mut buffer = [0; 256];

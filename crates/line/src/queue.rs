@@ -1,4 +1,4 @@
-//! Whose turn it is: one owner of the line at a time, in the order they came.
+//! Whose turn it is: one owner of the line at a time, in the order they came; a stop overtakes those who wait.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -18,23 +18,36 @@ pub(crate) struct Queue {
 #[derive(Debug, Default)]
 struct Waiting {
     next: u64,
-    order: VecDeque<u64>,
+    /// The first is the one whose turn it is.
+    order: VecDeque<Ticket>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Ticket {
+    number: u64,
+    urgent: bool,
 }
 
 /// The right to use the line, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Turn<'a> {
     queue: &'a Queue,
-    ticket: u64,
+    ticket: Ticket,
 }
 
 impl Queue {
     /// Waits for a turn; `None` when `give_up` says so before it comes.
-    pub(crate) fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Option<Turn<'_>> {
+    ///
+    /// Who is `urgent` comes before all who wait and are not, but not before the one whose turn it is.
+    pub(crate) fn turn(&self, urgent: bool, give_up: &mut dyn FnMut() -> bool) -> Option<Turn<'_>> {
         let mut waiting = self.lock();
-        let ticket = waiting.next;
+        let ticket = Ticket { number: waiting.next, urgent };
         waiting.next += 1;
-        waiting.order.push_back(ticket);
+        let place = match waiting.order.iter().skip(1).position(|other| urgent && !other.urgent) {
+            Some(behind_the_owner) => 1 + behind_the_owner,
+            None => waiting.order.len(),
+        };
+        waiting.order.insert(place, ticket);
         let turn = Turn { queue: self, ticket };
         while waiting.order.front() != Some(&ticket) {
             let (guard, waited) = self.moved.wait_timeout(waiting, LOOK_UP).unwrap_or_else(PoisonError::into_inner);
@@ -76,15 +89,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turns_come_in_the_order_of_arrival() {
+    fn turns_come_in_the_order_of_arrival_but_for_the_urgent() {
         let queue = Queue::default();
         let (done, order) = mpsc::channel();
-        let first = queue.turn(&mut || false).unwrap();
+        let first = queue.turn(false, &mut || false).unwrap();
         std::thread::scope(|scope| {
-            for number in 0..4 {
+            for (number, urgent) in [false, false, true, false, true].into_iter().enumerate() {
                 let (queue, done) = (&queue, done.clone());
                 scope.spawn(move || {
-                    let _turn = queue.turn(&mut || false);
+                    let _turn = queue.turn(urgent, &mut || false);
                     done.send(number).unwrap();
                 });
                 // The next one comes only when this one stands in the queue.
@@ -94,15 +107,15 @@ mod tests {
             }
             drop(first);
         });
-        assert_eq!(order.try_iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
+        assert_eq!(order.try_iter().collect::<Vec<_>>(), [2, 4, 0, 1, 3]);
     }
 
     #[test]
     fn who_gives_up_leaves_no_gap() {
         let queue = Queue::default();
-        let first = queue.turn(&mut || false).unwrap();
-        assert!(queue.turn(&mut || true).is_none());
+        let first = queue.turn(false, &mut || false).unwrap();
+        assert!(queue.turn(false, &mut || true).is_none());
         drop(first);
-        assert!(queue.turn(&mut || true).is_some());
+        assert!(queue.turn(false, &mut || true).is_some());
     }
 }

@@ -87,7 +87,7 @@ impl Bus {
         retries: Option<u32>,
     ) -> PyResult<Vec<u16>> {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
-        Ok(self.read_words(unit, address, count, CallOptions { timeout, retries })?.0)
+        Ok(self.read_words(unit, address, count, CallOptions { timeout, retries, ..CallOptions::default() })?.0)
     }
 
     #[pyo3(signature = (unit, address, count, /))]
@@ -102,14 +102,20 @@ impl Bus {
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
 
-    #[pyo3(signature = (unit, address, value, /))]
-    fn write(&self, unit: &Bound<'_, PyAny>, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.write_to(unit_address(unit)?.into(), address, value)
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false))]
+    fn write(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        value: &Bound<'_, PyAny>,
+        urgent: bool,
+    ) -> PyResult<()> {
+        self.write_to(unit_address(unit)?.into(), address, value, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.write_to(Destination::Broadcast, address, value)
+        self.write_to(Destination::Broadcast, address, value, false)
     }
 
     #[pyo3(signature = (unit, word = None, /, *, timeout = None))]
@@ -125,7 +131,7 @@ impl Bus {
             Some(word) => one_word("word", word)?,
             None => py.detach(|| self.core.fresh_word()),
         };
-        let options = CallOptions { timeout, retries: None };
+        let options = CallOptions { timeout, ..CallOptions::default() };
         let done = self.call(py, unit_address(unit)?.into(), &Request::echo(word), options, &mut |_| ())?;
         Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
     }
@@ -147,12 +153,18 @@ impl Bus {
             _ => Request::custom(pdu, length).map_err(refuse)?,
         };
         let mut reply = Vec::new();
-        self.call(py, unit.into(), &request, CallOptions { timeout: None, retries: Some(0) }, &mut |answer| {
-            let frame = Adu::answer(unit, &answer);
-            if let Ok(frame) = Frame::parse(frame.as_bytes()) {
-                reply = frame.pdu().to_vec();
-            }
-        })?;
+        self.call(
+            py,
+            unit.into(),
+            &request,
+            CallOptions { retries: Some(0), ..CallOptions::default() },
+            &mut |answer| {
+                let frame = Adu::answer(unit, &answer);
+                if let Ok(frame) = Frame::parse(frame.as_bytes()) {
+                    reply = frame.pdu().to_vec();
+                }
+            },
+        )?;
         Ok(PyBytes::new(py, &reply))
     }
 
@@ -197,10 +209,16 @@ impl Bus {
         Ok((read, done))
     }
 
-    fn write_to(&self, to: Destination, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn write_to(
+        &self,
+        to: Destination,
+        address: &Bound<'_, PyAny>,
+        value: &Bound<'_, PyAny>,
+        urgent: bool,
+    ) -> PyResult<()> {
         let py = address.py();
         let address = one_word("address", address)?;
-        let options = CallOptions::default();
+        let options = CallOptions { urgent, ..CallOptions::default() };
         match words_of(value)? {
             Err(value) => self.call(py, to, &Request::write(address, value), options, &mut |_| ())?,
             Ok(words) => {

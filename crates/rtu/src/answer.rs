@@ -233,6 +233,11 @@ impl Expected {
         }
     }
 
+    /// Whether the answer returns a word of the request's own choosing: proof that it is the answer to this request.
+    pub(crate) const fn is_echo(self) -> bool {
+        matches!(self.0, Kind::Echo { .. })
+    }
+
     /// Whether the right answer is the request once more, so that an adapter's own echo cannot be told from it.
     pub const fn repeats_request(&self) -> bool {
         matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. })

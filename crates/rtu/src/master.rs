@@ -153,15 +153,33 @@ impl Master {
         request: &Request<'_>,
         timeout: Duration,
     ) -> Result<(), BeginError> {
+        match destination {
+            Destination::Unit(unit) if self.in_quarantine(unit) && !matches!(request, Request::Echo { .. }) => {
+                Err(BeginError::Quarantine { unit })
+            }
+            _ => self.begin_in_doubt(now, destination, request, timeout),
+        }
+    }
+
+    /// As [`begin`](Self::begin), quarantine or not: for a stop, which has to go out whatever else is in doubt.
+    ///
+    /// In quarantine its answer may be a late one to the very same request, sent before; the quarantine goes on.
+    ///
+    /// # Errors
+    ///
+    /// [`BeginError`]: nothing is sent.
+    pub fn begin_in_doubt(
+        &mut self,
+        now: Instant,
+        destination: Destination,
+        request: &Request<'_>,
+        timeout: Duration,
+    ) -> Result<(), BeginError> {
         if !matches!(self.state, State::Idle) {
             return Err(BeginError::OutOfTurn);
         }
-        match destination {
-            Destination::Broadcast if !request.is_write() => return Err(BeginError::BroadcastRead),
-            Destination::Unit(unit) if self.in_quarantine(unit) && !matches!(request, Request::Echo { .. }) => {
-                return Err(BeginError::Quarantine { unit });
-            }
-            _ => {}
+        if destination == Destination::Broadcast && !request.is_write() {
+            return Err(BeginError::BroadcastRead);
         }
         self.framer.expect_anything();
         self.request = Adu::request(destination, request);
@@ -343,7 +361,8 @@ impl Master {
         range: core::ops::Range<usize>,
     ) -> Event<'_> {
         match error {
-            None => self.quarantine.remove(unit),
+            None if expected.is_echo() => self.quarantine.remove(unit),
+            None => {}
             Some(_) => self.quarantine.insert(unit),
         }
         let frame = self.framer.held(range);

@@ -170,6 +170,21 @@ fn only_the_fresh_word_ends_the_quarantine() {
 }
 
 #[test]
+fn a_stop_goes_out_whatever_else_is_in_doubt() {
+    let mut master = waiting(&Request::read(100, 1).unwrap());
+    assert!(matches!(master.poll(at(102_500)), Some(Event::NoAnswer { .. })));
+    let stop = Request::write(0x2000, 5);
+    master.begin_in_doubt(at(102_500), unit(1).into(), &stop, TIMEOUT).unwrap();
+    assert!(matches!(master.poll(at(102_500)), Some(Event::Transmit(_))));
+    master.sent(at(103_250));
+    master.receive(at(105_000), &words(1, &[100]));
+    assert_eq!(master.poll(at(105_000)), None, "the late answer to the read");
+    master.receive(at(110_000), Adu::request(unit(1).into(), &stop).as_bytes());
+    assert!(matches!(master.poll(at(110_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
+    assert!(master.in_quarantine(unit(1)), "it may have been the answer to an earlier stop");
+}
+
+#[test]
 fn giving_up_a_request_that_went_out_is_remembered() {
     let mut master = waiting(&Request::read(0, 1).unwrap());
     assert!(master.abort());

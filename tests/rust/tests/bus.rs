@@ -90,12 +90,29 @@ fn a_read_is_repeated_and_a_write_is_not() {
 fn a_reply_that_comes_during_the_next_request_is_never_its_answer() {
     let (simulator, bus) = pair();
     simulator.wire().delay_answers(Duration::from_millis(515), 1);
-    let once = CallOptions { timeout: None, retries: Some(0) };
+    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
     let late = bus.call(unit(1).into(), &Request::read(0x2103, 1).unwrap(), once, &mut || false, &mut |_| ());
     assert!(matches!(late.unwrap_err().failure, Failure::NoAnswer { .. }));
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3], "not 01A0H, the identification asked for before");
     let stats = bus.stats();
     assert_eq!((stats.late, stats.total.resyncs), (1, 1), "{stats:?}");
+}
+
+#[test]
+fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
+    let (simulator, bus) = pair();
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+    simulator.wire().drop_answers(100); // it hears, and is not heard
+    assert!(read(&bus, STATE, 1).is_err());
+    let stop = Request::write(0x2000, 5);
+    let urgent = CallOptions { urgent: true, ..CallOptions::default() };
+    let error = bus.call(unit(1).into(), &stop, urgent, &mut || false, &mut |_| ()).unwrap_err();
+    assert!(error.sent.is_some(), "{error}");
+    let writes = simulator.drive(1).unwrap().writes();
+    assert_eq!(writes.iter().filter(|write| (write.address, write.value) == (0x2000, 5)).count(), 1);
+    // Anything else is not sent before the unit has returned an echo.
+    let error = ask(&bus, 1, &Request::write(0x2001, 5)).unwrap_err();
+    assert_eq!(error.sent, None, "{error}");
 }
 
 #[test]
@@ -124,7 +141,7 @@ fn a_damaged_answer_is_told_with_both_crcs_and_its_bytes() {
     let (simulator, bus) = pair();
     let bad = [0x01, 0x03, 0x02, 0x00, 0x03, 0xF8, 0x46];
     simulator.wire().answer_with(&bad);
-    let once = CallOptions { timeout: None, retries: Some(0) };
+    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
     let request = Request::read(STATE, 1).unwrap();
     let error = bus.call(unit(1).into(), &request, once, &mut || false, &mut |_| ()).unwrap_err();
     assert_eq!(error.raw, bad);
