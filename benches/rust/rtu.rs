@@ -44,11 +44,18 @@ fn frames(c: &mut Criterion) {
     let unit = UnitAddress::MIN;
     let words: Vec<u16> = (0..16).map(|n| n * 4_099).collect();
     let mut group = c.benchmark_group("frame");
+    let mut adu = Adu::new();
     group.bench_function("encode a read", |b| {
-        b.iter(|| Adu::request(black_box(unit).into(), &Request::read(black_box(0x3000), 16).unwrap()));
+        b.iter(|| {
+            adu.set_request(black_box(unit).into(), &Request::read(black_box(0x3000), 16).unwrap());
+            black_box(adu.as_bytes()).len()
+        });
     });
     group.bench_function("encode a write of 16 words", |b| {
-        b.iter(|| Adu::request(black_box(unit).into(), &Request::write_many(0x2000, black_box(&words)).unwrap()));
+        b.iter(|| {
+            adu.set_request(black_box(unit).into(), &Request::write_many(0x2000, black_box(&words)).unwrap());
+            black_box(adu.as_bytes()).len()
+        });
     });
     let answer = Adu::answer(unit, &Answer::read(&words).unwrap());
     let expected = Request::read(0x3000, 16).unwrap().expected();

@@ -11,6 +11,10 @@ use crate::errors::{answer_error, frame_error, refuse, refused};
 #[pyfunction]
 #[pyo3(signature = (data, /))]
 pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
+    // The usual case, without so much as a reference count.
+    if let Ok(bytes) = data.cast::<PyBytes>() {
+        return Ok(crc(bytes.as_bytes()));
+    }
     Ok(crc(bytes_of(data)?.as_bytes()))
 }
 

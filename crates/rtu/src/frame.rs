@@ -101,8 +101,11 @@ pub struct Adu {
 }
 
 impl Adu {
-    /// No frame: what a master holds before its first request.
-    pub(crate) const EMPTY: Self = Self { bytes: [0; MAX_ADU], len: 0 };
+    /// A buffer without a frame in it.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { bytes: [0; MAX_ADU], len: 0 }
+    }
 
     /// The frame that asks `request` of `destination`.
     ///
@@ -116,33 +119,50 @@ impl Adu {
     /// ```
     #[must_use]
     pub fn request(destination: Destination, request: &Request<'_>) -> Self {
-        Self::build(destination.to_wire(), |pdu| request.put(pdu))
+        let mut adu = Self::new();
+        adu.set_request(destination, request);
+        adu
     }
 
     /// The frame with which `unit` answers.
     #[must_use]
     pub fn answer(unit: UnitAddress, answer: &Answer<'_>) -> Self {
-        Self::build(unit.get(), |pdu| answer.put(pdu))
+        let mut adu = Self::new();
+        adu.set_answer(unit, answer);
+        adu
     }
 
-    fn build(address: u8, put: impl FnOnce(&mut [u8; MAX_PDU]) -> usize) -> Self {
-        // Made in place: a frame is as large as 256 bytes, and copying it costs more than making it.
-        let mut adu = Self::EMPTY;
-        adu.bytes[0] = address;
-        let body = match adu.bytes[1..].first_chunk_mut::<MAX_PDU>() {
+    /// As [`request`](Self::request), in place of whatever was in the buffer: for whoever sends many frames.
+    pub fn set_request(&mut self, destination: Destination, request: &Request<'_>) {
+        self.build(destination.to_wire(), |pdu| request.put(pdu));
+    }
+
+    /// As [`answer`](Self::answer), in place of whatever was in the buffer.
+    pub fn set_answer(&mut self, unit: UnitAddress, answer: &Answer<'_>) {
+        self.build(unit.get(), |pdu| answer.put(pdu));
+    }
+
+    fn build(&mut self, address: u8, put: impl FnOnce(&mut [u8; MAX_PDU]) -> usize) {
+        self.bytes[0] = address;
+        let body = match self.bytes[1..].first_chunk_mut::<MAX_PDU>() {
             Some(pdu) => 1 + put(pdu),
             None => 1,
         };
-        let crc = crc16(&adu.bytes[..body]).to_le_bytes();
-        adu.bytes[body..body + CRC_LEN].copy_from_slice(&crc);
-        adu.len = body + CRC_LEN;
-        adu
+        let crc = crc16(&self.bytes[..body]).to_le_bytes();
+        self.bytes[body..body + CRC_LEN].copy_from_slice(&crc);
+        self.len = body + CRC_LEN;
     }
 
     /// The bytes in the order of the wire.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.len]
+    }
+}
+
+impl Default for Adu {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

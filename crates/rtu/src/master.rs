@@ -128,7 +128,7 @@ impl Master {
             silence,
             framer: Framer::new(silence),
             state: State::Idle,
-            request: Adu::EMPTY,
+            request: Adu::new(),
             own_echo: 0,
             strips_echo: false,
             busy: None,
@@ -182,7 +182,7 @@ impl Master {
             return Err(BeginError::BroadcastRead);
         }
         self.framer.expect_anything();
-        self.request = Adu::request(destination, request);
+        self.request.set_request(destination, request);
         // Nothing is known of a line that was never watched: it may be busy now.
         self.busy.get_or_insert(now);
         let job = Job { destination, expected: request.expected(), timeout };
