@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Unconfirmed
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
 from drivebus.registers import Registers
 from drivebus.values import ControlSource, Fault, State, Value
 
@@ -219,7 +219,7 @@ class Motion(Registers):
     def _seen_last(self) -> str:
         try:
             return f"State seen afterwards: {self.look()}"
-        except _LINE_ERRORS as error:
+        except (*_LINE_ERRORS, Refused) as error:
             return f"Its state could not be read afterwards either ({type(error).__name__})"
 
     def _confirm(self, command: str, shows: Callable[[Seen], bool], within: float) -> None:
@@ -236,9 +236,10 @@ class Motion(Registers):
                 source = seen.source
                 if source not in (ControlSource.COMMUNICATION, None):
                     last += f", with commands from the {source}"
-                if seen.fault is not None:
+                if seen.fault is not None and command != "reset_fault":
                     break
-            except (NoAnswer, BadAnswer) as error:
+            except (NoAnswer, BadAnswer, Refused) as error:
+                # A refusal here is one of a read: it says nothing about the command.
                 last = f"its last answer: {error}"
             except PortError as error:
                 raise Unconfirmed(

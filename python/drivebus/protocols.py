@@ -43,6 +43,9 @@ class ProfileProtocol(Protocol):
     def title(self) -> str:
         """The family as its maker calls it."""
 
+    def names(self) -> list[str]:
+        """Every register name and parameter code."""
+
     def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address*, or None."""
 
@@ -84,6 +87,9 @@ class ProfileProtocol(Protocol):
 
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code in this family."""
+
+    def faults(self) -> list[Fault]:
+        """Every fault that is known, by number."""
 
     @property
     def maximum_frequency(self) -> str | None:

@@ -84,6 +84,11 @@ class Registers:
         units = {name: self.profile.describe(name).unit for name in names}
         return Snapshot(values, units, started, ended - started)
 
+    def read_words(self, address: int, count: int = 1) -> list[int]:
+        """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""
+        with self._explained():
+            return self.bus.read(self.unit, address, count)
+
     def value(self, name: str, raw: int) -> Value:
         """The word *raw* of *name* in engineering units."""
         value = self.profile.decode(name, raw)
@@ -164,7 +169,7 @@ class Registers:
                 self._in_ram.add(item.name)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-        in_force = self._read(self.profile.address(item.name))[0]
+        in_force = self.read_words(self.profile.address(item.name))[0]
         if in_force == item.raw and item.name not in self._in_ram:
             return
         self._write(item.address, item.raw)
@@ -204,13 +209,9 @@ class Registers:
         with self._explained():
             self.bus.write(self.unit, address, value)
 
-    def _read(self, address: int, count: int = 1) -> list[int]:
-        with self._explained():
-            return self.bus.read(self.unit, address, count)
-
     def state(self) -> State:
         """What the drive is doing: one read of its first status word."""
-        return self._state_of(self._read(self.profile.address("status_word_1"))[0])
+        return self._state_of(self.read_words(self.profile.address("status_word_1"))[0])
 
     def _state_of(self, word: int) -> State:
         try:

@@ -160,7 +160,7 @@ def read(session: Session, wanted: tuple[str, ...]) -> None:
         for text in wanted:
             place = names.resolve(profile, text)
             if isinstance(place, int):
-                [word] = drive.bus.read(drive.unit, place)
+                [word] = drive.read_words(place)
                 rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}"])
             else:
                 known = drive.describe(place)

@@ -27,6 +27,12 @@ EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
 """What the process ends with, by whose fault it is; 0 is done, 1 anything else."""
 
 
+class _Declined(click.ClickException):
+    """What moves a motor was not wanted, or nobody was there to be asked."""
+
+    exit_code = 2
+
+
 @dataclass
 class Session:
     """The options before the command.
@@ -86,9 +92,9 @@ class Session:
         if yes:
             return
         if not sys.stdin.isatty():
-            raise click.UsageError("without a terminal this needs --yes; nothing was sent")
+            raise _Declined("without a terminal this needs --yes; nothing was sent")
         if not click.confirm("Is the machine clear, and shall it be done?", err=True):
-            raise click.UsageError("nothing was sent")
+            raise _Declined("nothing was sent")
 
 
 pass_session = click.make_pass_decorator(Session)

@@ -38,8 +38,10 @@ def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
         try:
             answer = bus.transact(unit, pdu)
         except drivebus.Refused as error:
-            if error.raw:
-                _show_frame(session, "answer", error.raw)
+            _show_frame(session, "answer", error.raw)
+            if session.profile is not None:
+                name, meaning = drivebus.Profile.find(session.profile).exception(error.code)
+                session.out.say(f"{'':<7}{session.profile} means by it: {name}, {meaning}")
             raise
         _show_frame(session, "answer", _framed(bytes([unit]) + answer))
 

@@ -1,0 +1,107 @@
+"""Time is the line's clock: in virtual time, limits and ramps hold to the character, and nobody waits for them.
+
+The last resorts are here too, because they take long where a second is a second.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import drivebus
+from drivebus import Bus, Drive, Simulator, State
+
+CONTROL, FORWARD, STOP, COAST = 0x2000, 1, 5, 6
+LOOK = 0.1  # seconds that two reads and the pause between them take at 19200, amply
+
+
+def commands(simulator: Simulator) -> list[int]:
+    return [value for _, address, value in simulator.drive(1).writes() if address == CONTROL]
+
+
+def test_a_ramp_takes_what_the_drive_is_set_to(virtual_bus: Bus, virtual_drive: Drive) -> None:
+    virtual_drive.write("P00.11", 10.0)  # seconds to P00.03 = 50 Hz
+    virtual_drive.run(hz=10.0)
+    began = virtual_bus.now()
+    virtual_drive.wait_for_speed(tolerance=0.0, timeout=60)
+    assert virtual_bus.now() - began == pytest.approx(2.0, abs=LOOK)
+
+
+def test_waiting_ends_when_the_time_is_up(virtual_bus: Bus, virtual_drive: Drive) -> None:
+    virtual_drive.write({"P00.11": 1000.0, "P00.12": 1000.0})
+    virtual_drive.run(hz=50.0)
+    for wait, message in (
+        (virtual_drive.wait_for_speed, "its setpoint was not reached within 30 s"),
+        (virtual_drive.wait_until_stopped, "it did not stop within 30 s"),
+    ):
+        began = virtual_bus.now()
+        with pytest.raises(drivebus.Unconfirmed, match=message):
+            wait(timeout=30)
+        assert virtual_bus.now() - began == pytest.approx(30.0, abs=LOOK)
+
+
+def test_a_command_that_has_no_effect_is_unconfirmed(
+    virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive
+) -> None:
+    # Commands from a bus that is not this one: the state words say "communication", and the drive does not obey.
+    virtual_drive.write("P00.02", 1)
+    began = virtual_bus.now()
+    with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent to unit 1.*stopped"):
+        virtual_drive.run(hz=10.0, confirm=2.0)
+    assert virtual_bus.now() - began == pytest.approx(2.0, abs=2 * LOOK)
+    virtual_drive.run(hz=10.0, confirm=0)
+    assert virtual.drive(1).state == "stopped"
+
+
+def test_a_trip_instead_of_a_start_is_told(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual.drive(1).load = 4.0
+    virtual_drive.write("P00.11", 0.1)
+    with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent.*OL1"):
+        virtual_drive.run(hz=50.0)
+    assert commands(virtual) == [FORWARD]
+
+
+def test_a_motor_that_cannot_be_stopped_is_told_to_stop_again_and_then_to_coast(
+    virtual: Simulator, virtual_drive: Drive
+) -> None:
+    with pytest.raises(drivebus.Unconfirmed, match="coast"), virtual_drive.running(hz=5.0):
+        virtual.line.drop_answers(1000)
+    assert commands(virtual) == [FORWARD, STOP, STOP, STOP, COAST]
+
+
+def test_the_first_error_is_kept_when_stopping_fails_too(virtual: Simulator, virtual_drive: Drive) -> None:
+    def fail() -> None:
+        virtual.line.drop_answers(1000)
+        raise RuntimeError("inside")
+
+    with pytest.raises(RuntimeError, match="inside") as reason, virtual_drive.running(hz=5.0):
+        fail()
+    notes = getattr(reason.value, "__notes__", ["could not be stopped"])  # Python 3.10 has no notes
+    assert "could not be stopped" in notes[0]
+    assert commands(virtual)[-1] == COAST
+
+
+def test_a_start_that_is_not_confirmed_is_stopped(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.write("P00.02", 1)
+    with pytest.raises(drivebus.Unconfirmed), virtual_drive.running(hz=5.0):
+        pytest.fail("the block must not be entered")
+    assert commands(virtual) == [FORWARD, STOP]
+
+
+def test_an_hour_is_nothing(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> None:
+    with virtual_drive.running(hz=10.0):
+        virtual_bus.sleep(3600)
+        assert virtual_drive.status().state is State.FORWARD
+    virtual.advance(3600)
+    assert virtual.now() > 7200
+    assert virtual_drive.status().state is State.STOPPED
+
+
+def test_a_refused_look_does_not_make_a_command_refused(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.run(hz=5.0)
+    # The stop's own answer, as it is; then a refusal of the look at the state. GD350 manual, chapter 9.4.7.
+    virtual.line.answer_with(bytes.fromhex("01 06 20 00 00 05 42 09"))
+    refusal = bytes.fromhex("01 83 06 C1 32")
+    virtual.line.answer_with(refusal)
+    virtual_drive.stop()
+    assert [data for _, who, data in virtual.line.trace() if who == "unit"].count(refusal) == 1
+    assert commands(virtual) == [FORWARD, STOP]
