@@ -149,17 +149,22 @@ class Bus:
             checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
         )
 
-    def write(self, unit: int, address: int, value: int | Sequence[int]) -> None:
+    def write(self, unit: int, address: int, value: int | Sequence[int], *, urgent: bool = False) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
 
         Nothing here asks what stands at *address*: a word in a command register moves the motor.
 
+        After a request that was left open, a unit is first asked to return an echo; if it does not, the write is not
+        sent. An *urgent* write does without it and overtakes all who wait: that is for a stop, which a drive may hear
+        although nothing is heard of it. Its confirmation may belong to the very same write, sent before.
+
         Raises:
             NotAllowed: An argument is out of range, or the bus is read-only. Nothing was sent.
-            NoAnswer, BadAnswer, PortError: The unit may have taken it all the same.
+            NoAnswer, BadAnswer, PortError: The unit may have taken it all the same, unless the error's `started` is
+                None: then it was not sent.
             Refused: The unit did not take it.
         """
-        self._native.write(checks.unit(unit), checks.address(address), checks.payload(value))
+        self._native.write(checks.unit(unit), checks.address(address), checks.payload(value), urgent=urgent)
 
     def broadcast(self, address: int, value: int | Sequence[int]) -> None:
         """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once."""

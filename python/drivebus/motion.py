@@ -21,6 +21,9 @@ POLL_INTERVAL = 0.02
 
 _LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
 
+_HALTS = ("stop", "coast", "jog_stop")
+"""Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
+
 
 class Seen(NamedTuple):
     """The status words of one read, decoded."""
@@ -57,6 +60,7 @@ class Motion(Registers):
             NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum. Nothing was sent
                 that moves it.
             Refused: The drive did not start.
+            NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
             Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
@@ -75,8 +79,11 @@ class Motion(Registers):
 
         Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end.
 
+        It overtakes whatever else waits for the line, and goes out to a drive that seems deaf too.
+
         Raises:
             Refused: The drive did not take it; it still runs if it ran.
+            PortError: It could not be sent.
             Unconfirmed: It was sent, and the drive does not show it.
         """
         self._halt("stop", confirm)
@@ -160,7 +167,7 @@ class Motion(Registers):
         if seen.source not in (ControlSource.COMMUNICATION, None):
             raise NotAllowed(
                 f"unit {self.unit} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
-                "was sent. prepare_control() sets it to obey the bus",
+                "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
                 unit=self.unit,
             )
         return seen
@@ -204,8 +211,10 @@ class Motion(Registers):
             else:
                 self._write(place, setpoint)
         try:
-            self._write(address, words)
+            self._write(address, words, urgent=name in _HALTS)
         except _LINE_ERRORS as error:
+            if error.started is None:
+                raise
             raise Unconfirmed(
                 f"{name} was sent to unit {self.unit} and not confirmed ({error}); it may have acted. "
                 f"{self._seen_last()}. It was not repeated",

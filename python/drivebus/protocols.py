@@ -28,8 +28,8 @@ class BusProtocol(Protocol):
     def read_stamped(self, unit: int, address: int, count: int = 1, /) -> tuple[list[int], float, float]:
         """Reads words, with the Unix times of request and answer."""
 
-    def write(self, unit: int, address: int, value: int | Sequence[int], /) -> None:
-        """Writes one word or several. Sent once."""
+    def write(self, unit: int, address: int, value: int | Sequence[int], /, *, urgent: bool = False) -> None:
+        """Writes one word or several. Sent once; *urgent* before all who wait, whatever is in doubt."""
 
 
 class ProfileProtocol(Protocol):

@@ -205,9 +205,9 @@ class Registers:
                 ended=error.ended,
             ) from None
 
-    def _write(self, address: int, value: int | Sequence[int]) -> None:
+    def _write(self, address: int, value: int | Sequence[int], *, urgent: bool = False) -> None:
         with self._explained():
-            self.bus.write(self.unit, address, value)
+            self.bus.write(self.unit, address, value, urgent=urgent)
 
     def state(self) -> State:
         """What the drive is doing: one read of its first status word."""

@@ -86,15 +86,30 @@ def reset(session: Session, yes: bool) -> None:
 
 
 @click.command()
+@click.option("--store", is_flag=True, help="Keep it in EEPROM: the drive still obeys the bus after it was off.")
+@yes_option
+@pass_session
+def prepare(session: Session, store: bool, yes: bool) -> None:
+    """Set the drive to obey the bus, and show what is set. Writes only what differs; moves nothing by itself."""
+    with session.drive() as drive:
+        session.ask_if_running(drive, "this takes its commands and its setpoint from the bus", yes)
+        rows = [
+            [item.code, item.actual, item.wanted, item.verified, item.label] for item in drive.prepare_control(store)
+        ]
+        session.out.rows(["code", "is", "needed", "verified", "label"], rows)
+
+
+@click.command()
 @click.argument(
     "assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=names.complete_assignment
 )
 @click.option("--store", is_flag=True, help="Keep parameters in EEPROM, whose write life is limited.")
+@yes_option
 @pass_session
-def write(session: Session, assignments: tuple[str, ...], store: bool) -> None:
+def write(session: Session, assignments: tuple[str, ...], store: bool, yes: bool) -> None:
     """Write registers or parameters. Parameters go to RAM: lost when the drive is switched off, unless --store.
 
-    All are checked before the first is sent. Registers that move the motor are refused.
+    All are checked before the first is sent. Command registers are refused. While the motor turns, it asks first.
     """
     asked = [names.parse_assignment(text) for text in assignments]
     with session.drive() as drive:
@@ -107,6 +122,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool) -> None:
                     "`raw` sends what you type"
                 )
             wanted[place] = value
+        session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
         drive.write(wanted, store=store)
         rows = []
         for name in wanted:
@@ -132,4 +148,4 @@ def _done(session: Session, drive: drivebus.Drive, command: str) -> None:
         session.out.say(f"unit {drive.unit}: {status}")
 
 
-COMMANDS = [run, stop, coast, jog, reset, write]
+COMMANDS = [run, stop, coast, jog, reset, prepare, write]

@@ -86,6 +86,11 @@ class Session:
         with self.drive() as drive:
             return drivebus.Profile.find(drive.profile.name)
 
+    def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
+        """As `ask`, but only where the motor turns: what stands still is not moved by *what*."""
+        if drive.state().running:
+            self.ask(f"The motor turns; {what}", yes)
+
     def ask(self, what: str, yes: bool) -> None:
         """Says that *what* moves a motor, and goes on only if that is wanted."""
         click.echo(f"{what} (unit {self.unit} on {self.port}).", err=True)
