@@ -337,6 +337,21 @@ class TestASpoiltLine:
         assert isinstance(unknown.value.__cause__, drivebus.NoAnswer)
         assert unknown.value.request == bytes.fromhex("01 06 20 00 00 05 42 09")
 
+    def test_a_stop_is_sent_to_a_drive_that_seems_deaf(self, simulator: Simulator, obedient: Drive) -> None:
+        obedient.run(hz=5.0)
+        simulator.line.drop_answers(1000)
+        with pytest.raises(NoAnswer):
+            obedient.status()
+        with pytest.raises(NoAnswer) as unsent:
+            obedient.setpoint = 10.0
+        assert unsent.value.started is None, "only an echo was sent, and it did not come back"
+        with pytest.raises(Unconfirmed):
+            obedient.stop()
+        stops = [value for _, address, value in simulator.drive(1).writes() if address == 0x2000]
+        assert stops == [1, 5]
+        simulator.line.clear()
+        obedient.wait_until_stopped(timeout=20)
+
     def test_a_late_answer_is_never_taken_for_another(self, simulator: Simulator, bus: Bus) -> None:
         simulator.line.delay_answers(0.3, 1)
         with pytest.raises(drivebus.NoAnswer):

@@ -145,6 +145,23 @@ class TestMoving:
         assert result.exit_code == 2
         assert "prepare_control" in result.stderr
 
+    def test_prepare_sets_the_drive_to_obey(self, pty: drivebus.Simulator) -> None:
+        before = rows(run("--json", "info", port=pty.port))[0]
+        set_now = {row["code"]: row["is"] for row in rows(run("--json", "prepare", port=pty.port))}
+        assert (before["obeys_bus"], set_now["P00.01"], set_now["P00.06"]) == (False, 2, 8)
+        assert rows(run("--json", "info", port=pty.port))[0]["obeys_bus"] is True
+        assert pty.drive(1).eeprom_writes == 0
+
+    def test_what_changes_a_motor_that_turns_asks_first(self, pty: drivebus.Simulator) -> None:
+        assert run("write", "set_frequency=5", port=pty.port).exit_code == 0
+        run("prepare", port=pty.port)
+        assert run("run", "--yes", port=pty.port).exit_code == 0
+        result = run("write", "set_frequency=20", port=pty.port)
+        assert (result.exit_code, "--yes" in result.stderr) == (2, True)
+        assert pty.drive(1).register(0x2001) == 500
+        assert run("write", "set_frequency=20", "--yes", port=pty.port).exit_code == 0
+        assert pty.drive(1).register(0x2001) == 2000
+
     def test_write_checks_before_it_sends(self) -> None:
         result = run("write", "P00.11=5.0", "P00.12=9999")
         assert result.exit_code == 2

@@ -12,7 +12,7 @@ use core::ops::Range;
 use core::time::Duration;
 
 use crate::answer::Expected;
-use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
+use crate::frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::request::AnswerLength;
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::{Instant, UnitAddress};
@@ -53,6 +53,8 @@ pub struct Framer {
     silence: Duration,
     last: Option<Instant>,
     expect: Option<(UnitAddress, Expected)>,
+    /// The request whose answer is looked for: an adapter may send it back to us.
+    own: Adu,
     /// Silence was seen and could not decide: only new bytes can.
     settled: bool,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
@@ -84,6 +86,7 @@ impl Framer {
             silence,
             last: None,
             expect: None,
+            own: Adu::new(),
             settled: false,
             overrun: false,
         }
@@ -95,6 +98,13 @@ impl Framer {
     pub fn expect(&mut self, unit: UnitAddress, expected: Expected) {
         self.clear();
         self.expect = Some((unit, expected));
+        self.own = Adu::new();
+    }
+
+    /// As [`expect`](Self::expect); `own` is the request, which may come back before its answer.
+    pub(crate) fn expect_answer_to(&mut self, own: &Adu, unit: UnitAddress, expected: Expected) {
+        self.expect(unit, expected);
+        self.own = *own;
     }
 
     /// From now on takes frames of any unit and both directions; what is held is dropped.
@@ -225,6 +235,9 @@ impl Framer {
         let here = &self.bytes[start..end];
         let fresh = start == 0 && !self.overrun;
 
+        if expected && let Some(look) = self.look_for_own(here, closed) {
+            return look;
+        }
         let mut error = None;
         let mut incomplete = false;
         for len in self.lengths(here, expected, fresh).into_iter().flatten() {
@@ -245,10 +258,27 @@ impl Framer {
         if patient || (incomplete && !closed) { Look::Wait } else { Look::Nothing(error) }
     }
 
+    /// Whether `here` is our own request, sent back to us.
+    ///
+    /// Told by its bytes, not by its length: eight bytes of a longer answer have a right CRC by chance, once in 65 536.
+    fn look_for_own(&self, here: &[u8], closed: bool) -> Option<Look> {
+        let own = self.own.as_bytes();
+        let (_, expected) = self.expect?;
+        if own.is_empty() || expected.repeats_request() {
+            None
+        } else if here.starts_with(own) {
+            Some(Look::Frame(own.len()))
+        } else if own.starts_with(here) && !closed {
+            Some(Look::Wait)
+        } else {
+            None
+        }
+    }
+
     /// Lengths that a frame beginning with `here` can have, shortest first. One that is longer than what is there
     /// means: wait.
     fn lengths(&self, here: &[u8], expected: bool, fresh: bool) -> [Option<usize>; 3] {
-        let [first, second] = self.known_lengths(here);
+        let [first, second] = if expected { Self::answer_lengths(here) } else { self.known_lengths(here) };
         let more = Some(here.len() + 1).filter(|&more| more <= MAX_ADU);
         let asked = match *here {
             [_, function, ..] if expected && function & EXCEPTION_BIT == 0 => self.answer_len().or(more),
@@ -260,6 +290,18 @@ impl Framer {
         let mut lengths = [first, second, asked];
         lengths.sort_unstable();
         lengths
+    }
+
+    /// Length that the answer looked for has by its own account.
+    fn answer_lengths(here: &[u8]) -> [Option<usize>; 2] {
+        let len = match *here {
+            [_, READ_HOLDING, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
+            [_] | [_, READ_HOLDING] => here.len() + 1,
+            [_, WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => SHORT_ADU,
+            [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
+            _ => return [None, None],
+        };
+        [Some(len).filter(|&len| len <= MAX_ADU), None]
     }
 
     /// Lengths that a frame of either direction can have whose function is known.

@@ -242,7 +242,7 @@ impl Master {
                 if now >= self.silent_at() {
                     self.framer.expect_anything();
                     if let Destination::Unit(unit) = job.destination {
-                        self.framer.expect(unit, job.expected);
+                        self.framer.expect_answer_to(&self.request, unit, job.expected);
                     }
                     self.own_echo = if self.strips_echo { self.request.as_bytes().len() } else { 0 };
                     self.state = State::Sending { job };

@@ -112,6 +112,25 @@ fn a_whole_frame_that_cannot_be_right_is_wrong_at_once() {
     assert!(matches!(master.poll(at(5_000)), Some(Event::Wrong { error: AnswerError::Echo { .. }, .. })));
 }
 
+/// Eight bytes are the length of a request, and of most answers; these eight are the beginning of a longer one.
+#[test]
+fn a_beginning_with_a_right_crc_by_chance_is_not_the_answer() {
+    let mut words_sent = [0x1234, 0x5600, 0, 9, 9, 9];
+    let crc = crc16(&[0x01, 0x03, 0x0C, 0x12, 0x34, 0x56]).to_le_bytes();
+    words_sent[1] |= u16::from(crc[0]);
+    words_sent[2] = u16::from(crc[1]) << 8;
+    let answer = words(1, &words_sent);
+    assert!(Frame::parse(&answer[..8]).is_ok());
+
+    let mut master = waiting(&Request::read(0x3000, 6).unwrap());
+    for (index, byte) in answer.iter().enumerate() {
+        assert_eq!(master.poll(at(5_000)), None, "after {index} bytes");
+        master.receive(at(5_000), &[*byte]);
+    }
+    let Some(Event::Answer(Answer::Read { words, .. })) = master.poll(at(5_000)) else { panic!("an answer") };
+    assert_eq!(words, Words::new(&words_sent));
+}
+
 #[test]
 fn a_corrupt_answer_is_told_when_silence_shows_that_nothing_follows() {
     let mut master = waiting(&Request::read(0x2100, 1).unwrap());
