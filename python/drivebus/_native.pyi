@@ -171,11 +171,14 @@ class Profile:
         """Every register name and parameter code, registers first, in address order."""
     def monitor_names(self) -> list[str]:
         """The registers that `Drive.monitor()` reads when it is given no names."""
+    def fault_history(self) -> list[str]:
+        """The parameters that hold the last faults, the latest first."""
     def describe(self, name: str, /) -> dict[str, Any]:
         """All that is known of one register or parameter.
 
         Keys: `name`, `code` (or None), `label`, `kind` (`"register"` or `"parameter"`), `address`, `unit`, `scale`,
-        `signed`, `low`, `high`, `default`, `access` (`"rw"`, `"ro"`, `"run"`, `"stop"`, `"unknown"`),
+        `signed`, `low`, `high`, `low_from`, `high_from` (parameters that narrow the range), `default`,
+        `access` (`"rw"`, `"ro"`, `"run"`, `"stop"`, `"unknown"`),
         `choices` ({int: str}), `bits` ({str: {int: str}} or None), `source`, `verified`, `note`.
         """
     def address(self, name: str, /, *, store: bool | None = None) -> int:

@@ -5,6 +5,7 @@ A profile is data; the package ships some, and `Profile.load` reads one from a f
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,9 +16,6 @@ from drivebus.errors import NotAllowed
 from drivebus.values import Description, Fault
 
 __all__ = ["Profile", "identify", "profiles"]
-
-_MAXIMUM_FREQUENCY = "P00.03"
-_FAULT_HISTORY = ("P07.27", "P07.28", "P07.29", "P07.30", "P07.31", "P07.32")
 
 
 class Profile:
@@ -37,7 +35,7 @@ class Profile:
         Raises:
             NotAllowed: There is none of that name; the message has the closest.
         """
-        return cls(_native.Profile.builtin(name))
+        return _builtin(name)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Profile:
@@ -157,21 +155,15 @@ class Profile:
     @property
     def maximum_frequency(self) -> str | None:
         """The parameter that holds the drive's highest output frequency, if it has one."""
-        return _MAXIMUM_FREQUENCY if _MAXIMUM_FREQUENCY in self._names else None
+        return self.describe("set_frequency").high_from
 
     @property
     def fault_history(self) -> tuple[str, ...]:
         """The parameters that hold the last faults, the latest first."""
-        return tuple(code for code in _FAULT_HISTORY if code in self._names)
+        return tuple(self._native.fault_history())
 
     def __repr__(self) -> str:
         return f"Profile({self.name!r})"
-
-    def __eq__(self, other: object) -> bool:
-        return self._native is other._native if isinstance(other, Profile) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(id(self._native))
 
 
 def profiles() -> list[str]:
@@ -186,6 +178,12 @@ def identify(code: int) -> str | None:
         if family is not None:
             return family
     return None
+
+
+@functools.cache
+def _builtin(name: str) -> Profile:
+    # One object each: equal profiles are the same profile.
+    return Profile(_native.Profile.builtin(name))
 
 
 def _fault(row: dict[str, Any]) -> Fault:

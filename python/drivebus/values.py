@@ -225,7 +225,8 @@ class Description:
         unit: Engineering unit, empty for a plain number.
         scale: Raw counts per unit.
         signed: Whether the word is two's complement.
-        low, high: Range in engineering units; None where it is not known, text where another parameter limits it.
+        low, high: Range in engineering units; None where it is not known.
+        low_from, high_from: The parameters that narrow the range on a given drive, or None.
         default: Factory value, or None.
         access: `"rw"`, `"ro"`, `"run"` (writable at any time), `"stop"` (only while stopped) or `"unknown"`.
         choices: Labels of the values, or None.
@@ -245,6 +246,8 @@ class Description:
     signed: bool
     low: Any
     high: Any
+    low_from: str | None
+    high_from: str | None
     default: Any
     access: str
     choices: Mapping[int, str] | None

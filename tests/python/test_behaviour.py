@@ -11,7 +11,7 @@ import threading
 import pytest
 
 import drivebus
-from drivebus import Bus, Choice, ControlSource, Drive, Simulator, State
+from drivebus import Bus, Choice, ControlSource, Drive, NoAnswer, Simulator, State, Unconfirmed
 
 CONTROL, SETPOINT, ACCELERATION = 0x2000, 0x2001, 0x000B
 RAM = 0x8000

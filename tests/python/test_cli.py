@@ -148,7 +148,7 @@ class TestMoving:
     def test_prepare_sets_the_drive_to_obey(self, pty: drivebus.Simulator) -> None:
         before = rows(run("--json", "info", port=pty.port))[0]
         set_now = {row["code"]: row["is"] for row in rows(run("--json", "prepare", port=pty.port))}
-        assert (before["obeys_bus"], set_now["P00.01"], set_now["P00.06"]) == (False, 2, 8)
+        assert (before["obeys_bus"], set_now["P00.01"]["value"], set_now["P00.06"]["value"]) == (False, 2, 8)
         assert rows(run("--json", "info", port=pty.port))[0]["obeys_bus"] is True
         assert pty.drive(1).eeprom_writes == 0
 

@@ -39,6 +39,7 @@ pub struct Profile {
     pub(crate) states: BTreeMap<State, u16>,
     pub(crate) control: Vec<Control>,
     pub(crate) monitor: Vec<u16>,
+    pub(crate) fault_history: Vec<u16>,
     pub(crate) faults: BTreeMap<u16, Fault>,
     pub(crate) exceptions: BTreeMap<u8, Exception>,
 }
@@ -176,6 +177,11 @@ impl Profile {
     /// What must be set before the drive obeys the bus, in order.
     pub fn control(&self) -> &[Control] {
         &self.control
+    }
+
+    /// Where the drive keeps its last faults, the latest first; none where it keeps none.
+    pub fn fault_history(&self) -> impl Iterator<Item = &Entry> {
+        self.fault_history.iter().filter_map(|&address| self.entry_at(address))
     }
 
     /// The registers that a monitor shows when it is not told what to show.

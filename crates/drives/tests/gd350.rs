@@ -292,6 +292,8 @@ fn rules_are_those_of_the_manual() {
     assert_eq!(control, [("P00.01", 2, true), ("P00.02", 0, false), ("P00.06", 8, true)]);
     let monitor: Vec<u16> = profile.monitor().map(Entry::address).collect();
     assert_eq!(monitor, (0x3000..=0x3016).collect::<Vec<u16>>());
+    let history: Vec<u16> = profile.fault_history().map(Entry::address).collect();
+    assert_eq!(history, (0x071B..=0x0720).collect::<Vec<u16>>());
 }
 
 #[test]

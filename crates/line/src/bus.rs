@@ -121,6 +121,11 @@ impl Bus {
         self.closed.load(Ordering::Acquire)
     }
 
+    /// Whether the line's clock is a simulation's.
+    pub fn is_virtual(&self) -> bool {
+        matches!(self.clock, Clock::Virtual)
+    }
+
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);

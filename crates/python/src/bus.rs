@@ -18,6 +18,8 @@ use crate::open;
 #[derive(Debug)]
 pub(crate) struct Bus {
     core: CoreBus,
+    /// Where the line's clock stands on the calendar, if it is a simulation's: it began when the bus was opened.
+    virtual_ahead: Option<f64>,
 }
 
 #[pymethods]
@@ -45,7 +47,9 @@ impl Bus {
         let options =
             BusOptions { timeout: duration("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
         let core = open::patiently(py, move || CoreBus::open(opener, options))?;
-        Ok(Self { core: core.map_err(|error| port_error(&error))? })
+        let core = core.map_err(|error| port_error(&error))?;
+        let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
+        Ok(Self { core, virtual_ahead })
     }
 
     #[getter]
@@ -245,9 +249,8 @@ impl Bus {
     }
 
     fn unix_clock(&self, py: Python<'_>) -> UnixClock {
-        let line = py.detach(|| to_seconds(self.core.now()));
-        let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64();
-        UnixClock { ahead: unix - line }
+        let ahead = self.virtual_ahead.unwrap_or_else(|| unix_time() - py.detach(|| to_seconds(self.core.now())));
+        UnixClock { ahead }
     }
 }
 
@@ -281,6 +284,10 @@ impl UnixClock {
     fn at(&self, moment: Instant) -> f64 {
         to_seconds(moment) + self.ahead
     }
+}
+
+fn unix_time() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 fn to_seconds(moment: Instant) -> f64 {

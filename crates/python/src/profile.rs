@@ -64,6 +64,10 @@ impl Profile {
         self.0.monitor().map(Entry::name).collect()
     }
 
+    fn fault_history(&self) -> Vec<&str> {
+        self.0.fault_history().map(Entry::name).collect()
+    }
+
     #[pyo3(signature = (name, /))]
     fn describe<'py>(&self, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
         let py = name.py();
@@ -88,6 +92,8 @@ impl Profile {
         dict.set_item("signed", quantity.is_signed())?;
         dict.set_item("low", value(quantity.low()))?;
         dict.set_item("high", value(quantity.high()))?;
+        dict.set_item("low_from", quantity.low_from())?;
+        dict.set_item("high_from", quantity.high_from())?;
         dict.set_item("default", value(entry.default_raw().map(|raw| entry.decode(raw))))?;
         dict.set_item("access", entry.access().name())?;
         dict.set_item("choices", quantity.choices())?;

@@ -53,6 +53,7 @@ pub(super) fn profile(files: &Files) -> Result<Profile, ProfileError> {
         states: codes::<State>(&manifest.state.codes),
         control: control(file, &entries, &manifest)?,
         monitor: addresses(file, &entries, &manifest.monitor.registers)?,
+        fault_history: addresses(file, &entries, &manifest.faults.history)?,
         faults: rows::faults(&files.faults)?,
         exceptions: exceptions(file, &manifest)?,
         by_address: entries.by_address,

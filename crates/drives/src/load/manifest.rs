@@ -25,6 +25,8 @@ pub(super) struct Manifest {
     pub(super) control: Vec<Spanned<Control>>,
     pub(super) monitor: Monitor,
     #[serde(default)]
+    pub(super) faults: Faults,
+    #[serde(default)]
     pub(super) exceptions: Vec<Spanned<Exception>>,
     #[serde(default)]
     pub(super) bits: BTreeMap<Spanned<String>, Vec<Spanned<Field>>>,
@@ -124,6 +126,12 @@ pub(super) struct Control {
 #[serde(deny_unknown_fields)]
 pub(super) struct Monitor {
     pub(super) registers: Vec<Spanned<String>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Faults {
+    pub(super) history: Vec<Spanned<String>>,
 }
 
 #[derive(Deserialize)]
