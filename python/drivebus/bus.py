@@ -237,10 +237,11 @@ class Bus:
     def _ask_profile(self, unit: int) -> Profile:
         [code] = self.read(unit, _identification_address())
         family = identify(code)
-        if family is None:
+        if family not in profiles():
+            known = "no list names" if family is None else f"is a {family}, a family without a profile yet"
             raise NotAllowed(
-                f"unit {unit} identifies itself as {code:#06x}, which no profile knows; "
-                f"if you know that it behaves like one of {', '.join(profiles())}, give profile=…",
+                f"unit {unit} identifies itself as {code:04X}H, which {known}; the registers and command codes of another "
+                f"family may differ. If you know that it behaves like one of {', '.join(profiles())}, give profile=…",
                 unit=unit,
             )
         return Profile.builtin(family)

@@ -235,3 +235,15 @@ class TestProfileFolders:
     def test_a_name_that_is_none(self) -> None:
         with pytest.raises(NotAllowed, match=r"gd355.*gd350"):
             Profile.builtin("gd355")
+
+
+@pytest.mark.parametrize(
+    ("code", "says"), [(0x010A, "010AH, which is a gd300"), (0x4242, "4242H, which no list names")]
+)
+def test_a_family_without_a_profile_is_not_taken_for_another(
+    virtual: Simulator, virtual_bus: Bus, code: int, says: str
+) -> None:
+    body = bytes([1, 3, 2, *code.to_bytes(2, "big")])
+    virtual.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+    with pytest.raises(NotAllowed, match=says):
+        virtual_bus.drive(1)
