@@ -161,9 +161,7 @@ impl Owner {
             Ok(_) => self.resync.answered(unit),
             Err(error) if matches!(error.failure, Failure::Refused { .. }) => self.resync.answered(unit),
             Err(mut error) => {
-                // Two time-outs of silence are over. A unit that never answered an echo may not know it; then what it
-                // owed is taken as never to come.
-                if matches!(error.failure, Failure::NoAnswer { .. }) && self.resync.may_not_echo(unit) {
+                if matches!(error.failure, Failure::NoAnswer { .. }) && self.resync.is_given_up(unit, error.ended) {
                     self.master.release(unit);
                 }
                 error.sent = None;
@@ -186,6 +184,13 @@ impl Owner {
             Destination::Broadcast => None,
         };
         self.learn(ask, &result);
+        if let (Some(unit), Err(error)) = (unit, &result)
+            && self.master.in_quarantine(unit)
+            && !matches!(ask.request, Request::Echo { .. })
+            && let Some(sent) = error.sent
+        {
+            self.resync.left_open(unit, sent);
+        }
         let sent = match &result {
             Ok(_) => true,
             Err(error) => error.sent.is_some(),

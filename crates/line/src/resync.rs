@@ -1,15 +1,24 @@
-//! The way back after a request was left open: which word to echo, and which units are known to echo at all.
+//! The way back after a request was left open: which word to echo, and what to do about units that do not echo.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::Duration;
 
-use drivebus_rtu::UnitAddress;
+use drivebus_rtu::{Instant, UnitAddress};
+
+/// How long a unit that never answered an echo may owe an answer. After that it is taken as never to come.
+///
+/// All drives known here document the echo (08H/0000), so this is for other devices on the line, which are silent on it.
+/// What is assumed of them: an answer comes within this time or never.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Words for probes, and what is known of the units that were probed.
 #[derive(Debug)]
 pub(crate) struct Resync {
     word: u16,
     echoed: BTreeSet<UnitAddress>,
+    /// When the latest request went out that a unit left open.
+    open: BTreeMap<UnitAddress, Instant>,
 }
 
 impl Resync {
@@ -19,7 +28,7 @@ impl Resync {
     pub(crate) fn new() -> Self {
         // Where the words begin is random: another program on this line must not use the same ones.
         let [a, b, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
-        Self { word: u16::from_le_bytes([a, b]), echoed: BTreeSet::new() }
+        Self { word: u16::from_le_bytes([a, b]), echoed: BTreeSet::new(), open: BTreeMap::new() }
     }
 
     /// A word that no open echo carries.
@@ -31,11 +40,18 @@ impl Resync {
     /// `unit` answered an echo, with the word or with a refusal.
     pub(crate) fn answered(&mut self, unit: UnitAddress) {
         self.echoed.insert(unit);
+        self.open.remove(&unit);
     }
 
-    /// Whether silence of `unit` on an echo may mean that it does not know 08H, rather than that it is not there.
-    pub(crate) fn may_not_echo(&self, unit: UnitAddress) -> bool {
-        !self.echoed.contains(&unit)
+    /// `unit` did not answer a request that went out at `sent`.
+    pub(crate) fn left_open(&mut self, unit: UnitAddress, sent: Instant) {
+        self.open.insert(unit, sent);
+    }
+
+    /// Whether `unit`, which is silent on an echo at `now`, is one that does not know 08H and owes nothing any more.
+    pub(crate) fn is_given_up(&self, unit: UnitAddress, now: Instant) -> bool {
+        let since = self.open.get(&unit).copied().unwrap_or(Instant::ZERO);
+        !self.echoed.contains(&unit) && now.saturating_duration_since(since) >= PATIENCE
     }
 }
 

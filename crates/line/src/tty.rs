@@ -111,7 +111,9 @@ impl Tty {
     }
 
     fn lost(&self, error: &io::Error) -> PortError {
-        let message = format!("the port is gone ({error}); plug the adapter in again, then open the port again");
+        let message = format!(
+            "the port is gone ({error}); plug the adapter in again; a bus opens the port again at its next call"
+        );
         PortError::new(PortErrorKind::Lost, &self.name, message)
     }
 }

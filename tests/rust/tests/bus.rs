@@ -115,6 +115,26 @@ fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
     assert_eq!(error.sent, None, "{error}");
 }
 
+/// The first time-out on a bus, of a drive that stalls for longer than two time-outs: it may store to EEPROM.
+#[test]
+fn an_answer_that_comes_after_the_echo_was_given_up_is_never_the_next_ones() {
+    let (simulator, bus) = pair();
+    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let identify = Request::read(0x2103, 1).unwrap();
+    simulator.wire().delay_answers(Duration::from_millis(1_200), 1);
+    bus.call(unit(1).into(), &identify, once, &mut || false, &mut |_| ()).unwrap_err();
+    let mut seen = Vec::new();
+    for _ in 0..4 {
+        let mut take = |answer: Answer<'_>| {
+            if let Answer::Read { words, .. } = answer {
+                seen.extend(words.iter());
+            }
+        };
+        let _ = bus.call(unit(1).into(), &Request::read(STATE, 1).unwrap(), once, &mut || false, &mut take);
+    }
+    assert!(!seen.is_empty() && seen.iter().all(|&word| word == 3), "{seen:04X?}");
+}
+
 #[test]
 fn a_silent_unit_costs_its_own_time_outs_only() {
     let (simulator, bus) = pair();
