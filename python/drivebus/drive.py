@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, Refused, Unconfirmed
+from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.motion import POLL_INTERVAL, Motion, Seen
 from drivebus.values import Control, ControlItem, Fault, Snapshot, State, Status
 
@@ -116,7 +116,8 @@ class Drive(Motion):
         """
 
         def stopped(status: Status) -> bool:
-            return not status.state.running and status.frequency <= _STANDSTILL
+            known = status.state is not State.UNKNOWN
+            return known and not status.state.running and status.frequency <= _STANDSTILL
 
         return self._wait(stopped, "it did not stop", timeout)
 
@@ -140,13 +141,18 @@ class Drive(Motion):
     def prepare_control(self, store: bool = False) -> Control:
         """Sets the drive to obey the bus, writing only what differs, and returns what `check_control` then says.
 
-        To RAM: the drive forgets it when it is switched off, unless *store*.
+        To RAM: the drive forgets it when it is switched off, unless *store*, which keeps what this object set in RAM
+        before as well.
 
         Raises:
             Refused: The drive kept what it had; parameters are locked while it runs, or by a password.
             Unconfirmed: It took the values, and shows others.
         """
-        needed = {item.code: item.wanted for item in self.check_control() if not item.ok}
+        needed = {
+            item.code: item.wanted
+            for item in self.check_control()
+            if not item.ok or (store and item.code in self._in_ram)
+        }
         if needed:
             self.write(needed, store=store)
         control = self.check_control()
@@ -165,7 +171,9 @@ class Drive(Motion):
         block is raised as it is; if the drive could not be stopped either, its note says so.
 
         Raises:
-            NotAllowed, Refused, Unconfirmed: From `run`, or from stopping when the block itself went well.
+            NotAllowed, Refused, NoAnswer, BadAnswer, PortError: From `run`, which was not sent or not taken: the
+                motor is left as it was. Or from stopping, when the block itself went well.
+            Unconfirmed: From `run`, after which it is stopped; or from stopping.
         """
         started = False
         try:
@@ -173,7 +181,8 @@ class Drive(Motion):
             started = True
             yield self
         except BaseException as reason:
-            if started or not isinstance(reason, (NotAllowed, Refused)):
+            # Of this package's errors, only Unconfirmed comes from `run` once its command was sent.
+            if started or isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError):
                 failure = self._stop_by_all_means()
                 if failure is not None and hasattr(reason, "add_note"):
                     reason.add_note(f"and unit {self.unit} could not be stopped: {failure}")

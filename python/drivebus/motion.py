@@ -107,7 +107,7 @@ class Motion(Registers):
         if self.look().state is not State.FAULT:
             return
         self._command("reset_fault")
-        self._confirm("reset_fault", lambda seen: seen.state is not State.FAULT, confirm)
+        self._confirm("reset_fault", lambda seen: seen.state not in (State.FAULT, State.UNKNOWN), confirm)
 
     @property
     def setpoint(self) -> float:
@@ -190,6 +190,8 @@ class Motion(Registers):
         first: list[float] = []
 
         def shows(seen: Seen) -> bool:
+            if seen.state is State.UNKNOWN:
+                return False
             if not seen.state.running:
                 return True
             first.append(self._running_frequency())

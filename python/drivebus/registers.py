@@ -105,7 +105,8 @@ class Registers:
         """Writes one value, or several from a mapping, each by its own request, sent once.
 
         Parameters go to RAM: they are lost when the drive is switched off. With *store* they go to EEPROM, whose
-        write life is limited; one that already has its value is not written again.
+        write life is limited; one that already has its value is not written again. A drive tells the value in force,
+        not where it is kept: what this object wrote to RAM is stored, what somebody else did is taken for stored.
 
         All checks come first: if one value is not allowed, none is sent.
 
@@ -164,9 +165,10 @@ class Registers:
     def _write_one(self, item: _Planned, store: bool) -> None:
         is_parameter = self.profile.describe(item.name).kind == "parameter"
         if not is_parameter or not store:
-            self._write(item.address, item.raw)
             if is_parameter:
+                # Before it is sent: the drive may take it although its answer is lost.
                 self._in_ram.add(item.name)
+            self._write(item.address, item.raw)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
         in_force = self.read_words(self.profile.address(item.name))[0]

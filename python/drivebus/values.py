@@ -229,7 +229,7 @@ class Description:
         low_from, high_from: The parameters that narrow the range on a given drive, or None.
         default: Factory value, or None.
         access: `"rw"`, `"ro"`, `"run"` (writable at any time), `"stop"` (only while stopped) or `"unknown"`.
-        choices: Labels of the values, or None.
+        choices: Labels of the values, empty if they have none.
         bits: Labels of bit fields, or None.
         source: The document that says so.
         verified: Whether that document is about this very family.
@@ -250,7 +250,7 @@ class Description:
     high_from: str | None
     default: Any
     access: str
-    choices: Mapping[int, str] | None
+    choices: Mapping[int, str]
     bits: Mapping[str, Mapping[int, str]] | None
     source: str
     verified: bool

@@ -303,6 +303,24 @@ class TestParameters:
         simulator.drive(1).power_cycle()
         assert drive.read("P00.11") == 3.0
 
+    def test_what_ram_may_have_taken_is_stored_all_the_same(self, simulator: Simulator, drive: Drive) -> None:
+        simulator.line.drop_answers(1)
+        with pytest.raises(NoAnswer):
+            drive.write("P00.11", 3.0)
+        drive.write("P00.11", 3.0, store=True)
+        simulator.drive(1).power_cycle()
+        assert drive.read("P00.11") == 3.0
+
+    def test_control_that_was_set_in_ram_can_be_stored(self, simulator: Simulator, drive: Drive) -> None:
+        drive.prepare_control()
+        assert simulator.drive(1).eeprom_writes == 0
+        drive.prepare_control(store=True)
+        simulator.drive(1).power_cycle()
+        assert drive.check_control()
+        writes = simulator.drive(1).eeprom_writes
+        drive.prepare_control(store=True)
+        assert simulator.drive(1).eeprom_writes == writes == 2  # P00.02 was right from the start
+
     def test_storing_in_a_loop_is_warned_about(self, drive: Drive) -> None:
         for seconds in (1.0, 2.0, 3.0, 4.0):
             drive.write("P00.11", seconds, store=True)

@@ -87,6 +87,23 @@ def test_a_start_that_is_not_confirmed_is_stopped(virtual: Simulator, virtual_dr
     assert commands(virtual) == [FORWARD, STOP]
 
 
+def test_a_start_that_was_not_sent_is_not_stopped(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.run(hz=5.0)
+    virtual.line.drop_answers(1000)
+    with pytest.raises(drivebus.NoAnswer), virtual_drive.running(hz=10.0):
+        pytest.fail("the block must not be entered")
+    assert commands(virtual) == [FORWARD], "a motor that somebody else runs is left alone"
+
+
+def test_a_state_nobody_knows_is_not_a_stop(virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
+    virtual_drive.run(hz=5.0)
+    monkeypatch.setattr(Drive, "_state_of", lambda *_: State.UNKNOWN)
+    with pytest.raises(drivebus.Unconfirmed, match=r"stop was sent to unit 1.*unknown"):
+        virtual_drive.stop()
+    with pytest.raises(drivebus.Unconfirmed, match="it did not stop"):
+        virtual_drive.wait_until_stopped(timeout=30)
+
+
 def test_an_hour_is_nothing(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> None:
     with virtual_drive.running(hz=10.0):
         virtual_bus.sleep(3600)
