@@ -152,6 +152,48 @@ class TestMoving:
         assert rows(run("--json", "info", port=pty.port))[0]["obeys_bus"] is True
         assert pty.drive(1).eeprom_writes == 0
 
+    def test_what_was_not_stored_is_said(self, pty: drivebus.Simulator) -> None:
+        run("prepare", port=pty.port)
+        result = run("prepare", "--store", port=pty.port)
+        assert "P00.01, P00.02, P00.06: the value was there already" in result.stderr
+        result = run("write", "--store", "P00.11=5.0", port=pty.port)
+        assert (result.stderr, pty.drive(1).eeprom_writes) == ("", 1)
+        result = run("write", "--store", "P00.11=5.0", port=pty.port)
+        assert ("P00.11: the value was there already" in result.stderr, pty.drive(1).eeprom_writes) == (True, 1)
+
+    def test_the_environment_answers_no_question(self, pty: drivebus.Simulator) -> None:
+        run("prepare", port=pty.port)
+        result = run("run", "5", port=pty.port, env={"DRIVEBUS_RUN_YES": "1"})
+        assert (result.exit_code, pty.drive(1).state) == (2, "stopped")
+        run("write", "P00.11=5.0", port=pty.port, env={"DRIVEBUS_WRITE_STORE": "1"})
+        assert pty.drive(1).eeprom_writes == 0
+
+    def test_options_stand_in_the_environment(self) -> None:
+        env = {"DRIVEBUS_PORT": SIM, "DRIVEBUS_UNIT": "1", "DRIVEBUS_BAUD": "9600", "DRIVEBUS_JSON": "1"}
+        facts, *_ = rows(run("info", port=None, env={**env, "DRIVEBUS_FORMAT": "8N2", "DRIVEBUS_PROFILE": "gd350"}))
+        assert facts["line"] == "9600 8N2"
+
+    def test_one_name_takes_one_value(self) -> None:
+        result = run("write", "P00.11=5.0", "000BH=6.0")
+        assert (result.exit_code, "P00.11 is given twice" in result.stderr) == (2, True)
+
+    def test_a_jog_that_was_not_sent_is_not_ended(self, pty: drivebus.Simulator) -> None:
+        pty.line.drop_answers(1000)
+        assert run("--profile", "gd350", "jog", "--yes", port=pty.port).exit_code == 3
+        assert pty.drive(1).writes() == []
+
+    def test_a_jog_whose_end_is_lost_coasts(self, monkeypatch: pytest.MonkeyPatch, pty: drivebus.Simulator) -> None:
+        run("prepare", port=pty.port)
+        end = drivebus.Drive.jog_stop
+
+        def deaf(drive: drivebus.Drive) -> None:
+            pty.line.drop_answers(1000)
+            end(drive)
+
+        monkeypatch.setattr(drivebus.Drive, "jog_stop", deaf)
+        assert run("jog", "--seconds", "0", "--yes", port=pty.port).exit_code == 7
+        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8, 6]
+
     def test_what_changes_a_motor_that_turns_asks_first(self, pty: drivebus.Simulator) -> None:
         assert run("write", "set_frequency=5", port=pty.port).exit_code == 0
         run("prepare", port=pty.port)
@@ -199,6 +241,25 @@ class TestMoving:
         pty.drive(1).trip("OL1")
         assert command("faults")["mnemonic"] == "OL1"
         assert command("reset", "--yes")["fault"] is None
+
+
+class TestUnits:
+    @pytest.mark.parametrize("units", ["0-3", "3-1", "240-248", "1-99999999999", "a", "1,,2"])
+    def test_units_that_cannot_be_are_refused(self, units: str) -> None:
+        result = run("scan", "--units", units)
+        assert result.exit_code == 2
+        assert "Traceback" not in result.output
+
+    @pytest.mark.parametrize("unit", ["00", "F8"])
+    def test_raw_goes_to_one_unit(self, unit: str) -> None:
+        result = run("raw", unit, "06 20 00 00 05", "--yes")
+        assert (result.exit_code, result.stdout) == (2, "")
+
+    def test_raw_names_the_unit_it_writes_to(self) -> None:
+        assert "(unit 9 on" in run("raw", "09 06 20 00 00 05").stderr
+
+    def test_sim_takes_a_unit_once(self) -> None:
+        assert run("sim", "--units", "1=gd350,1=gd350", port=None).exit_code == 2
 
 
 class TestExitCodes:

@@ -15,6 +15,10 @@ from drivebus.cli.session import Session, exit_code, parse_format
 __all__ = ["cli", "main"]
 
 
+# Each variable is named by hand: with click's own prefix, DRIVEBUS_RUN_YES would answer the question before a motor
+# starts, and DRIVEBUS_WRITE_STORE would wear EEPROM, without a word on the command line.
+
+
 class _Commands(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
 
@@ -30,7 +34,6 @@ class _Commands(click.Group):
 @click.group(
     cls=_Commands,
     context_settings={
-        "auto_envvar_prefix": "DRIVEBUS",
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
     },
@@ -39,9 +42,21 @@ class _Commands(click.Group):
     "DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
-    "--port", "-p", metavar="PORT", help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, sim://gd350."
+    "--port",
+    "-p",
+    metavar="PORT",
+    envvar="DRIVEBUS_PORT",
+    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, sim://gd350.",
 )
-@click.option("--baud", "-b", type=click.IntRange(1), default=19200, show_default=True, help="Bits per second.")
+@click.option(
+    "--baud",
+    "-b",
+    type=click.IntRange(1),
+    default=19200,
+    show_default=True,
+    envvar="DRIVEBUS_BAUD",
+    help="Bits per second.",
+)
 @click.option(
     "--format",
     "line_format",
@@ -53,10 +68,19 @@ class _Commands(click.Group):
     callback=parse_format,
     help="Data bits, parity, stop bits.",
 )
-@click.option("--unit", "-u", type=click.IntRange(1, 247), default=1, show_default=True, help="Unit address.")
+@click.option(
+    "--unit",
+    "-u",
+    type=click.IntRange(1, 247),
+    default=1,
+    show_default=True,
+    envvar="DRIVEBUS_UNIT",
+    help="Unit address.",
+)
 @click.option(
     "--profile",
     metavar="NAME",
+    envvar="DRIVEBUS_PROFILE",
     shell_complete=complete_profile,
     help="Family or folder; without it, the drive is asked.",
 )

@@ -65,13 +65,23 @@ def jog(session: Session, seconds: float, reverse: bool, yes: bool) -> None:
         try:
             drive.jog(reverse=reverse)
             drive.bus.sleep(seconds)
-        except (drivebus.NotAllowed, drivebus.Refused):
+        except BaseException as reason:
+            # Of this package's errors, only Unconfirmed comes once the jog was sent.
+            if isinstance(reason, drivebus.Unconfirmed) or not isinstance(reason, drivebus.DrivebusError):
+                _end_jog(drive)
             raise
-        except BaseException:
-            drive.jog_stop()
-            raise
-        drive.jog_stop()
+        _end_jog(drive)
         _done(session, drive, "jog")
+
+
+def _end_jog(drive: drivebus.Drive) -> None:
+    """Ends the jog, or coasts where that fails or is interrupted: nobody else would end it."""
+    try:
+        drive.jog_stop()
+    except BaseException:
+        click.echo("The end of the jog is not confirmed; the motor is told to coast.", err=True)
+        drive.coast()
+        raise
 
 
 @click.command()
@@ -93,9 +103,12 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
     """Set the drive to obey the bus, and show what is set. Writes only what differs; moves nothing by itself."""
     with session.drive() as drive:
         session.ask_if_running(drive, "this takes its commands and its setpoint from the bus", yes)
+        before = drive.check_control()
         rows = [
             [item.code, item.actual, item.wanted, item.verified, item.label] for item in drive.prepare_control(store)
         ]
+        if store:
+            _say_kept([item.code for item in before if item.ok])
         session.out.rows(["code", "is", "needed", "verified", "label"], rows)
 
 
@@ -121,14 +134,29 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, yes: bool
                     f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; "
                     "`raw` sends what you type"
                 )
+            if place in wanted:
+                raise drivebus.NotAllowed(f"{place} is given twice; nothing was sent")
             wanted[place] = value
         session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
+        parameters = [name for name in wanted if drive.describe(name).kind == "parameter"] if store else []
+        before = {name: drive.read(name) for name in parameters}
         drive.write(wanted, store=store)
         rows = []
         for name in wanted:
             known = drive.describe(name)
             rows.append([known.name, drive.read(name), known.unit, known.label])
+        _say_kept([name for name, value, *_ in rows if name in before and before[name] == value])
         session.out.rows(["name", "value", "unit", "label"], rows)
+
+
+def _say_kept(names: list[str]) -> None:
+    """Says that *names* were not stored, because they have their values: where from, a drive does not tell."""
+    if names:
+        click.echo(
+            f"{', '.join(names)}: the value was there already, so EEPROM was not written. If it came from an earlier "
+            "write to RAM, it is lost with power: switch the drive off and on, then store again.",
+            err=True,
+        )
 
 
 def _done(session: Session, drive: drivebus.Drive, command: str) -> None:

@@ -69,6 +69,8 @@ def parse_units(text: str) -> list[int]:
         if match is None:
             raise click.UsageError(f"{part!r} is no unit address; write 1-247, or a list such as 1-31,40")
         first, last = int(match[1]), int(match[2] or match[1])
+        if not 1 <= first <= last <= 247:
+            raise click.UsageError(f"units {part.strip()!r} are out of range or turned round; allowed is 1-247")
         units.extend(range(first, last + 1))
     return units
 

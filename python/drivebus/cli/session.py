@@ -87,13 +87,14 @@ class Session:
             return drivebus.Profile.find(drive.profile.name)
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
-        """As `ask`, but only where the motor turns: what stands still is not moved by *what*."""
-        if drive.state().running:
+        """As `ask`, but only where the motor turns, or may: what stands still is not moved by *what*."""
+        state = drive.state()
+        if state.running or state is drivebus.State.UNKNOWN:
             self.ask(f"The motor turns; {what}", yes)
 
-    def ask(self, what: str, yes: bool) -> None:
-        """Says that *what* moves a motor, and goes on only if that is wanted."""
-        click.echo(f"{what} (unit {self.unit} on {self.port}).", err=True)
+    def ask(self, what: str, yes: bool, unit: int | None = None) -> None:
+        """Says that *what* moves the motor of *unit* (None: the one of the options), and goes on only if wanted."""
+        click.echo(f"{what} (unit {unit or self.unit} on {self.port}).", err=True)
         if yes:
             return
         if not sys.stdin.isatty():

@@ -31,9 +31,11 @@ def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
     if not 2 <= len(body) <= 254:
         raise click.UsageError(f"{len(body)} bytes is no request; give the unit, then 1..253 bytes of PDU, and no CRC")
     unit, pdu = body[0], body[1:]
+    if not 1 <= unit <= 247:
+        raise click.UsageError(f"unit {unit:02X} is nobody who answers; the first byte is the unit, 01..F7")
     with session.bus() as bus:
         if pdu[0] not in _READS:
-            session.ask(f"Function {pdu[0]:02X}H writes to unit {unit}, which can move its motor", yes)
+            session.ask(f"Function {pdu[0]:02X}H writes, which can move the motor", yes, unit)
         _show_frame(session, "sent", _framed(body))
         try:
             answer = bus.transact(unit, pdu)
@@ -103,6 +105,8 @@ def _simulated(text: str) -> dict[int, str]:
         unit, equals, family = part.strip().partition("=")
         if not equals or not unit.isdecimal():
             raise click.UsageError(f"{part!r} is no simulated drive; write UNIT=FAMILY, such as 1=gd350")
+        if int(unit) in units:
+            raise click.UsageError(f"unit {unit} is given twice; give each unit once, such as 1=gd350,2=gd350")
         units[int(unit)] = family
     return units
 
