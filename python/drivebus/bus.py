@@ -240,8 +240,9 @@ class Bus:
         if family not in profiles():
             known = "no list names" if family is None else f"is a {family}, a family without a profile yet"
             raise NotAllowed(
-                f"unit {unit} identifies itself as {code:04X}H, which {known}; the registers and command codes of another "
-                f"family may differ. If you know that it behaves like one of {', '.join(profiles())}, give profile=…",
+                f"unit {unit} identifies itself as {code:04X}H, which {known}; the registers and command codes of "
+                "another family may differ. If you know that it behaves like one of "
+                f"{', '.join(profiles())}, give profile=…",
                 unit=unit,
             )
         return Profile.builtin(family)
