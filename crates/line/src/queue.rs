@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use crate::clock::monotonic;
+
 /// How often somebody who waits looks up to see whether it should still wait.
 pub(crate) const LOOK_UP: Duration = Duration::from_millis(50);
 
@@ -49,10 +51,13 @@ impl Queue {
         };
         waiting.order.insert(place, ticket);
         let turn = Turn { queue: self, ticket };
+        // Turns that pass wake everybody, so that time alone says when to look up.
+        let mut look_up = monotonic() + LOOK_UP;
         while waiting.order.front() != Some(&ticket) {
-            let (guard, waited) = self.moved.wait_timeout(waiting, LOOK_UP).unwrap_or_else(PoisonError::into_inner);
-            waiting = guard;
-            if waited.timed_out() {
+            let left = look_up.saturating_duration_since(monotonic());
+            waiting = self.moved.wait_timeout(waiting, left).unwrap_or_else(PoisonError::into_inner).0;
+            if monotonic() >= look_up {
+                look_up = monotonic() + LOOK_UP;
                 // The caller may need locks of its own to answer.
                 drop(waiting);
                 if give_up() {
@@ -108,6 +113,26 @@ mod tests {
             drop(first);
         });
         assert_eq!(order.try_iter().collect::<Vec<_>>(), [2, 4, 0, 1, 3]);
+    }
+
+    #[test]
+    fn who_waits_looks_up_though_turns_pass_all_the_time() {
+        let queue = Queue::default();
+        let first = queue.turn(false, &mut || false).unwrap();
+        let (gave_up, passing) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let queue = &queue;
+            scope.spawn(move || {
+                assert!(queue.turn(false, &mut || true).is_none());
+                gave_up.send(()).unwrap();
+            });
+            // Ends only when the one who waits has given up.
+            while passing.try_recv() == Err(mpsc::TryRecvError::Empty) {
+                queue.moved.notify_all();
+                std::thread::yield_now();
+            }
+        });
+        drop(first);
     }
 
     #[test]
