@@ -84,6 +84,17 @@ impl Clock {
             Self::RealBehind { behind: system.saturating_duration_since(line) }
         }
     }
+
+    /// Now on the line's clock; `None` where only the line knows.
+    fn now(self) -> Option<Instant> {
+        match self {
+            Self::Real { ahead } => Some(monotonic() + ahead),
+            Self::RealBehind { behind } => {
+                Some(Instant::ZERO + monotonic().saturating_duration_since(Instant::ZERO + behind))
+            }
+            Self::Virtual => None,
+        }
+    }
 }
 
 impl Bus {
@@ -172,7 +183,7 @@ impl Bus {
             }
             if let Err(error) = owner.reopen() {
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.unwrap_or_else(|| unsent(&ask, Failure::Port(error), owner.now())));
+                return Err(lost.unwrap_or_else(|| unsent(&ask, Failure::Port(error), self.now_of(&owner))));
             }
             if attempt > 0
                 && let Destination::Unit(unit) = destination
@@ -194,7 +205,7 @@ impl Bus {
                 done => return done,
             }
         }
-        Err(unsent(&ask, Failure::Closed, owner.now()))
+        Err(unsent(&ask, Failure::Closed, self.now_of(&owner)))
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
@@ -204,13 +215,7 @@ impl Bus {
 
     /// Now, on the line's clock.
     pub fn now(&self) -> Instant {
-        match self.clock {
-            Clock::Real { ahead } => monotonic() + ahead,
-            Clock::RealBehind { behind } => {
-                Instant::ZERO + monotonic().saturating_duration_since(Instant::ZERO + behind)
-            }
-            Clock::Virtual => self.lock().now(),
-        }
+        self.clock.now().unwrap_or_else(|| self.lock().now())
     }
 
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
@@ -243,6 +248,11 @@ impl Bus {
     /// What the user should know about the line, such as a setting that did not reach the wire.
     pub fn notes(&self) -> Vec<String> {
         self.lock().line().map(|line| line.notes()).unwrap_or_default()
+    }
+
+    /// As [`now`](Self::now), for who holds the owner; also while no line is open.
+    fn now_of(&self, owner: &Owner) -> Instant {
+        self.clock.now().unwrap_or_else(|| owner.now())
     }
 
     fn given_up(&self) -> Failure {

@@ -50,8 +50,10 @@ pub struct Done {
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
     opener: Opener,
-    format: SerialFormat,
     master: Master,
+    /// What the user knows about the adapter.
+    given_echo: AdapterEcho,
+    /// What is known by now about the one that is plugged in.
     echo: AdapterEcho,
     resync: Resync,
     pub(crate) stats: Stats,
@@ -69,8 +71,8 @@ impl Owner {
         let mut owner = Self {
             line: None,
             opener,
-            format,
-            master: Master::new(&format),
+            master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
+            given_echo: echo,
             echo,
             resync: Resync::new(),
             stats: Stats::default(),
@@ -101,6 +103,8 @@ impl Owner {
     pub(crate) fn reopen(&mut self) -> Result<(), PortError> {
         if self.line.is_none() {
             let line = (self.opener)()?;
+            // What was asked over the lost port may be answered over the new one.
+            self.master.reopened(line.now());
             self.take_line(line);
             self.stats.reconnects += 1;
         }
@@ -108,18 +112,19 @@ impl Owner {
     }
 
     fn take_line(&mut self, line: Box<dyn Line>) {
-        self.master = if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&self.format) };
-        if self.echo == AdapterEcho::Auto && !line.may_echo() {
-            self.echo = AdapterEcho::Absent;
-        }
+        self.echo = match self.given_echo {
+            AdapterEcho::Auto if !line.may_echo() => AdapterEcho::Absent,
+            given => given,
+        };
         self.master.strip_echo(self.echo == AdapterEcho::Present);
         self.line = Some(line);
     }
 
     /// Makes sure that what comes next can only be the answer to what is asked next.
     ///
-    /// Nothing is sent where nothing is in doubt. Otherwise a fresh word is echoed; and before a write, whose answer
-    /// looks like the request, one word is read if it is not known yet whether the adapter echoes.
+    /// Nothing is sent where nothing is in doubt. Before a request whose answer may look like it, a write or the echo
+    /// sent here included, one word is read if it is not known yet whether the adapter echoes. Then a unit that left a
+    /// request open is sent a fresh word.
     pub(crate) fn prepare(&mut self, ask: &Ask<'_>, give_up: &mut dyn FnMut() -> bool) -> Result<(), Box<CallError>> {
         let Destination::Unit(unit) = ask.destination else {
             return Ok(());
@@ -127,25 +132,31 @@ impl Owner {
         if ask.urgent {
             return Ok(());
         }
-        if self.master.in_quarantine(unit) && !matches!(ask.request, Request::Echo { .. }) {
+        let echoes = matches!(ask.request, Request::Echo { .. });
+        if self.echo == AdapterEcho::Auto
+            && (ask.request.expected().may_repeat_request() || self.master.in_quarantine(unit))
+        {
+            self.look_for_echo(ask, give_up)?;
+        }
+        if self.master.in_quarantine(unit) && !echoes {
             self.probe(unit, ask, give_up)?;
         }
-        if self.echo == AdapterEcho::Auto && ask.request.expected().repeats_request() {
-            if let Ok(read) = Request::read(0, 1) {
-                let look = Ask { request: &read, ..*ask };
-                match self.exchange(&look, give_up, &mut |_| ()) {
-                    Err(error) if matches!(error.failure, Failure::Port(_) | Failure::Interrupted) => {
-                        return Err(error);
-                    }
-                    // Any other outcome has shown whether the request came back.
-                    _ => {}
-                }
-            }
-            if self.master.in_quarantine(unit) && !matches!(ask.request, Request::Echo { .. }) {
-                self.probe(unit, ask, give_up)?;
-            }
-        }
         Ok(())
+    }
+
+    /// Reads one word to see whether the request comes back; what is answered does not matter.
+    fn look_for_echo(&mut self, ask: &Ask<'_>, give_up: &mut dyn FnMut() -> bool) -> Result<(), Box<CallError>> {
+        let Ok(read) = Request::read(0, 1) else {
+            return Ok(());
+        };
+        match self.exchange(&Ask { request: &read, urgent: true, ..*ask }, give_up, &mut |_| ()) {
+            // It has not shown anything: the next request's echo could be taken for its answer.
+            Err(mut error) if self.echo == AdapterEcho::Auto => {
+                error.sent = None;
+                Err(error)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Sends a fresh word to `unit` and waits for it to come back.
@@ -223,14 +234,21 @@ impl Owner {
         if self.echo != AdapterEcho::Auto {
             return;
         }
-        let listened = match result {
-            Ok(_) => true,
-            Err(error) => error.sent.is_some() && !matches!(error.failure, Failure::Port(_) | Failure::Interrupted),
-        };
+        let length = Adu::request(ask.destination, ask.request).as_bytes().len();
+        // Bytes that are no frame might be an echo that did not survive.
+        let clean = usize::try_from(tally.noise).is_ok_and(|noise| noise < length)
+            && match result {
+                Ok(_) => true,
+                Err(error) => match error.failure {
+                    Failure::Refused { .. } => true,
+                    Failure::NoAnswer { .. } => error.raw.is_empty(),
+                    _ => false,
+                },
+            };
         if tally.own_echo > 0 {
             self.echo = AdapterEcho::Present;
             self.master.strip_echo(true);
-        } else if listened && !ask.request.expected().repeats_request() {
+        } else if clean && ask.destination != Destination::Broadcast && !ask.request.expected().may_repeat_request() {
             self.echo = AdapterEcho::Absent;
         }
     }
@@ -257,7 +275,19 @@ impl Owner {
             return Err(failed(ask, Failure::NotBegun(error), sent, now, &[]));
         }
         let mut buffer = [0; 256];
+        let mut came = 0..0;
+        // What is queued already is no answer, and the line was not silent while it came.
+        match line.receive(&mut buffer, now) {
+            Ok(count) => came = 0..count,
+            Err(error) => {
+                master.abort();
+                return Err(failed(ask, Failure::Port(error), sent, now, &[]));
+            }
+        }
+        now = line.now();
         loop {
+            // Whatever there is no room for now, there is after polling.
+            came.start += master.receive(now, &buffer[came.clone()]);
             if let Some(event) = master.poll(now) {
                 let no_answer = Failure::NoAnswer { timeout, attempts: 1 };
                 match (event, sent) {
@@ -309,15 +339,15 @@ impl Owner {
                     return Err(failed(ask, Failure::Interrupted, sent, now, &[]));
                 }
             }
+            if !came.is_empty() {
+                continue;
+            }
             let wake = now + LOOK_UP;
             let until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
             let received = line.receive(&mut buffer, until);
             now = line.now();
             match received {
-                // The framer's room is twice this buffer, and it was just emptied of all but one frame.
-                Ok(count) => {
-                    master.receive(now, &buffer[..count]);
-                }
+                Ok(count) => came = 0..count,
                 Err(error) => {
                     master.abort();
                     return Err(failed(ask, Failure::Port(error), sent, now, &[]));

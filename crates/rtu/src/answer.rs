@@ -238,9 +238,11 @@ impl Expected {
         matches!(self.0, Kind::Echo { .. })
     }
 
-    /// Whether the right answer is the request once more, so that an adapter's own echo cannot be told from it.
-    pub const fn repeats_request(&self) -> bool {
-        matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. })
+    /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.
+    ///
+    /// Always so for 06H and 08H; of a custom function nobody knows.
+    pub const fn may_repeat_request(&self) -> bool {
+        matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::Custom { .. })
     }
 
     /// `frame` as the answer of `unit` that was expected, or as the refusal of it.

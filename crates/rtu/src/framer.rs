@@ -101,10 +101,14 @@ impl Framer {
         self.own = Adu::new();
     }
 
-    /// As [`expect`](Self::expect); `own` is the request, which may come back before its answer.
-    pub(crate) fn expect_answer_to(&mut self, own: &Adu, unit: UnitAddress, expected: Expected) {
-        self.expect(unit, expected);
+    /// After [`expect`](Self::expect): `own`, the request, may come back before its answer.
+    pub(crate) fn expect_own(&mut self, own: &Adu) {
         self.own = *own;
+    }
+
+    /// The request has come back, or will not any more.
+    pub(crate) fn forget_own(&mut self) {
+        self.own = Adu::new();
     }
 
     /// From now on takes frames of any unit and both directions; what is held is dropped.
@@ -235,7 +239,7 @@ impl Framer {
         let here = &self.bytes[start..end];
         let fresh = start == 0 && !self.overrun;
 
-        if expected && let Some(look) = self.look_for_own(here, closed) {
+        if expected && let Some(look) = self.look_for_own(here) {
             return look;
         }
         let mut error = None;
@@ -261,14 +265,14 @@ impl Framer {
     /// Whether `here` is our own request, sent back to us.
     ///
     /// Told by its bytes, not by its length: eight bytes of a longer answer have a right CRC by chance, once in 65 536.
-    fn look_for_own(&self, here: &[u8], closed: bool) -> Option<Look> {
+    /// Like an answer it may come in lumps.
+    fn look_for_own(&self, here: &[u8]) -> Option<Look> {
         let own = self.own.as_bytes();
-        let (_, expected) = self.expect?;
-        if own.is_empty() || expected.repeats_request() {
+        if own.is_empty() {
             None
         } else if here.starts_with(own) {
             Some(Look::Frame(own.len()))
-        } else if own.starts_with(here) && !closed {
+        } else if own.starts_with(here) {
             Some(Look::Wait)
         } else {
             None

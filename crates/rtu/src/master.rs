@@ -32,9 +32,10 @@ pub struct Master {
     framer: Framer,
     state: State,
     request: Adu,
-    /// Bytes of the request that the adapter has not yet sent back, while it is known to do so.
-    own_echo: usize,
+    /// The adapter is known to send every request back.
     strips_echo: bool,
+    /// It has yet to send back the one in flight.
+    echo_due: bool,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
     quarantine: UnitSet,
@@ -129,8 +130,8 @@ impl Master {
             framer: Framer::new(silence),
             state: State::Idle,
             request: Adu::new(),
-            own_echo: 0,
             strips_echo: false,
+            echo_due: false,
             busy: None,
             quarantine: UnitSet([0; 4]),
             tally: Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 },
@@ -212,8 +213,7 @@ impl Master {
         if !bytes.is_empty() {
             self.busy = self.busy.max(Some(now));
         }
-        let own = self.strip_own_echo(bytes);
-        own + self.framer.receive(now, &bytes[own..])
+        self.framer.receive(now, bytes)
     }
 
     /// When to call [`poll`](Self::poll) next although no byte came; `None` while only bytes can change anything.
@@ -242,9 +242,12 @@ impl Master {
                 if now >= self.silent_at() {
                     self.framer.expect_anything();
                     if let Destination::Unit(unit) = job.destination {
-                        self.framer.expect_answer_to(&self.request, unit, job.expected);
+                        self.framer.expect(unit, job.expected);
+                        if self.strips_echo || !job.expected.may_repeat_request() {
+                            self.framer.expect_own(&self.request);
+                        }
                     }
-                    self.own_echo = if self.strips_echo { self.request.as_bytes().len() } else { 0 };
+                    self.echo_due = self.strips_echo;
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {
@@ -283,6 +286,14 @@ impl Master {
         };
         self.state = State::Idle;
         sent
+    }
+
+    /// Says that the line was opened anew: a request in flight is given up, quarantines stay, and nothing is known of
+    /// what was on the line before `now`.
+    pub fn reopened(&mut self, now: Instant) {
+        self.abort();
+        self.framer.expect_anything();
+        self.busy = self.busy.max(Some(now));
     }
 
     /// Whether `unit` left a request open, so that only an echo may be sent to it.
@@ -324,6 +335,11 @@ impl Master {
                     self.quarantine.insert(unit);
                     return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
                 }
+                Step::Frame(range) if self.is_own_echo(&range, expected) => {
+                    self.tally.own_echo += 1;
+                    self.echo_due = false;
+                    self.framer.forget_own();
+                }
                 Step::Frame(range) => {
                     let Ok(frame) = Frame::parse(self.framer.held(range.clone())) else {
                         continue;
@@ -332,13 +348,13 @@ impl Master {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => self.count_other(range, unit),
                         // In quarantine another word than the fresh one is a late answer to an earlier echo.
                         Err(AnswerError::Echo { .. }) if self.in_quarantine(unit) => self.tally.late += 1,
-                        Err(_) if !expected.repeats_request() && self.is_own(range.clone()) => {
-                            self.tally.own_echo += 1;
-                        }
                         outcome => {
                             self.state = State::Idle;
-                            // The answer proves that the request has left the wire, whatever was computed.
-                            self.busy = Some(now);
+                            // The answer proves that the request has left the wire, whatever was computed; but not one
+                            // that may be late.
+                            if expected.is_echo() || !self.in_quarantine(unit) {
+                                self.busy = Some(now);
+                            }
                             return Some(self.settle(unit, expected, outcome.err(), range));
                         }
                     }
@@ -377,16 +393,14 @@ impl Master {
         }
     }
 
-    fn is_own(&self, range: core::ops::Range<usize>) -> bool {
-        self.framer.held(range) == self.request.as_bytes()
+    /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
+    fn is_own_echo(&self, range: &core::ops::Range<usize>, expected: Expected) -> bool {
+        (self.echo_due || !expected.may_repeat_request()) && self.framer.held(range.clone()) == self.request.as_bytes()
     }
 
     /// Counts a whole frame that is not the answer.
     fn count_other(&mut self, range: core::ops::Range<usize>, unit: UnitAddress) {
-        let frame = self.framer.held(range.clone());
-        if frame == self.request.as_bytes() {
-            self.tally.own_echo += 1;
-        } else if frame.first() == Some(&unit.get()) && self.in_quarantine(unit) {
+        if self.framer.held(range).first() == Some(&unit.get()) && self.in_quarantine(unit) {
             self.tally.late += 1;
         } else {
             self.tally.foreign += 1;
@@ -395,32 +409,16 @@ impl Master {
 
     /// Counts what came while nothing was waited for.
     fn count_strays(&mut self, now: Instant) {
+        let broadcast = matches!(self.state, State::Turnaround { .. });
         while let Some(step) = self.framer.step(now) {
             match step {
+                Step::Frame(range) if broadcast && self.framer.held(range.clone()) == self.request.as_bytes() => {
+                    self.tally.own_echo += 1;
+                }
                 Step::Frame(_) => self.tally.late += 1,
                 Step::Skipped { range, .. } => self.tally.noise += count(&range),
             }
         }
-    }
-
-    /// Takes the adapter's echo of the request off the front of `bytes` and returns its length.
-    fn strip_own_echo(&mut self, bytes: &[u8]) -> usize {
-        if self.own_echo == 0 || !matches!(self.state, State::Waiting { .. } | State::Turnaround { .. }) {
-            return 0;
-        }
-        let request = self.request.as_bytes();
-        let rest = &request[request.len() - self.own_echo..];
-        let same = bytes.iter().zip(rest).take_while(|(came, sent)| came == sent).count();
-        if same < bytes.len().min(rest.len()) {
-            // Something else is on the line: what follows is judged as it is.
-            self.own_echo = 0;
-        } else {
-            self.own_echo -= same;
-            if self.own_echo == 0 {
-                self.tally.own_echo += 1;
-            }
-        }
-        same
     }
 }
 

@@ -1,0 +1,8 @@
+//! The bus on a hostile line: what other masters were seen to get wrong, and what this one must do instead.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+
+mod echoing;
+mod masters_table;
+mod odd;
+mod scripted;

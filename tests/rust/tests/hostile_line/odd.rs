@@ -1,0 +1,71 @@
+//! Rarer troubles: babble, slow units that do not echo, ports that vanish.
+
+use drivebus_line::{CallOptions, Failure, PortErrorKind};
+use drivebus_rtu::Request;
+
+use crate::scripted::{Rig, after, millis, prompt, right, unit};
+
+#[test]
+fn an_answer_after_much_babble_loses_no_byte() {
+    for (babble, piece) in [(300, 600), (505, 600), (600, 600), (400, 100), (500, 150), (1_000, 90)] {
+        let rig = Rig::new(move |_, request| {
+            let bytes = [vec![0xFF; babble], right(request)].concat();
+            bytes.chunks(piece).map(|piece| (millis(5), piece.to_vec())).collect()
+        });
+        assert_eq!(rig.read(100, 100).unwrap(), (100..200).collect::<Vec<u16>>(), "{babble} bytes by {piece}");
+        assert_eq!(rig.bus.stats().noise_bytes, u64::try_from(babble).unwrap());
+    }
+}
+
+/// A unit that answers everything, in order, a second too late: also the echo, which then looks unknown to it.
+#[test]
+fn a_unit_that_never_echoed_in_time_gives_no_answer_to_another_question() {
+    let rig = Rig::new(|_, request| after(millis(1_250), &right(request)));
+    for address in (100..2_000).step_by(100) {
+        if let Ok(words) = rig.read(address, 1) {
+            assert_eq!(words, [address]);
+        }
+    }
+}
+
+#[test]
+fn a_unit_that_ignores_08h_is_found_again() {
+    let rig =
+        Rig::new(|number, request| if number == 0 || request[1] == 8 { Vec::new() } else { prompt(&right(request)) });
+    rig.read(100, 1).unwrap_err();
+    let tries = (0..10).position(|_| rig.read(200, 1).is_ok_and(|words| words == [200]));
+    assert!(tries.is_some(), "{:?}", rig.read(200, 1));
+}
+
+/// A serial server that is connected to again hands over what its line brings, whoever asked.
+#[test]
+fn what_was_asked_before_a_port_was_lost_is_remembered() {
+    let rig = Rig::new(|number, request| after(millis(if number == 0 { 200 } else { 0 }), &right(request)));
+    rig.wire.lock().unwrap().vanish_after_sending = true;
+    let error = rig.read(100, 1).unwrap_err();
+    assert!(matches!(&error.failure, Failure::Port(port) if port.kind == PortErrorKind::Lost), "{error}");
+    rig.pass(millis(190));
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    let stats = rig.bus.stats();
+    assert_eq!((stats.reconnects, stats.late, stats.total.resyncs), (1, 1, 1), "{stats:?}");
+}
+
+#[test]
+fn a_read_goes_on_over_a_port_that_comes_back() {
+    let rig = Rig::new(|_, request| prompt(&right(request)));
+    rig.wire.lock().unwrap().vanish_after_sending = true;
+    let again = CallOptions { retries: Some(1), ..CallOptions::default() };
+    let request = Request::read(100, 1).unwrap();
+    rig.call(unit(1).into(), &request, again, &mut || false, &mut |_| ()).unwrap();
+    assert_eq!(rig.wire.lock().unwrap().opened, 2);
+}
+
+#[test]
+fn a_write_that_was_not_sent_is_not_said_to_be() {
+    let rig = Rig::new(|_, _| Vec::new());
+    let write = Request::write(0x2001, 7);
+    let error = rig.call(unit(1).into(), &write, CallOptions::default(), &mut || true, &mut |_| ()).unwrap_err();
+    assert_eq!(error.failure, Failure::Interrupted);
+    assert_eq!(rig.sent(&write), 0);
+    assert_eq!(error.sent, None, "{error}");
+}
