@@ -201,6 +201,8 @@ class Bus:
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
+        if not isinstance(units, Iterable):
+            raise NotAllowed(f"units {units!r} are no units; give several of 1..247, such as range(1, 248) or [5]")
         wanted = [checks.unit(unit) for unit in units]
         limit = min(_SCAN_TIMEOUT, self._timeout) if timeout is None else timeout
         limit = checks.number("timeout", limit, 0.0, 3600.0, above=True)

@@ -81,7 +81,7 @@ class Drive(Motion):
         """
         return self.snapshot(*(names or self.profile.monitor_names()))
 
-    def wait_for_speed(self, hz: float | None = None, *, tolerance: float = 0.1, timeout: float = 60.0) -> Status:
+    def wait_for_speed(self, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0) -> Status:
         """Waits until the output frequency is *hz*, or the setpoint in force if None.
 
         Args:
@@ -105,7 +105,7 @@ class Drive(Motion):
 
         return self._wait(reached, f"{goal} was not reached", timeout)
 
-    def wait_until_stopped(self, *, timeout: float = 60.0) -> Status:
+    def wait_until_stopped(self, timeout: float = 60.0) -> Status:
         """Waits until the drive is stopped and its output frequency is zero.
 
         A motor that coasts has no output frequency: its shaft may still turn, and the drive does not know.
@@ -164,7 +164,7 @@ class Drive(Motion):
         return control
 
     @contextmanager
-    def running(self, hz: float | None = None, *, reverse: bool = False, confirm: float = 1.0) -> Iterator[Drive]:
+    def running(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
         A stop that is not confirmed is sent again, and in the end the drive is told to coast. An error from inside the

@@ -46,7 +46,7 @@ class Seen(NamedTuple):
 class Motion(Registers):
     """Starts, stops and resets one drive. Times are seconds of the line's clock, real or simulated."""
 
-    def run(self, hz: float | None = None, *, reverse: bool = False, confirm: float = 1.0) -> None:
+    def run(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0) -> None:
         """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
 
         Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`.
@@ -68,7 +68,7 @@ class Motion(Registers):
         before = self._ready_to_start()
         self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
 
-    def jog(self, *, reverse: bool = False, confirm: float = 1.0) -> None:
+    def jog(self, reverse: bool = False, *, confirm: float = 1.0) -> None:
         """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`."""
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
         before = self._ready_to_start()

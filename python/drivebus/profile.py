@@ -56,7 +56,8 @@ class Profile:
         if isinstance(profile, Profile):
             return profile
         if isinstance(profile, str):
-            is_folder = os.sep in profile or Path(profile).is_dir()
+            # A shipped name comes first: what a command means must not depend on the folder one happens to be in.
+            is_folder = profile not in profiles() and (os.sep in profile or Path(profile).is_dir())
             return cls.load(profile) if is_folder else cls.builtin(profile)
         if isinstance(profile, os.PathLike):
             return cls.load(profile)

@@ -154,8 +154,8 @@ class Simulator:
             raise NotAllowed(
                 f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
             )
-        if not units:
-            raise NotAllowed('no units: give at least one, such as {1: "gd350"}')
+        if not isinstance(units, Mapping) or not units:
+            raise NotAllowed(f'units {units!r} name no drive; give at least one, such as {{1: "gd350"}}')
         families = profiles()
         for unit, family in units.items():
             checks.unit(unit)

@@ -47,6 +47,7 @@ BUS: list[tuple[Call, str]] = [
     (lambda bus, _: bus.transact(1, b"\x03", 254), r"reply_length 254 .*1\.\.253"),
     (lambda bus, _: list(bus.scan([300])), r"unit 300 .*1\.\.247"),
     (lambda bus, _: list(bus.scan([1], timeout=0)), r"timeout 0 .*more than 0"),
+    (lambda bus, _: bus.scan(5), r"units 5 .*1\.\.247"),  # type: ignore[arg-type]
     (lambda bus, _: bus.drive(0), r"unit 0"),
     (lambda bus, _: bus.drive(1, "gd355"), r"gd355.*gd350"),
     (lambda bus, _: bus.drive(1, "/nowhere/at/all"), r"/nowhere/at/all"),
@@ -174,7 +175,8 @@ def test_a_port_that_cannot_be_opened_is_named(port: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (({},), "no units"),
+        (({},), "units {} name no drive"),
+        (("gd350",), "units 'gd350' name no drive"),
         (({0: "gd350"},), "unit 0"),
         (({1: "gd35O"},), "gd35O.*did you mean 'gd350'"),
     ],
@@ -247,3 +249,13 @@ def test_a_family_without_a_profile_is_not_taken_for_another(
     virtual.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
     with pytest.raises(NotAllowed, match=says):
         virtual_bus.drive(1)
+
+
+def test_a_shipped_name_is_not_looked_for_in_the_present_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gd350").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert Profile.find("gd350") is Profile.builtin("gd350")
+    with pytest.raises(NotAllowed, match=r"profile\.toml"):
+        Profile.find("./gd350")
