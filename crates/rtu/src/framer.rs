@@ -211,7 +211,11 @@ impl Framer {
                 self.overrun = false;
                 return Some(Step::Frame(frame.clone()));
             }
-            Some(frame) => frame.start,
+            Some(frame) => {
+                // What stands before the answer was not the answer, whatever it looked like.
+                expected &= !self.is_expected(frame.start);
+                frame.start
+            }
             None if quiet || self.len == CAPACITY => start,
             // What an earlier silence ended is decided, even while newer bytes are not.
             None if self.ended > 0 && start >= self.ended => self.ended,

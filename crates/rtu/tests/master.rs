@@ -251,3 +251,36 @@ fn the_adapters_own_echo_is_seen_and_then_taken_off() {
     master.receive(at(end + 3_000), own.as_bytes());
     assert!(matches!(master.poll(at(end + 3_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
 }
+
+#[test]
+fn a_glitch_does_not_hide_the_adapters_echo() {
+    let write = Request::write(0x2001, 1000);
+    let own = Adu::request(unit(1).into(), &write);
+    let mut master = Master::with_silence(Duration::from_micros(1_750));
+    master.strip_echo(true);
+    let end = send(&mut master, 0, &write);
+    master.receive(at(end), &[&[0x00], own.as_bytes()].concat());
+    assert_eq!(master.poll(at(end)), None, "the echo is not the confirmation");
+    assert_eq!(master.take_tally(), Tally { own_echo: 1, noise: 1, ..Tally::default() });
+    master.receive(at(end + 3_000), own.as_bytes());
+    assert!(matches!(master.poll(at(end + 3_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
+}
+
+#[test]
+fn a_line_that_is_opened_anew_owes_what_the_old_one_did() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    master.reopened(at(20_000));
+    assert!(master.in_quarantine(unit(1)));
+    master.begin(at(20_000), unit(2).into(), &Request::read(0x2100, 1).unwrap(), TIMEOUT).unwrap();
+    assert_eq!(master.poll(at(21_749)), None, "nobody knows what was on the line before");
+    assert!(matches!(master.poll(at(21_750)), Some(Event::Transmit(_))));
+}
+
+/// Two bytes of noise that are those of the answer's beginning.
+#[test]
+fn a_false_beginning_does_not_hide_the_answer() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    master.receive(at(5_000), &[&[0x01, 0x03], words(1, &[3]).as_slice()].concat());
+    assert!(matches!(master.poll(at(5_000)), Some(Event::Answer(Answer::Read { .. }))));
+    assert_eq!(master.take_tally().noise, 2);
+}
