@@ -61,6 +61,11 @@ impl Line for RtuOverTcp {
     fn name(&self) -> String {
         self.connection.name.clone()
     }
+
+    /// The server's own transceiver may hear what it sends, as an adapter's may.
+    fn may_echo(&self) -> bool {
+        true
+    }
 }
 
 /// What both kinds of TCP line share: bytes through a socket, with deadlines on our clock.

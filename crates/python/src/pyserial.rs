@@ -147,6 +147,10 @@ impl Line for PySerialLine {
         self.name.clone()
     }
 
+    fn may_echo(&self) -> bool {
+        true
+    }
+
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
