@@ -181,9 +181,10 @@ impl Bus {
             if self.is_closed() {
                 break;
             }
-            if let Err(error) = owner.reopen() {
+            if let Err(failure) = owner.reopen(&mut give_up) {
+                let failure = if failure == Failure::Interrupted { self.given_up() } else { failure };
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.unwrap_or_else(|| unsent(&ask, Failure::Port(error), self.now_of(&owner))));
+                return Err(lost.unwrap_or_else(|| unsent(&ask, failure, self.now_of(&owner))));
             }
             if attempt > 0
                 && let Destination::Unit(unit) = destination

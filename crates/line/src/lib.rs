@@ -12,6 +12,7 @@ pub mod mbap;
 mod owner;
 mod port;
 mod queue;
+mod reopen;
 mod resync;
 pub mod rs485;
 mod stats;

@@ -8,6 +8,7 @@ use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, Se
 
 use crate::error::{CallError, Failure};
 use crate::queue::LOOK_UP;
+use crate::reopen::Reopen;
 use crate::resync::Resync;
 use crate::stats::Stats;
 use crate::{Line, PortError};
@@ -49,7 +50,7 @@ pub struct Done {
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
-    opener: Opener,
+    reopen: Reopen,
     master: Master,
     /// What the user knows about the adapter.
     given_echo: AdapterEcho,
@@ -70,7 +71,7 @@ impl Owner {
         let line = opener()?;
         let mut owner = Self {
             line: None,
-            opener,
+            reopen: Reopen::new(opener),
             master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
             given_echo: echo,
             echo,
@@ -99,10 +100,10 @@ impl Owner {
         self.line.as_deref_mut()
     }
 
-    /// Opens the line again after it was lost.
-    pub(crate) fn reopen(&mut self) -> Result<(), PortError> {
+    /// Opens the line again if it was lost, unless `give_up` says so first.
+    pub(crate) fn reopen(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {
-            let line = (self.opener)()?;
+            let line = self.reopen.open(give_up).ok_or(Failure::Interrupted)?.map_err(Failure::Port)?;
             // What was asked over the lost port may be answered over the new one.
             self.master.reopened(line.now());
             self.take_line(line);

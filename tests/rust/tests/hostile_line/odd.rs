@@ -1,5 +1,7 @@
 //! Rarer troubles: babble, slow units that do not echo, ports that vanish.
 
+use std::sync::Arc;
+
 use drivebus_line::{CallOptions, Failure, PortErrorKind};
 use drivebus_rtu::Request;
 
@@ -58,6 +60,22 @@ fn a_read_goes_on_over_a_port_that_comes_back() {
     let request = Request::read(100, 1).unwrap();
     rig.call(unit(1).into(), &request, again, &mut || false, &mut |_| ()).unwrap();
     assert_eq!(rig.wire.lock().unwrap().opened, 2);
+}
+
+/// A server that is switched off lets the system try for seconds.
+#[test]
+fn who_gives_up_does_not_wait_for_a_port_to_open() {
+    let rig = Rig::new(|_, request| prompt(&right(request)));
+    rig.wire.lock().unwrap().vanish_after_sending = true;
+    rig.read(100, 1).unwrap_err();
+    let opening = Arc::clone(&rig.opening);
+    let held = opening.lock().unwrap();
+    let request = Request::read(100, 1).unwrap();
+    let error = rig.call(unit(1).into(), &request, CallOptions::default(), &mut || true, &mut |_| ()).unwrap_err();
+    assert_eq!((error.failure, error.sent), (Failure::Interrupted, None));
+    drop(held);
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    assert_eq!(rig.wire.lock().unwrap().opened, 2, "the opening under way was waited for");
 }
 
 #[test]

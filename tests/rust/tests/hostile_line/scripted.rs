@@ -153,6 +153,8 @@ impl Line for Scripted {
 pub(crate) struct Rig {
     pub(crate) bus: Bus,
     pub(crate) wire: Arc<Mutex<Wire>>,
+    /// Who holds it keeps the port from opening.
+    pub(crate) opening: Arc<Mutex<()>>,
 }
 
 impl Rig {
@@ -177,12 +179,15 @@ impl Rig {
             opened: 0,
         }));
         let line = Scripted(Arc::clone(&wire));
+        let opening = Arc::default();
+        let door: Arc<Mutex<()>> = Arc::clone(&opening);
         let opener = move || {
+            let _open = door.lock().unwrap();
             line.0.lock().unwrap().opened += 1;
             Ok(Box::new(line.clone()) as Box<dyn Line>)
         };
         let options = BusOptions { retries: 0, ..BusOptions::new(FORMAT) };
-        Self { bus: Bus::open(Box::new(opener), options).unwrap(), wire }
+        Self { bus: Bus::open(Box::new(opener), options).unwrap(), wire, opening }
     }
 
     /// Asks unit 1; the words read, or none.
