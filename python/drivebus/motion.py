@@ -69,9 +69,19 @@ class Motion(Registers):
         self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
 
     def jog(self, reverse: bool = False, *, confirm: float = 1.0) -> None:
-        """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`."""
+        """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
+
+        A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
+        not end it.
+        """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
         before = self._ready_to_start()
+        if before.state.running:
+            raise NotAllowed(
+                f"unit {self.unit} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
+                "wait_until_stopped(), before a jog",
+                unit=self.unit,
+            )
         self._start("jog_reverse" if reverse else "jog_forward", None, reverse, before, confirm)
 
     def stop(self, *, confirm: float = 1.0) -> None:

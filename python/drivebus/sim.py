@@ -154,12 +154,7 @@ class Simulator:
             raise NotAllowed(
                 f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
             )
-        if not isinstance(units, Mapping) or not units:
-            raise NotAllowed(f'units {units!r} name no drive; give at least one, such as {{1: "gd350"}}')
-        families = profiles()
-        for unit, family in units.items():
-            checks.unit(unit)
-            checks.one_of("profile", family, families)
+        _check_units(units)
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
         self.transport = transport
         self._native = _native.Simulator(
@@ -207,3 +202,12 @@ class Simulator:
 
     def __repr__(self) -> str:
         return f"<Simulator on {self.port}>"
+
+
+def _check_units(units: object) -> None:
+    if not isinstance(units, Mapping) or not units:
+        raise NotAllowed(f'units {units!r} name no drive; give at least one, such as {{1: "gd350"}}')
+    families = profiles()
+    for unit, family in units.items():
+        checks.unit(unit)
+        checks.one_of("profile", family, families)

@@ -117,6 +117,13 @@ def test_arguments_may_stand_in_the_order_of_the_documentation(virtual: Simulato
     assert [value for value in commands(virtual) if value not in (STOP, 8)] == [2, 4, 2]
 
 
+def test_a_motor_that_turns_is_not_jogged(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.run(hz=5.0)
+    with pytest.raises(drivebus.NotAllowed, match="turns already"):
+        virtual_drive.jog()
+    assert commands(virtual) == [FORWARD]
+
+
 def test_an_hour_is_nothing(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> None:
     with virtual_drive.running(hz=10.0):
         virtual_bus.sleep(3600)
