@@ -149,12 +149,14 @@ class _Job:
 
     def farewell(self) -> None:
         self.out.say(
-            "\nOn a real drive (wire A to A, B to B; set P00.01, P00.02, P00.06 or let prepare_control() do it):\n"
+            "\nOn a real drive (wire A to A, B to B; `prepare` sets P00.01, P00.02 and P00.06):\n"
             "  drivebus ports\n"
             "  drivebus --port /dev/ttyUSB0 scan\n"
             "  drivebus --port /dev/ttyUSB0 info\n"
             "  drivebus --port /dev/ttyUSB0 monitor\n"
+            "  drivebus --port /dev/ttyUSB0 prepare\n"
             "  drivebus --port /dev/ttyUSB0 run 10\n"
+            "  drivebus --port /dev/ttyUSB0 stop\n"
             "This is not a safety function: an emergency stop is a wire."
         )
 
