@@ -1,15 +1,16 @@
 //! The bus as its callers see it: safe from any thread, one exchange at a time, retries by kind.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Instant, Request, SerialFormat};
+use drivebus_rtu::{Adu, Answer, BeginError, Destination, Instant, Request, SerialFormat};
 
 use crate::clock::{monotonic, sleep_until};
 use crate::error::{CallError, Failure};
 use crate::owner::{AdapterEcho, Ask, Done, Opener, Owner};
 use crate::queue::{LOOK_UP, Queue};
+use crate::resync::FreshWords;
 use crate::stats::Stats;
 use crate::{Line, PortError, PortErrorKind};
 
@@ -55,6 +56,10 @@ pub struct CallOptions {
 pub struct Bus {
     queue: Queue,
     owner: Mutex<Owner>,
+    /// What can be asked for while somebody waits on the line.
+    stats: Arc<Mutex<Stats>>,
+    words: Arc<FreshWords>,
+    notes: Mutex<Vec<String>>,
     options: BusOptions,
     name: String,
     closed: AtomicBool,
@@ -104,11 +109,16 @@ impl Bus {
     ///
     /// [`PortError`]: the line cannot be opened.
     pub fn open(opener: Opener, options: BusOptions) -> Result<Self, PortError> {
-        let mut owner = Owner::open(opener, options.format, options.echo)?;
+        let words = Arc::new(FreshWords::new());
+        let mut owner = Owner::open(opener, options.format, options.echo, Arc::clone(&words))?;
         let (name, clock) =
             owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
+        let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         Ok(Self {
             queue: Queue::default(),
+            stats: owner.shared_stats(),
+            words,
+            notes: Mutex::new(notes),
             owner: Mutex::new(owner),
             options,
             name,
@@ -138,8 +148,13 @@ impl Bus {
     }
 
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
+    ///
+    /// From inside a `give_up`, the call that asks it closes the line when it ends.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);
+        if self.queue.has_this_thread() {
+            return;
+        }
         let _turn = self.queue.turn(true, &mut || false);
         self.lock().close();
     }
@@ -153,7 +168,8 @@ impl Bus {
     /// # Errors
     ///
     /// [`CallError`]: with [`sent`](CallError::sent) `None` the request never went out, so nothing was done; after any
-    /// other failure but [`Failure::Refused`] the unit may have done what was asked.
+    /// other failure but [`Failure::Refused`] the unit may have done what was asked. From inside a `give_up` of the same
+    /// thread: [`BeginError::OutOfTurn`].
     pub fn call(
         &self,
         destination: Destination,
@@ -164,6 +180,10 @@ impl Bus {
     ) -> Result<Done, Box<CallError>> {
         let timeout = options.timeout.unwrap_or(self.options.timeout);
         let ask = Ask { destination, request, timeout, urgent: options.urgent };
+        if self.queue.has_this_thread() {
+            let now = self.clock.now().unwrap_or_default();
+            return Err(unsent(&ask, Failure::NotBegun(BeginError::OutOfTurn), now));
+        }
         if self.options.read_only && request.is_write() {
             return Err(unsent(&ask, Failure::ReadOnly { function: request.function() }, self.now()));
         }
@@ -172,6 +192,23 @@ impl Bus {
             return Err(unsent(&ask, self.given_up(), self.now()));
         };
         let mut owner = self.lock();
+        let result = self.ask(&mut owner, &ask, options, &mut give_up, take);
+        if self.is_closed() {
+            owner.close();
+        }
+        result
+    }
+
+    /// Asks until it is answered, refused or given up; the line is ours.
+    fn ask(
+        &self,
+        owner: &mut Owner,
+        ask: &Ask<'_>,
+        options: CallOptions,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let Ask { destination, request, .. } = *ask;
         let repeats = match request {
             Request::ReadHolding { .. } => options.retries.unwrap_or(self.options.retries),
             _ => 0,
@@ -181,17 +218,17 @@ impl Bus {
             if self.is_closed() {
                 break;
             }
-            if let Err(failure) = owner.reopen(&mut give_up) {
+            if let Err(failure) = owner.reopen(give_up) {
                 let failure = if failure == Failure::Interrupted { self.given_up() } else { failure };
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.unwrap_or_else(|| unsent(&ask, failure, self.now_of(&owner))));
+                return Err(lost.unwrap_or_else(|| unsent(ask, failure, self.now_of(owner))));
             }
             if attempt > 0
                 && let Destination::Unit(unit) = destination
             {
-                owner.stats.count(Some(unit), |counters| counters.retries += 1);
+                owner.stats().count(Some(unit), |counters| counters.retries += 1);
             }
-            let result = owner.prepare(&ask, &mut give_up).and_then(|()| owner.exchange(&ask, &mut give_up, take));
+            let result = owner.prepare(ask, give_up).and_then(|()| owner.exchange(ask, give_up, take));
             match result {
                 Err(error) if attempt < repeats && is_passing(&error.failure) => lost = Some(error),
                 Err(mut error) => {
@@ -206,12 +243,12 @@ impl Bus {
                 done => return done,
             }
         }
-        Err(unsent(&ask, Failure::Closed, self.now_of(&owner)))
+        Err(unsent(ask, Failure::Closed, self.now_of(owner)))
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
     pub fn fresh_word(&self) -> u16 {
-        self.lock().fresh_word()
+        self.words.next()
     }
 
     /// Now, on the line's clock.
@@ -243,12 +280,20 @@ impl Bus {
 
     /// What has happened so far.
     pub fn stats(&self) -> Stats {
-        self.lock().stats.clone()
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// What the user should know about the line, such as a setting that did not reach the wire.
+    ///
+    /// While somebody waits on the line, what it said last.
     pub fn notes(&self) -> Vec<String> {
-        self.lock().line().map(|line| line.notes()).unwrap_or_default()
+        let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Ok(mut owner) = self.owner.try_lock()
+            && let Some(line) = owner.line()
+        {
+            *notes = line.notes();
+        }
+        notes.clone()
     }
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.

@@ -2,6 +2,7 @@
 //!
 //! Drives the state machine of `drivebus-rtu` with a real line: bytes, the clock, and the wish to give up.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, SerialFormat, TURNAROUND, UnitAddress};
@@ -9,7 +10,7 @@ use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, Se
 use crate::error::{CallError, Failure};
 use crate::queue::LOOK_UP;
 use crate::reopen::Reopen;
-use crate::resync::Resync;
+use crate::resync::{FreshWords, Resync};
 use crate::stats::Stats;
 use crate::{Line, PortError};
 
@@ -57,7 +58,8 @@ pub(crate) struct Owner {
     /// What is known by now about the one that is plugged in.
     echo: AdapterEcho,
     resync: Resync,
-    pub(crate) stats: Stats,
+    words: Arc<FreshWords>,
+    stats: Arc<Mutex<Stats>>,
 }
 
 impl std::fmt::Debug for Owner {
@@ -67,7 +69,12 @@ impl std::fmt::Debug for Owner {
 }
 
 impl Owner {
-    pub(crate) fn open(mut opener: Opener, format: SerialFormat, echo: AdapterEcho) -> Result<Self, PortError> {
+    pub(crate) fn open(
+        mut opener: Opener,
+        format: SerialFormat,
+        echo: AdapterEcho,
+        words: Arc<FreshWords>,
+    ) -> Result<Self, PortError> {
         let line = opener()?;
         let mut owner = Self {
             line: None,
@@ -75,8 +82,9 @@ impl Owner {
             master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
             given_echo: echo,
             echo,
-            resync: Resync::new(),
-            stats: Stats::default(),
+            resync: Resync::default(),
+            words,
+            stats: Arc::default(),
         };
         owner.take_line(line);
         Ok(owner)
@@ -86,8 +94,14 @@ impl Owner {
         self.line = None;
     }
 
-    pub(crate) fn fresh_word(&mut self) -> u16 {
-        self.resync.fresh_word()
+    /// What is counted, to be read while somebody waits for the line.
+    pub(crate) fn shared_stats(&self) -> Arc<Mutex<Stats>> {
+        Arc::clone(&self.stats)
+    }
+
+    /// A thread that panicked cannot have left the figures inconsistent enough to matter.
+    pub(crate) fn stats(&self) -> MutexGuard<'_, Stats> {
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Now, on the line's clock; its start while no line is open.
@@ -107,7 +121,7 @@ impl Owner {
             // What was asked over the lost port may be answered over the new one.
             self.master.reopened(line.now());
             self.take_line(line);
-            self.stats.reconnects += 1;
+            self.stats().reconnects += 1;
         }
         Ok(())
     }
@@ -167,8 +181,8 @@ impl Owner {
         ask: &Ask<'_>,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
-        let echo = Request::echo(self.resync.fresh_word());
-        self.stats.count(Some(unit), |counters| counters.resyncs += 1);
+        let echo = Request::echo(self.words.next());
+        self.stats().count(Some(unit), |counters| counters.resyncs += 1);
         match self.exchange(&Ask { request: &echo, ..*ask }, give_up, &mut |_| ()) {
             Ok(_) => self.resync.answered(unit),
             Err(error) if matches!(error.failure, Failure::Refused { .. }) => self.resync.answered(unit),
@@ -207,7 +221,7 @@ impl Owner {
             Ok(_) => true,
             Err(error) => error.sent.is_some(),
         };
-        self.stats.count(unit, |counters| {
+        self.stats().count(unit, |counters| {
             counters.requests += u64::from(sent);
             match &result {
                 Ok(done) => counters.answered(done.ended.saturating_duration_since(done.sent)),
@@ -231,7 +245,7 @@ impl Owner {
     /// Keeps what the exchange has shown about the adapter and the line.
     fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>) {
         let tally = self.master.take_tally();
-        self.stats.add(tally);
+        self.stats().add(tally);
         if self.echo != AdapterEcho::Auto {
             return;
         }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 use crate::clock::monotonic;
@@ -28,6 +29,7 @@ struct Waiting {
 struct Ticket {
     number: u64,
     urgent: bool,
+    thread: ThreadId,
 }
 
 /// The right to use the line, until it is dropped.
@@ -43,7 +45,7 @@ impl Queue {
     /// Who is `urgent` comes before all who wait and are not, but not before the one whose turn it is.
     pub(crate) fn turn(&self, urgent: bool, give_up: &mut dyn FnMut() -> bool) -> Option<Turn<'_>> {
         let mut waiting = self.lock();
-        let ticket = Ticket { number: waiting.next, urgent };
+        let ticket = Ticket { number: waiting.next, urgent, thread: thread::current().id() };
         waiting.next += 1;
         let place = match waiting.order.iter().skip(1).position(|other| urgent && !other.urgent) {
             Some(behind_the_owner) => 1 + behind_the_owner,
@@ -67,6 +69,13 @@ impl Queue {
             }
         }
         Some(turn)
+    }
+
+    /// Whether this thread stands in the queue already, and would wait for itself: inside a question of [`turn`](Self::turn)
+    /// or of the owner's, which may run a signal handler of the caller's.
+    pub(crate) fn has_this_thread(&self) -> bool {
+        let this = thread::current().id();
+        self.lock().order.iter().any(|ticket| ticket.thread == this)
     }
 
     /// A thread that panicked cannot have left the order inconsistent: every change is one call.
@@ -98,7 +107,7 @@ mod tests {
         let queue = Queue::default();
         let (done, order) = mpsc::channel();
         let first = queue.turn(false, &mut || false).unwrap();
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             for (number, urgent) in [false, false, true, false, true].into_iter().enumerate() {
                 let (queue, done) = (&queue, done.clone());
                 scope.spawn(move || {
@@ -107,7 +116,7 @@ mod tests {
                 });
                 // The next one comes only when this one stands in the queue.
                 while queue.lock().order.len() < number + 2 {
-                    std::thread::yield_now();
+                    thread::yield_now();
                 }
             }
             drop(first);
@@ -120,7 +129,7 @@ mod tests {
         let queue = Queue::default();
         let first = queue.turn(false, &mut || false).unwrap();
         let (gave_up, passing) = mpsc::channel();
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             let queue = &queue;
             scope.spawn(move || {
                 assert!(queue.turn(false, &mut || true).is_none());
@@ -129,7 +138,7 @@ mod tests {
             // Ends only when the one who waits has given up.
             while passing.try_recv() == Err(mpsc::TryRecvError::Empty) {
                 queue.moved.notify_all();
-                std::thread::yield_now();
+                thread::yield_now();
             }
         });
         drop(first);

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{BuildHasher, Hasher, RandomState};
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
@@ -12,31 +13,35 @@ use drivebus_rtu::{Instant, UnitAddress};
 /// What is assumed of them: an answer comes within this time or never.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Words for probes, and what is known of the units that were probed.
+/// Words for probes and echoes.
 #[derive(Debug)]
-pub(crate) struct Resync {
-    word: u16,
-    echoed: BTreeSet<UnitAddress>,
-    /// When the latest request went out that a unit left open.
-    open: BTreeMap<UnitAddress, Instant>,
-}
+pub(crate) struct FreshWords(AtomicU16);
 
-impl Resync {
+impl FreshWords {
     /// An odd step reaches every word before one comes again, so that 65 535 echoes may still be open.
     const STEP: u16 = 0x9E35;
 
     pub(crate) fn new() -> Self {
         // Where the words begin is random: another program on this line must not use the same ones.
         let [a, b, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
-        Self { word: u16::from_le_bytes([a, b]), echoed: BTreeSet::new(), open: BTreeMap::new() }
+        Self(AtomicU16::new(u16::from_le_bytes([a, b])))
     }
 
     /// A word that no open echo carries.
-    pub(crate) fn fresh_word(&mut self) -> u16 {
-        self.word = self.word.wrapping_add(Self::STEP);
-        self.word
+    pub(crate) fn next(&self) -> u16 {
+        self.0.fetch_add(Self::STEP, Ordering::Relaxed)
     }
+}
 
+/// What is known of the units that were probed.
+#[derive(Debug, Default)]
+pub(crate) struct Resync {
+    echoed: BTreeSet<UnitAddress>,
+    /// When the latest request went out that a unit left open.
+    open: BTreeMap<UnitAddress, Instant>,
+}
+
+impl Resync {
     /// `unit` answered an echo, with the word or with a refusal.
     pub(crate) fn answered(&mut self, unit: UnitAddress) {
         self.echoed.insert(unit);
@@ -61,8 +66,8 @@ mod tests {
 
     #[test]
     fn no_word_comes_twice_before_all_have_come() {
-        let mut resync = Resync::new();
-        let words: BTreeSet<u16> = (0..=u16::MAX).map(|_| resync.fresh_word()).collect();
+        let fresh = FreshWords::new();
+        let words: BTreeSet<u16> = (0..=u16::MAX).map(|_| fresh.next()).collect();
         assert_eq!(words.len(), 65_536);
     }
 }

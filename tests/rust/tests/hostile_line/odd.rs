@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drivebus_line::{CallOptions, Failure, PortErrorKind};
-use drivebus_rtu::Request;
+use drivebus_rtu::{BeginError, Request};
 
 use crate::scripted::{Rig, after, millis, prompt, right, unit};
 
@@ -86,4 +86,25 @@ fn a_write_that_was_not_sent_is_not_said_to_be() {
     assert_eq!(error.failure, Failure::Interrupted);
     assert_eq!(rig.sent(&write), 0);
     assert_eq!(error.sent, None, "{error}");
+}
+
+/// A signal handler runs inside the question whether to give up; it must not wait for the call that asks.
+#[test]
+fn a_handler_may_use_the_bus_it_interrupts() {
+    let rig = Rig::new(|_, _| Vec::new());
+    let bus = &rig.bus;
+    let request = Request::read(100, 1).unwrap();
+    let mut inside = None;
+    let mut handler = || {
+        assert_eq!((bus.stats().reconnects, bus.notes().len()), (0, 0));
+        assert_ne!(bus.fresh_word(), bus.fresh_word());
+        inside = Some(rig.ask(&Request::write(0x2000, 5)));
+        bus.close();
+        false
+    };
+    let error = rig.call(unit(1).into(), &request, CallOptions::default(), &mut handler, &mut |_| ()).unwrap_err();
+    assert_eq!(error.failure, Failure::Closed);
+    let inside = inside.unwrap().unwrap_err();
+    assert_eq!((inside.failure, inside.sent), (Failure::NotBegun(BeginError::OutOfTurn), None));
+    assert!(matches!(rig.read(100, 1).unwrap_err().failure, Failure::Closed));
 }
