@@ -182,6 +182,21 @@ class TestMoving:
         assert run("--profile", "gd350", "jog", "--yes", port=pty.port).exit_code == 3
         assert pty.drive(1).writes() == []
 
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ["jog", "--seconds", "nan"],
+            ["jog", "--seconds", "61"],
+            ["run", "--wait", "nan"],
+            ["run", "--wait", "inf"],
+            ["run", "nan"],
+        ],
+    )
+    def test_a_number_that_is_none_moves_nothing(self, pty: drivebus.Simulator, words: list[str]) -> None:
+        run("prepare", port=pty.port)
+        assert run(*words, "--yes", port=pty.port).exit_code == 2
+        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == []
+
     def test_a_jog_whose_end_is_lost_coasts(self, monkeypatch: pytest.MonkeyPatch, pty: drivebus.Simulator) -> None:
         run("prepare", port=pty.port)
         end = drivebus.Drive.jog_stop

@@ -116,7 +116,7 @@ def status(session: Session) -> None:
 
 @click.command()
 @click.argument("wanted", metavar="[NAME]...", nargs=-1, shell_complete=names.complete_name)
-@click.option("--interval", type=click.FloatRange(0), default=0.5, show_default=True, help="Seconds between samples.")
+@click.option("--interval", type=names.Seconds(0), default=0.5, show_default=True, help="Seconds between samples.")
 @click.option("--count", type=click.IntRange(1), help="Samples to take; without it, until Ctrl-C.")
 @pass_session
 def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: int | None) -> None:

@@ -16,7 +16,7 @@ __all__ = ["COMMANDS"]
 @click.command()
 @click.argument("hz", type=float, required=False)
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
-@click.option("--wait", type=click.FloatRange(0), metavar="SECONDS", help="Wait until the speed is reached.")
+@click.option("--wait", type=names.Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
 @yes_option
 @pass_session
 def run(session: Session, hz: float | None, reverse: bool, wait: float | None, yes: bool) -> None:
@@ -32,7 +32,7 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, y
 
 
 @click.command()
-@click.option("--wait", type=click.FloatRange(0), metavar="SECONDS", help="Wait until it stands.")
+@click.option("--wait", type=names.Seconds(0), metavar="SECONDS", help="Wait until it stands.")
 @pass_session
 def stop(session: Session, wait: float | None) -> None:
     """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
@@ -53,7 +53,7 @@ def coast(session: Session) -> None:
 
 
 @click.command()
-@click.option("--seconds", type=click.FloatRange(0, 60), default=1.0, show_default=True, help="How long.")
+@click.option("--seconds", type=names.Seconds(0, 60), default=1.0, show_default=True, help="How long.")
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
 @yes_option
 @pass_session
@@ -62,12 +62,14 @@ def jog(session: Session, seconds: float, reverse: bool, yes: bool) -> None:
     way = "in reverse" if reverse else "forward"
     with session.drive() as drive:
         session.ask(f"This jogs the motor {way} for {seconds:g} s", yes)
+        jogs = False
         try:
             drive.jog(reverse=reverse)
+            jogs = True
             drive.bus.sleep(seconds)
         except BaseException as reason:
-            # Of this package's errors, only Unconfirmed comes once the jog was sent.
-            if isinstance(reason, drivebus.Unconfirmed) or not isinstance(reason, drivebus.DrivebusError):
+            # Of this package's errors, only Unconfirmed comes from `jog` once it was sent.
+            if jogs or isinstance(reason, drivebus.Unconfirmed) or not isinstance(reason, drivebus.DrivebusError):
                 _end_jog(drive)
             raise
         _end_jog(drive)

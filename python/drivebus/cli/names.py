@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -11,6 +13,7 @@ import drivebus
 from drivebus.protocols import ProfileProtocol
 
 __all__ = [
+    "Seconds",
     "complete_assignment",
     "complete_name",
     "complete_profile",
@@ -22,6 +25,17 @@ __all__ = [
 
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 _PARAMETER = re.compile(r"p\d\d\.\d\d", re.IGNORECASE)
+
+
+class Seconds(click.FloatRange):
+    """A time in seconds. "nan" and "inf" are refused before anything moves: they would be neither early nor late."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as a finite float in the range."""
+        seconds = super().convert(value, parameter, context)
+        if not math.isfinite(seconds):
+            self.fail(f"{value} is no number of seconds.", parameter, context)
+        return seconds
 
 
 def resolve(profile: ProfileProtocol, text: str) -> str | int:
