@@ -55,6 +55,7 @@ PYTHON: dict[str, set[str]] = {
     "sim": {"_native", "checks", "errors", "profile"},
     "ports": {"_native", "checks", "errors", "profile", "sim"},
     "bus": {"_native", "checks", "drive", "errors", "ports", "profile", "sim", "values"},
+    "__main__": {"cli"},
     "__init__": {"_native", "bus", "drive", "errors", "profile", "rtu", "sim", "values"},
     "cli": {"drivebus", "protocols", "rtu", "sim"},
 }

@@ -234,7 +234,7 @@ class TestMoving:
     def test_a_whole_job_through_another_program(self, pty: drivebus.Simulator) -> None:
         def command(*words: str) -> dict[str, Any]:
             done = subprocess.run(
-                [sys.executable, "-m", "drivebus.cli", "--json", *words],
+                [sys.executable, "-m", "drivebus", "--json", *words],
                 env={**os.environ, "DRIVEBUS_PORT": pty.port},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
@@ -328,7 +328,7 @@ def test_every_command_has_help() -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to a whole console")
 def test_sim_serves_until_ctrl_c() -> None:
-    words = [sys.executable, "-m", "drivebus.cli", "--json", "sim", "--units", "1=gd350,3=gd350"]
+    words = [sys.executable, "-m", "drivebus", "--json", "sim", "--units", "1=gd350,3=gd350"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         port = json.loads(child.stdout.readline())["port"]
@@ -341,7 +341,7 @@ def test_sim_serves_until_ctrl_c() -> None:
 
 def test_the_demonstration_holds() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "drivebus.cli", "demo"],
+        [sys.executable, "-m", "drivebus", "demo"],
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,

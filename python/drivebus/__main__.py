@@ -1,4 +1,4 @@
-"""`python -m drivebus.cli` is the command `drivebus`."""
+"""`python -m drivebus` is the command `drivebus`."""
 
 from drivebus.cli import main
 
