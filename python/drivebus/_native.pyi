@@ -27,28 +27,28 @@ __all__ = [
     "encode_write",
 ]
 
-def crc16(data: Buffer, /) -> int:
+def crc16(data: Buffer) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
 
-def encode_read(unit: int, address: int, count: int, /) -> bytes:
+def encode_read(unit: int, address: int, count: int) -> bytes:
     """A whole 03H request frame: *unit* 1..=247, *address* 0..=0xFFFF, *count* 1..=125 words."""
 
-def encode_write(unit: int, address: int, value: int | Sequence[int], /) -> bytes:
+def encode_write(unit: int, address: int, value: int | Sequence[int]) -> bytes:
     """A whole 06H (an int) or 10H (a sequence of 1..=123 ints) request frame.
 
     *value* 0..=0xFFFF each; *unit* 1..=247, or 0 for a broadcast.
     """
 
-def encode_echo(unit: int, word: int, /) -> bytes:
+def encode_echo(unit: int, word: int) -> bytes:
     """A whole 08H/0000 request frame with *word* 0..=0xFFFF."""
 
-def decode_answer(request: Buffer, frame: Buffer, /) -> list[int] | None:
+def decode_answer(request: Buffer, frame: Buffer) -> list[int] | None:
     """The words that *frame* answers to *request*; None for a confirmed write or echo.
 
     Raises CrcError, BadAnswer, Refused; NotAllowed where *request* is no request.
     """
 
-def decode(frame: Buffer, /) -> dict[str, Any]:
+def decode(frame: Buffer) -> dict[str, Any]:
     """Any frame as fields: `unit`, `function`, `kind`, `crc`, and those of its kind.
 
     `kind` is `"read"`, `"write"`, `"write_many"`, `"echo"` (requests and answers that look alike),

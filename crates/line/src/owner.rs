@@ -5,7 +5,9 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{
+    Adu, Answer, Destination, Event, Instant, Master, Request, SerialFormat, TURNAROUND, Tally, UnitAddress,
+};
 
 use crate::error::{CallError, Failure};
 use crate::queue::LOOK_UP;
@@ -209,7 +211,8 @@ impl Owner {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
         };
-        self.learn(ask, &result);
+        let tally = self.master.take_tally();
+        self.learn(ask, &result, tally);
         if let (Some(unit), Err(error)) = (unit, &result)
             && self.master.in_quarantine(unit)
             && !matches!(ask.request, Request::Echo { .. })
@@ -223,6 +226,7 @@ impl Owner {
         };
         self.stats().count(unit, |counters| {
             counters.requests += u64::from(sent);
+            counters.add(tally);
             match &result {
                 Ok(done) => counters.answered(done.ended.saturating_duration_since(done.sent)),
                 Err(error) => match error.failure {
@@ -243,9 +247,7 @@ impl Owner {
     }
 
     /// Keeps what the exchange has shown about the adapter and the line.
-    fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>) {
-        let tally = self.master.take_tally();
-        self.stats().add(tally);
+    fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>, tally: Tally) {
         if self.echo != AdapterEcho::Auto {
             return;
         }

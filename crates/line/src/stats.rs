@@ -11,16 +11,8 @@ use drivebus_rtu::{Tally, UnitAddress};
 pub struct Stats {
     /// Everything that can be told of the exchanges, over all units and broadcasts.
     pub total: Counters,
-    /// The same for each unit that was asked.
+    /// The same for each unit that was asked; what came beside an answer counts for the unit that was asked then.
     pub units: BTreeMap<UnitAddress, Counters>,
-    /// Whole frames that came when nothing was waited for.
-    pub late: u64,
-    /// Whole frames of others while an answer was waited for.
-    pub foreign: u64,
-    /// Bytes that belong to no frame.
-    pub noise_bytes: u64,
-    /// Requests that the adapter sent back to us.
-    pub own_echoes: u64,
     /// How often the port was opened again after it was lost.
     pub reconnects: u64,
 }
@@ -45,6 +37,14 @@ pub struct Counters {
     pub retries: u64,
     /// Echoes sent to find the way back after a request was left open.
     pub resyncs: u64,
+    /// Whole frames that came before the request went out, or that the unit still owed.
+    pub late: u64,
+    /// Whole frames of others while an answer was waited for.
+    pub foreign: u64,
+    /// Bytes that belong to no frame.
+    pub noise_bytes: u64,
+    /// Requests that the adapter sent back to us.
+    pub own_echoes: u64,
     /// From the first bit of the request to the last byte of the answer.
     pub round_trip: Latency,
 }
@@ -82,16 +82,17 @@ impl Stats {
             change(self.units.entry(unit).or_default());
         }
     }
+}
 
+impl Counters {
+    /// What was seen beside the answer.
     pub(crate) fn add(&mut self, tally: Tally) {
         self.late += u64::from(tally.late);
         self.foreign += u64::from(tally.foreign);
         self.noise_bytes += u64::from(tally.noise);
         self.own_echoes += u64::from(tally.own_echo);
     }
-}
 
-impl Counters {
     pub(crate) fn answered(&mut self, round_trip: Duration) {
         self.answers += 1;
         self.round_trip.add(round_trip);

@@ -175,10 +175,6 @@ impl Bus {
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (stats, notes) = py.detach(|| (self.core.stats(), self.core.notes()));
         let all = counters(py, &stats.total)?;
-        all.set_item("late_replies", stats.late)?;
-        all.set_item("foreign_frames", stats.foreign)?;
-        all.set_item("noise_bytes", stats.noise_bytes)?;
-        all.set_item("own_echoes", stats.own_echoes)?;
         all.set_item("reconnects", stats.reconnects)?;
         all.set_item("notes", notes)?;
         let units = PyDict::new(py);
@@ -309,6 +305,10 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
     all.set_item("bad_answers", figures.bad_answers)?;
     all.set_item("retries", figures.retries)?;
     all.set_item("resyncs", figures.resyncs)?;
+    all.set_item("late_replies", figures.late)?;
+    all.set_item("foreign_frames", figures.foreign)?;
+    all.set_item("noise_bytes", figures.noise_bytes)?;
+    all.set_item("own_echoes", figures.own_echoes)?;
     let latency = PyDict::new(py);
     latency.set_item("min", figures.round_trip.min.as_secs_f64())?;
     latency.set_item("mean", figures.round_trip.mean().as_secs_f64())?;

@@ -2,13 +2,14 @@
 
 use drivebus_rtu::{Destination, UnitAddress};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyMemoryView, PyString};
+use pyo3::types::{PyBool, PyBytes, PyMemoryView, PyString};
 
 use crate::errors::not_allowed;
 
-/// A word: 0..=0xFFFF.
+/// A word: 0..=0xFFFF. A bool is none, although Python counts it as a number: it was meant for something else.
 pub(crate) fn one_word(what: &str, given: &Bound<'_, PyAny>) -> PyResult<u16> {
-    given.extract().map_err(|_| not_allowed(format!("{what} {} is not in 0..65535", shown(given))))
+    let word = if given.is_instance_of::<PyBool>() { None } else { given.extract().ok() };
+    word.ok_or_else(|| not_allowed(format!("{what} {} is not in 0..65535", shown(given))))
 }
 
 /// A unit that can answer.

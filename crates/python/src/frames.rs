@@ -9,7 +9,6 @@ use crate::errors::{answer_error, frame_error, refuse, refused};
 
 /// CRC-16/MODBUS of any bytes-like object.
 #[pyfunction]
-#[pyo3(signature = (data, /))]
 pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
     // The usual case, without so much as a reference count.
     if let Ok(bytes) = data.cast::<PyBytes>() {
@@ -20,7 +19,6 @@ pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
 
 /// A whole 03H request frame.
 #[pyfunction]
-#[pyo3(signature = (unit, address, count, /))]
 pub(crate) fn encode_read<'py>(
     py: Python<'py>,
     unit: &Bound<'py, PyAny>,
@@ -33,7 +31,6 @@ pub(crate) fn encode_read<'py>(
 
 /// A whole 06H or 10H request frame.
 #[pyfunction]
-#[pyo3(signature = (unit, address, value, /))]
 pub(crate) fn encode_write<'py>(
     py: Python<'py>,
     unit: &Bound<'py, PyAny>,
@@ -49,7 +46,6 @@ pub(crate) fn encode_write<'py>(
 
 /// A whole 08H/0000 request frame.
 #[pyfunction]
-#[pyo3(signature = (unit, word, /))]
 pub(crate) fn encode_echo<'py>(
     py: Python<'py>,
     unit: &Bound<'py, PyAny>,
@@ -64,7 +60,6 @@ fn frame<'py>(py: Python<'py>, to: Destination, request: &Request<'_>) -> Bound<
 
 /// The words that a frame answers to a request, or None for a confirmation.
 #[pyfunction]
-#[pyo3(signature = (request, frame, /))]
 pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u16>>> {
     let (asked, came) = (bytes_of(request)?, bytes_of(frame)?);
     let (asked, came) = (asked.as_bytes(), came.as_bytes());
@@ -89,7 +84,6 @@ pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>
 
 /// Any frame of either direction as fields.
 #[pyfunction]
-#[pyo3(signature = (frame, /))]
 pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let bytes = bytes_of(frame)?;
     let bytes = bytes.as_bytes();

@@ -4,6 +4,7 @@
 mod address;
 mod answer;
 pub mod crc;
+mod event;
 mod frame;
 mod framer;
 mod master;
@@ -11,6 +12,7 @@ mod request;
 mod serial;
 mod slave;
 mod time;
+mod unit_set;
 mod words;
 
 pub use core::time::Duration;
@@ -18,9 +20,10 @@ pub use core::time::Duration;
 pub use address::{AddressError, Destination, UnitAddress};
 pub use answer::{Answer, AnswerError, ExceptionCode, Expected};
 pub use crc::crc16;
+pub use event::{BeginError, Event, Tally};
 pub use frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
 pub use framer::{Framer, Skipped};
-pub use master::{BeginError, Event, Master, TURNAROUND, Tally};
+pub use master::{Master, TURNAROUND};
 pub use request::{AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, Request, RequestError, function};
 pub use serial::{DataBits, Parity, SerialFormat, SerialFormatError, Silence, StopBits};
 pub use slave::{Slave, SlaveEvent};

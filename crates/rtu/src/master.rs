@@ -10,10 +10,12 @@
 
 use core::time::Duration;
 
-use crate::answer::{Answer, AnswerError, Expected};
-use crate::frame::{Adu, Frame, FrameError};
+use crate::answer::{AnswerError, Expected};
+use crate::event::{BeginError, Event, Tally};
+use crate::frame::{Adu, Frame};
 use crate::framer::{Framer, Step};
 use crate::request::Request;
+use crate::unit_set::UnitSet;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
@@ -72,51 +74,6 @@ struct Job {
     timeout: Duration,
 }
 
-/// What happens to a request. All but [`Transmit`](Self::Transmit) end it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Event<'a> {
-    /// The line was silent long enough: send these bytes in one piece, then call [`Master::sent`].
-    Transmit(&'a [u8]),
-    /// The unit answered, or refused with [`Answer::Exception`].
-    Answer(Answer<'a>),
-    /// The unit sent a whole frame that is not the answer. It may have done what was asked.
-    Wrong {
-        /// What is wrong with it.
-        error: AnswerError,
-        /// All of it.
-        frame: &'a [u8],
-    },
-    /// An answer began and did not survive the line. The unit may have done what was asked.
-    Corrupt {
-        /// Why it is no frame.
-        error: FrameError,
-        /// The bytes, with the noise around them.
-        bytes: &'a [u8],
-    },
-    /// The time is over. The unit may have done what was asked.
-    NoAnswer {
-        /// The beginning of an answer, or nothing.
-        bytes: &'a [u8],
-    },
-    /// The broadcast was sent and the turnaround delay is over.
-    BroadcastDone,
-    /// The line was never silent long enough: nothing was sent.
-    Busy,
-}
-
-/// What was seen on the line beside answers, since [`Master::take_tally`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
-    /// Whole frames that came when nothing was waited for, or from a unit in quarantine.
-    pub late: u32,
-    /// Whole frames of other units or functions while an answer was waited for.
-    pub foreign: u32,
-    /// Bytes that belong to no frame.
-    pub noise: u32,
-    /// Requests that came back from the adapter itself.
-    pub own_echo: u32,
-}
-
 impl Master {
     /// A master on a line of `format`.
     pub const fn new(format: &SerialFormat) -> Self {
@@ -133,7 +90,7 @@ impl Master {
             strips_echo: false,
             echo_due: false,
             busy: None,
-            quarantine: UnitSet([0; 4]),
+            quarantine: UnitSet::EMPTY,
             tally: Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 },
         }
     }
@@ -425,48 +382,3 @@ impl Master {
 fn count(range: &core::ops::Range<usize>) -> u32 {
     u32::try_from(range.len()).unwrap_or(u32::MAX)
 }
-
-/// Which of the 247 units are in it.
-#[derive(Debug, Clone, Copy)]
-struct UnitSet([u64; 4]);
-
-impl UnitSet {
-    const fn contains(&self, unit: UnitAddress) -> bool {
-        self.0[unit.get() as usize / 64] >> (unit.get() % 64) & 1 == 1
-    }
-
-    const fn insert(&mut self, unit: UnitAddress) {
-        self.0[unit.get() as usize / 64] |= 1 << (unit.get() % 64);
-    }
-
-    const fn remove(&mut self, unit: UnitAddress) {
-        self.0[unit.get() as usize / 64] &= !(1 << (unit.get() % 64));
-    }
-}
-
-/// A request that was not begun. Nothing was sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum BeginError {
-    /// Another request is in flight.
-    OutOfTurn,
-    /// Nobody answers a broadcast, so nothing can be read by one.
-    BroadcastRead,
-    /// The unit may still answer an earlier request: send it an echo first.
-    Quarantine {
-        /// The unit.
-        unit: UnitAddress,
-    },
-}
-
-impl core::fmt::Display for BeginError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::OutOfTurn => f.write_str("another request is in flight"),
-            Self::BroadcastRead => f.write_str("nobody answers a broadcast: only writes can be sent to unit 0"),
-            Self::Quarantine { unit } => write!(f, "unit {unit} may still answer an earlier request: echo it first"),
-        }
-    }
-}
-
-impl core::error::Error for BeginError {}

@@ -95,7 +95,7 @@ fn a_reply_that_comes_during_the_next_request_is_never_its_answer() {
     assert!(matches!(late.unwrap_err().failure, Failure::NoAnswer { .. }));
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3], "not 01A0H, the identification asked for before");
     let stats = bus.stats();
-    assert_eq!((stats.late, stats.total.resyncs), (1, 1), "{stats:?}");
+    assert_eq!((stats.total.late, stats.total.resyncs), (1, 1), "{stats:?}");
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn a_broadcast_does_not_hide_that_the_adapter_echoes() {
         let rig = Rig::echoing(whole, |_, _| Vec::new());
         rig.call(Destination::Broadcast, &request, CallOptions::default(), &mut || false, &mut |_| ()).unwrap();
         let stats = rig.bus.stats();
-        assert_eq!((stats.own_echoes, stats.late), (1, 0));
+        assert_eq!((stats.total.own_echoes, stats.total.late), (1, 0));
         rig.ask(&Request::write(0x2001, 7)).unwrap_err();
     }
 }

@@ -1,0 +1,75 @@
+//! What a master says: what becomes of a request, what was seen beside it, and why it was not begun.
+
+use crate::{Answer, AnswerError, FrameError, UnitAddress};
+
+/// What happens to a request. All but [`Transmit`](Self::Transmit) end it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event<'a> {
+    /// The line was silent long enough: send these bytes in one piece, then call [`crate::Master::sent`].
+    Transmit(&'a [u8]),
+    /// The unit answered, or refused with [`Answer::Exception`].
+    Answer(Answer<'a>),
+    /// The unit sent a whole frame that is not the answer. It may have done what was asked.
+    Wrong {
+        /// What is wrong with it.
+        error: AnswerError,
+        /// All of it.
+        frame: &'a [u8],
+    },
+    /// An answer began and did not survive the line. The unit may have done what was asked.
+    Corrupt {
+        /// Why it is no frame.
+        error: FrameError,
+        /// The bytes, with the noise around them.
+        bytes: &'a [u8],
+    },
+    /// The time is over. The unit may have done what was asked.
+    NoAnswer {
+        /// The beginning of an answer, or nothing.
+        bytes: &'a [u8],
+    },
+    /// The broadcast was sent and the turnaround delay is over.
+    BroadcastDone,
+    /// The line was never silent long enough: nothing was sent.
+    Busy,
+}
+
+/// What was seen on the line beside answers, since [`crate::Master::take_tally`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// Whole frames that came when nothing was waited for, or from a unit in quarantine.
+    pub late: u32,
+    /// Whole frames of other units or functions while an answer was waited for.
+    pub foreign: u32,
+    /// Bytes that belong to no frame.
+    pub noise: u32,
+    /// Requests that came back from the adapter itself.
+    pub own_echo: u32,
+}
+
+/// A request that was not begun. Nothing was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BeginError {
+    /// Another request is in flight.
+    OutOfTurn,
+    /// Nobody answers a broadcast, so nothing can be read by one.
+    BroadcastRead,
+    /// The unit may still answer an earlier request: send it an echo first.
+    Quarantine {
+        /// The unit.
+        unit: UnitAddress,
+    },
+}
+
+impl core::fmt::Display for BeginError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::OutOfTurn => f.write_str("another request is in flight"),
+            Self::BroadcastRead => f.write_str("nobody answers a broadcast: only writes can be sent to unit 0"),
+            Self::Quarantine { unit } => write!(f, "unit {unit} may still answer an earlier request: echo it first"),
+        }
+    }
+}
+
+impl core::error::Error for BeginError {}
