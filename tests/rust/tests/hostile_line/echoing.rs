@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_line::{CallOptions, Failure};
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Request};
 
-use crate::scripted::{FORMAT, Pieces, Rig, lumps, millis, prompt, right, unit};
+use crate::scripted::{FORMAT, Pieces, Rig, at_once, lumps, millis, right, unit};
 
 type Echo = fn(usize, &[u8]) -> Pieces;
 
@@ -96,7 +96,7 @@ fn an_interrupted_first_call_does_not_let_the_echo_end_the_quarantine() {
 fn another_adapter_at_the_same_port_is_looked_at_anew() {
     let rig = Rig::echoing(
         |number, sent| if number < 2 { Vec::new() } else { whole(number, sent) },
-        |number, request| if number < 1 { prompt(&right(request)) } else { Vec::new() },
+        |number, request| if number < 1 { at_once(&right(request)) } else { Vec::new() },
     );
     assert_eq!(rig.read(100, 1).unwrap(), [100]);
     rig.wire.lock().unwrap().vanish_after_sending = true;
@@ -109,7 +109,7 @@ fn another_adapter_at_the_same_port_is_looked_at_anew() {
 
 #[test]
 fn the_answer_is_still_there_at_its_last_byte() {
-    let rig = Rig::echoing(whole, |_, request| prompt(&right(request)));
+    let rig = Rig::echoing(whole, |_, request| at_once(&right(request)));
     for request in [Request::write(0x2001, 7), Request::read(100, 16).unwrap()] {
         let done = rig.call(unit(1).into(), &request, CallOptions::default(), &mut || false, &mut |_| ()).unwrap();
         let frame = Adu::request(unit(1).into(), &request);

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_line::{CallError, Failure};
 use drivebus_rtu::{Adu, Answer, AnswerError, ExceptionCode, Request};
 
-use crate::scripted::{FORMAT, Pieces, Rig, after, lumps, millis, prompt, right, unit};
+use crate::scripted::{FORMAT, Pieces, Rig, after, at_once, lumps, millis, right, unit};
 
 /// Longer than the time-out of half a second: the reply comes while the next request is out.
 const LATE: Duration = millis(503);
@@ -39,7 +39,7 @@ fn joined(pieces: [&[u8]; 2]) -> Vec<u8> {
 }
 
 fn late_once(number: usize, request: &[u8]) -> Pieces {
-    if number == 0 { after(LATE, &right(request)) } else { prompt(&right(request)) }
+    if number == 0 { after(LATE, &right(request)) } else { at_once(&right(request)) }
 }
 
 fn other_unit(request: &[u8]) -> Vec<u8> {
@@ -62,31 +62,31 @@ fn reads() {
     let table: [Row; 11] = [
         ("the reply comes during the next read", late_once, [(100, 1), (200, 1)], [NoAnswer, Words(vec![200])]),
         ("the same, and the reads differ in length", late_once, [(100, 2), (200, 1)], [NoAnswer, Words(vec![200])]),
-        ("00 before the reply", |_, request| prompt(&joined([&[0x00], &right(request)])),
+        ("00 before the reply", |_, request| at_once(&joined([&[0x00], &right(request)])),
             [(100, 1), (200, 2)], [Words(vec![100]), Words(vec![200, 201])]),
-        ("FF before the reply", |_, request| prompt(&joined([&[0xFF], &right(request)])),
+        ("FF before the reply", |_, request| at_once(&joined([&[0xFF], &right(request)])),
             [(100, 1), (200, 2)], [Words(vec![100]), Words(vec![200, 201])]),
-        ("00 after the reply", |_, request| prompt(&joined([&right(request), &[0x00]])),
+        ("00 after the reply", |_, request| at_once(&joined([&right(request), &[0x00]])),
             [(100, 1), (200, 2)], [Words(vec![100]), Words(vec![200, 201])]),
         ("00 a while after the reply", |_, request| {
-            [prompt(&right(request)), after(millis(1), &joined([&right(request), &[0x00]])[7..])].concat()
+            [at_once(&right(request)), after(millis(1), &joined([&right(request), &[0x00]])[7..])].concat()
         }, [(100, 1), (200, 1)], [Words(vec![100]), Words(vec![200])]),
         ("fewer words than asked for", |number, request| {
             let shorter = Adu::request(unit(1).into(), &Request::read(100, 1).unwrap());
-            prompt(&right(if number == 0 { shorter.as_bytes() } else { request }))
+            at_once(&right(if number == 0 { shorter.as_bytes() } else { request }))
         }, [(100, 2), (200, 1)], [Short(1), Words(vec![200])]),
         ("function 04, then the reply", |_, request| {
             if request[1] == 3 {
-                [prompt(&function_04(request)), after(millis(20), &right(request))].concat()
+                [at_once(&function_04(request)), after(millis(20), &right(request))].concat()
             } else {
-                prompt(&right(request))
+                at_once(&right(request))
             }
         }, [(100, 1), (200, 1)], [Words(vec![100]), Words(vec![200])]),
         ("another unit, then the reply", |_, request| {
-            [prompt(&other_unit(request)), after(millis(20), &right(request))].concat()
+            [at_once(&other_unit(request)), after(millis(20), &right(request))].concat()
         }, [(100, 1), (200, 1)], [Words(vec![100]), Words(vec![200])]),
         ("another unit only", |_, request| {
-            if request[1] == 3 { prompt(&other_unit(request)) } else { prompt(&right(request)) }
+            if request[1] == 3 { at_once(&other_unit(request)) } else { at_once(&right(request)) }
         }, [(100, 1), (200, 1)], [NoAnswer, NoAnswer]),
         ("four bytes every 16 ms", |_, request| lumps(millis(5), &right(request)),
             [(100, 1), (200, 16)], [Words(vec![100]), Words((200..216).collect())]),
@@ -123,7 +123,7 @@ fn a_late_reply_that_is_queued_already_is_counted_and_dropped() {
 /// Nothing is in doubt here, but what came before the question cannot be its answer.
 #[test]
 fn what_is_queued_before_a_request_is_never_its_answer() {
-    let rig = Rig::new(|_, request| [prompt(&right(request)), after(millis(20), &right(request))].concat());
+    let rig = Rig::new(|_, request| [at_once(&right(request)), after(millis(20), &right(request))].concat());
     assert_eq!(rig.read(100, 1).unwrap(), [100]);
     rig.pass(millis(100));
     assert_eq!(rig.read(200, 1).unwrap(), [200]);
@@ -151,7 +151,7 @@ fn a_late_reply_does_not_confirm_a_write_that_the_unit_missed() {
         match (request[1], writes) {
             (6, 1) => after(LATE, &right(request)),
             (6, _) => Vec::new(),
-            _ => prompt(&right(request)),
+            _ => at_once(&right(request)),
         }
     });
     rig.ask(&Request::write(100, 5)).unwrap_err();
@@ -162,7 +162,7 @@ fn a_late_reply_does_not_confirm_a_write_that_the_unit_missed() {
 fn a_refusal_is_told_at_its_last_byte() {
     let refusal = Answer::exception(3, ExceptionCode::ILLEGAL_ADDRESS);
     let frame = Adu::answer(unit(1), &refusal).as_bytes().to_vec();
-    let rig = Rig::new(move |_, _| prompt(&frame));
+    let rig = Rig::new(move |_, _| at_once(&frame));
     let error = rig.read(100, 1).unwrap_err();
     assert!(matches!(error.failure, Failure::Refused { function: 3, code: ExceptionCode::ILLEGAL_ADDRESS }));
     let took = error.ended.saturating_duration_since(error.sent.unwrap());

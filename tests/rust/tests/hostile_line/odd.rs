@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drivebus_line::{CallOptions, Failure, PortErrorKind};
 use drivebus_rtu::{BeginError, Request};
 
-use crate::scripted::{Rig, after, millis, prompt, right, unit};
+use crate::scripted::{Rig, after, at_once, millis, right, unit};
 
 #[test]
 fn an_answer_after_much_babble_loses_no_byte() {
@@ -33,7 +33,7 @@ fn a_unit_that_never_echoed_in_time_gives_no_answer_to_another_question() {
 #[test]
 fn a_unit_that_ignores_08h_is_found_again() {
     let rig =
-        Rig::new(|number, request| if number == 0 || request[1] == 8 { Vec::new() } else { prompt(&right(request)) });
+        Rig::new(|number, request| if number == 0 || request[1] == 8 { Vec::new() } else { at_once(&right(request)) });
     rig.read(100, 1).unwrap_err();
     let tries = (0..10).position(|_| rig.read(200, 1).is_ok_and(|words| words == [200]));
     assert!(tries.is_some(), "{:?}", rig.read(200, 1));
@@ -54,7 +54,7 @@ fn what_was_asked_before_a_port_was_lost_is_remembered() {
 
 #[test]
 fn a_read_goes_on_over_a_port_that_comes_back() {
-    let rig = Rig::new(|_, request| prompt(&right(request)));
+    let rig = Rig::new(|_, request| at_once(&right(request)));
     rig.wire.lock().unwrap().vanish_after_sending = true;
     let again = CallOptions { retries: Some(1), ..CallOptions::default() };
     let request = Request::read(100, 1).unwrap();
@@ -65,7 +65,7 @@ fn a_read_goes_on_over_a_port_that_comes_back() {
 /// A server that is switched off lets the system try for seconds.
 #[test]
 fn who_gives_up_does_not_wait_for_a_port_to_open() {
-    let rig = Rig::new(|_, request| prompt(&right(request)));
+    let rig = Rig::new(|_, request| at_once(&right(request)));
     rig.wire.lock().unwrap().vanish_after_sending = true;
     rig.read(100, 1).unwrap_err();
     let opening = Arc::clone(&rig.opening);

@@ -40,11 +40,11 @@ pub(crate) fn right(request: &[u8]) -> Vec<u8> {
 }
 
 /// An answer whose last byte is there as soon as a unit can have sent it.
-pub(crate) fn prompt(bytes: &[u8]) -> Pieces {
+pub(crate) fn at_once(bytes: &[u8]) -> Pieces {
     after(Duration::ZERO, bytes)
 }
 
-/// As [`prompt`], so much later.
+/// As [`at_once`], so much later.
 pub(crate) fn after(delay: Duration, bytes: &[u8]) -> Pieces {
     vec![(FORMAT.t35() + FORMAT.chars(u32::try_from(bytes.len()).unwrap()) + delay, bytes.to_vec())]
 }
