@@ -4,11 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, BeginError, Destination, Instant, Request, SerialFormat};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat};
 
 use crate::clock::{monotonic, sleep_until};
 use crate::error::{CallError, Failure};
-use crate::owner::{AdapterEcho, Ask, Done, Opener, Owner};
+use crate::exchange::{Ask, Done};
+use crate::owner::{AdapterEcho, Opener, Owner};
 use crate::queue::{LOOK_UP, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
@@ -182,14 +183,14 @@ impl Bus {
         let ask = Ask { destination, request, timeout, urgent: options.urgent };
         if self.queue.has_this_thread() {
             let now = self.clock.now().unwrap_or_default();
-            return Err(unsent(&ask, Failure::NotBegun(BeginError::OutOfTurn), now));
+            return Err(ask.failed(Failure::NotBegun(BeginError::OutOfTurn), None, now, &[]));
         }
         if self.options.read_only && request.is_write() {
-            return Err(unsent(&ask, Failure::ReadOnly { function: request.function() }, self.now()));
+            return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now(), &[]));
         }
         let mut give_up = || self.is_closed() || give_up();
         let Some(_turn) = self.queue.turn(options.urgent, &mut give_up) else {
-            return Err(unsent(&ask, self.given_up(), self.now()));
+            return Err(ask.failed(self.given_up(), None, self.now(), &[]));
         };
         let mut owner = self.lock();
         let result = self.ask(&mut owner, &ask, options, &mut give_up, take);
@@ -221,7 +222,7 @@ impl Bus {
             if let Err(failure) = owner.reopen(give_up) {
                 let failure = if failure == Failure::Interrupted { self.given_up() } else { failure };
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.unwrap_or_else(|| unsent(ask, failure, self.now_of(owner))));
+                return Err(lost.unwrap_or_else(|| ask.failed(failure, None, self.now_of(owner), &[])));
             }
             if attempt > 0
                 && let Destination::Unit(unit) = destination
@@ -237,13 +238,13 @@ impl Bus {
                         Failure::NoAnswer { timeout, .. } => Failure::NoAnswer { timeout, attempts: attempt + 1 },
                         other => other,
                     };
-                    error.request = Adu::request(destination, request).as_bytes().to_vec();
+                    error.request = ask.frame();
                     return Err(error);
                 }
                 done => return done,
             }
         }
-        Err(unsent(ask, Failure::Closed, self.now_of(owner)))
+        Err(ask.failed(Failure::Closed, None, self.now_of(owner), &[]))
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
@@ -309,12 +310,6 @@ impl Bus {
     fn lock(&self) -> MutexGuard<'_, Owner> {
         self.owner.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// The error of a call whose request never went out.
-fn unsent(ask: &Ask<'_>, failure: Failure, ended: Instant) -> Box<CallError> {
-    let request = Adu::request(ask.destination, ask.request).as_bytes().to_vec();
-    Box::new(CallError { failure, destination: ask.destination, request, raw: Vec::new(), sent: None, ended })
 }
 
 /// Whether the same read may well succeed the next time.

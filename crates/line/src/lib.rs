@@ -8,6 +8,7 @@
 mod bus;
 pub mod clock;
 mod error;
+mod exchange;
 pub mod mbap;
 mod owner;
 mod port;
@@ -21,6 +22,7 @@ pub mod tty;
 
 pub use bus::{Bus, BusOptions, CallOptions};
 pub use error::{CallError, Failure};
-pub use owner::{AdapterEcho, Done, Opener};
+pub use exchange::Done;
+pub use owner::{AdapterEcho, Opener};
 pub use port::{Line, PortError, PortErrorKind};
 pub use stats::{Counters, Latency, Stats};

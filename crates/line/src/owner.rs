@@ -1,16 +1,12 @@
-//! Who has the turn: one exchange after the other on an open line.
-//!
-//! Drives the state machine of `drivebus-rtu` with a real line: bytes, the clock, and the wish to give up.
+//! Who has the turn: what is known of the line, its adapter and its units, and what has to go out before a request.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{
-    Adu, Answer, Destination, Event, Instant, Master, Request, SerialFormat, TURNAROUND, Tally, UnitAddress,
-};
+use drivebus_rtu::{Adu, Answer, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
 use crate::error::{CallError, Failure};
-use crate::queue::LOOK_UP;
+use crate::exchange::{Ask, Done, exchange};
 use crate::reopen::Reopen;
 use crate::resync::{FreshWords, Resync};
 use crate::stats::Stats;
@@ -28,26 +24,6 @@ pub enum AdapterEcho {
     Present,
     /// It does not.
     Absent,
-}
-
-/// One request on its way.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ask<'a> {
-    pub(crate) destination: Destination,
-    pub(crate) request: &'a Request<'a>,
-    pub(crate) timeout: Duration,
-    /// Whether it goes out at once, even to a unit that left a request open.
-    pub(crate) urgent: bool,
-}
-
-/// When an exchange happened, on the line's clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Done {
-    /// The first bit of the request.
-    pub sent: Instant,
-    /// The last byte of the answer.
-    pub ended: Instant,
 }
 
 /// The line, and all that is known about it.
@@ -206,7 +182,10 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let result = self.run(ask, give_up, take);
+        let result = match self.line.as_deref_mut() {
+            Some(line) => exchange(line, &mut self.master, ask, give_up, take),
+            None => Err(ask.failed(Failure::Closed, None, Instant::ZERO, &[])),
+        };
         let unit = match ask.destination {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
@@ -269,112 +248,4 @@ impl Owner {
             self.echo = AdapterEcho::Absent;
         }
     }
-
-    fn run(
-        &mut self,
-        ask: &Ask<'_>,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        let mut sent = None;
-        let Some(line) = self.line.as_deref_mut() else {
-            return Err(failed(ask, Failure::Closed, sent, Instant::ZERO, &[]));
-        };
-        let master = &mut self.master;
-        let mut now = line.now();
-        let mut looked_up = now;
-        let timeout = match ask.destination {
-            Destination::Unit(_) => ask.timeout,
-            Destination::Broadcast => TURNAROUND,
-        };
-        let begin = if ask.urgent { Master::begin_in_doubt } else { Master::begin };
-        if let Err(error) = begin(master, now, ask.destination, ask.request, timeout) {
-            return Err(failed(ask, Failure::NotBegun(error), sent, now, &[]));
-        }
-        let mut buffer = [0; 256];
-        let mut came = 0..0;
-        // What is queued already is no answer, and the line was not silent while it came.
-        match line.receive(&mut buffer, now) {
-            Ok(count) => came = 0..count,
-            Err(error) => {
-                master.abort();
-                return Err(failed(ask, Failure::Port(error), sent, now, &[]));
-            }
-        }
-        now = line.now();
-        loop {
-            // Whatever there is no room for now, there is after polling.
-            came.start += master.receive(now, &buffer[came.clone()]);
-            if let Some(event) = master.poll(now) {
-                let no_answer = Failure::NoAnswer { timeout, attempts: 1 };
-                match (event, sent) {
-                    (Event::Transmit(frame), _) => {
-                        let end = line
-                            .send(frame)
-                            .map_err(|error| failed(ask, Failure::Port(error), Some(now), line.now(), &[]));
-                        sent = Some(now);
-                        match end {
-                            Ok(end) => master.sent(end),
-                            Err(error) => {
-                                master.abort();
-                                return Err(error);
-                            }
-                        }
-                    }
-                    (Event::Answer(answer @ Answer::Exception { function, code, .. }), _) => {
-                        // An exception is known by its two bytes: the frame that came is the one that is made here.
-                        let came = match ask.destination {
-                            Destination::Unit(unit) => Some(Adu::answer(unit, &answer)),
-                            Destination::Broadcast => None,
-                        };
-                        let raw = came.as_ref().map_or(&[][..], Adu::as_bytes);
-                        return Err(failed(ask, Failure::Refused { function, code }, sent, now, raw));
-                    }
-                    (Event::Answer(answer), Some(sent)) => {
-                        take(answer);
-                        return Ok(Done { sent, ended: now });
-                    }
-                    (Event::BroadcastDone, Some(sent)) => return Ok(Done { sent, ended: now }),
-                    (Event::Wrong { error, frame }, _) => {
-                        return Err(failed(ask, Failure::Wrong(error), sent, now, frame));
-                    }
-                    (Event::Corrupt { error, bytes }, _) => {
-                        return Err(failed(ask, Failure::Corrupt(error), sent, now, bytes));
-                    }
-                    (Event::NoAnswer { bytes }, _) => return Err(failed(ask, no_answer, sent, now, bytes)),
-                    (Event::Busy, _) => return Err(failed(ask, Failure::Busy { timeout }, sent, now, &[])),
-                    (Event::Answer(_) | Event::BroadcastDone, None) => {
-                        return Err(failed(ask, no_answer, sent, now, &[]));
-                    }
-                }
-                continue;
-            }
-            if now.saturating_duration_since(looked_up) >= LOOK_UP {
-                looked_up = now;
-                if give_up() {
-                    master.abort();
-                    return Err(failed(ask, Failure::Interrupted, sent, now, &[]));
-                }
-            }
-            if !came.is_empty() {
-                continue;
-            }
-            let wake = now + LOOK_UP;
-            let until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
-            let received = line.receive(&mut buffer, until);
-            now = line.now();
-            match received {
-                Ok(count) => came = 0..count,
-                Err(error) => {
-                    master.abort();
-                    return Err(failed(ask, Failure::Port(error), sent, now, &[]));
-                }
-            }
-        }
-    }
-}
-
-fn failed(ask: &Ask<'_>, failure: Failure, sent: Option<Instant>, ended: Instant, raw: &[u8]) -> Box<CallError> {
-    let request = Adu::request(ask.destination, ask.request).as_bytes().to_vec();
-    Box::new(CallError { failure, destination: ask.destination, request, raw: raw.to_vec(), sent, ended })
 }

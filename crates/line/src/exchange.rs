@@ -1,0 +1,147 @@
+//! One request and what becomes of it, on an open line.
+//!
+//! Drives the state machine of `drivebus-rtu` with a real line: bytes, the clock, and the wish to give up.
+
+use std::time::Duration;
+
+use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, TURNAROUND};
+
+use crate::Line;
+use crate::error::{CallError, Failure};
+use crate::queue::LOOK_UP;
+
+/// One request on its way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ask<'a> {
+    pub(crate) destination: Destination,
+    pub(crate) request: &'a Request<'a>,
+    pub(crate) timeout: Duration,
+    /// Whether it goes out at once, even to a unit that left a request open.
+    pub(crate) urgent: bool,
+}
+
+/// When an exchange happened, on the line's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Done {
+    /// The first bit of the request.
+    pub sent: Instant,
+    /// The last byte of the answer.
+    pub ended: Instant,
+}
+
+impl Ask<'_> {
+    /// The whole request frame.
+    pub(crate) fn frame(&self) -> Vec<u8> {
+        Adu::request(self.destination, self.request).as_bytes().to_vec()
+    }
+
+    /// The error of this request; `sent` and `ended` are moments of the line's clock, `raw` is what came.
+    pub(crate) fn failed(&self, failure: Failure, sent: Option<Instant>, ended: Instant, raw: &[u8]) -> Box<CallError> {
+        let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
+        Box::new(CallError { failure, destination, request, raw, sent, ended })
+    }
+
+    /// How long to wait after the request: for the answer, or for the units to act on a broadcast.
+    fn patience(&self) -> Duration {
+        match self.destination {
+            Destination::Unit(_) => self.timeout,
+            Destination::Broadcast => TURNAROUND,
+        }
+    }
+}
+
+/// Sends one request over `line` and gives its answer to `take`.
+pub(crate) fn exchange(
+    line: &mut dyn Line,
+    master: &mut Master,
+    ask: &Ask<'_>,
+    give_up: &mut dyn FnMut() -> bool,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<Done, Box<CallError>> {
+    let mut sent = None;
+    let mut now = line.now();
+    let mut looked_up = now;
+    let begin = if ask.urgent { Master::begin_in_doubt } else { Master::begin };
+    begin(master, now, ask.destination, ask.request, ask.patience())
+        .map_err(|error| ask.failed(Failure::NotBegun(error), sent, now, &[]))?;
+
+    let mut buffer = [0; 256];
+    // What is queued already is no answer, and the line was not silent while it came: read without waiting.
+    let mut until = now;
+    loop {
+        let received = line.receive(&mut buffer, until);
+        now = line.now();
+        let mut rest = match received {
+            Ok(count) => &buffer[..count],
+            Err(error) => {
+                master.abort();
+                return Err(ask.failed(Failure::Port(error), sent, now, &[]));
+            }
+        };
+        loop {
+            // Whatever there is no room for now, there is after polling.
+            rest = &rest[master.receive(now, rest)..];
+            match master.poll(now) {
+                Some(Event::Transmit(frame)) => {
+                    sent = Some(now);
+                    match line.send(frame) {
+                        Ok(end) => master.sent(end),
+                        Err(error) => {
+                            master.abort();
+                            return Err(ask.failed(Failure::Port(error), sent, line.now(), &[]));
+                        }
+                    }
+                }
+                Some(event) => return conclude(ask, event, sent, now, take),
+                None if rest.is_empty() => break,
+                None => {}
+            }
+        }
+        if now.saturating_duration_since(looked_up) >= LOOK_UP {
+            looked_up = now;
+            if give_up() {
+                master.abort();
+                return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
+            }
+        }
+        let wake = now + LOOK_UP;
+        until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
+    }
+}
+
+/// What `event`, which ends the request, means to its caller.
+fn conclude(
+    ask: &Ask<'_>,
+    event: Event<'_>,
+    sent: Option<Instant>,
+    ended: Instant,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<Done, Box<CallError>> {
+    let timeout = ask.patience();
+    let (failure, raw) = match (event, sent) {
+        (Event::Answer(answer @ Answer::Exception { function, code, .. }), _) => {
+            // An exception is known by its two bytes: the frame that came is the one that is made here.
+            let came = match ask.destination {
+                Destination::Unit(unit) => Some(Adu::answer(unit, &answer)),
+                Destination::Broadcast => None,
+            };
+            let raw = came.as_ref().map_or(&[][..], Adu::as_bytes);
+            return Err(ask.failed(Failure::Refused { function, code }, sent, ended, raw));
+        }
+        (Event::Answer(answer), Some(sent)) => {
+            take(answer);
+            return Ok(Done { sent, ended });
+        }
+        (Event::BroadcastDone, Some(sent)) => return Ok(Done { sent, ended }),
+        (Event::Wrong { error, frame }, _) => (Failure::Wrong(error), frame),
+        (Event::Corrupt { error, bytes }, _) => (Failure::Corrupt(error), bytes),
+        (Event::NoAnswer { bytes }, _) => (Failure::NoAnswer { timeout, attempts: 1 }, bytes),
+        (Event::Busy, _) => (Failure::Busy { timeout }, &[][..]),
+        // The master says neither of a request that it did not hand out.
+        (Event::Transmit(_) | Event::Answer(_) | Event::BroadcastDone, _) => {
+            (Failure::NoAnswer { timeout, attempts: 1 }, &[][..])
+        }
+    };
+    Err(ask.failed(failure, sent, ended, raw))
+}
