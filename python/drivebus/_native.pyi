@@ -27,7 +27,7 @@ __all__ = [
     "encode_write",
 ]
 
-def crc16(data: Buffer) -> int:
+def crc16(data: Buffer, /) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
 
 def encode_read(unit: int, address: int, count: int) -> bytes:

@@ -7,8 +7,9 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use crate::convert::{bytes_of, destination, one_word, unit_address, words_of};
 use crate::errors::{answer_error, frame_error, refuse, refused};
 
-/// CRC-16/MODBUS of any bytes-like object.
+/// CRC-16/MODBUS of any bytes-like object. By position only, as `zlib.crc32`: a name costs a fifth of the call.
 #[pyfunction]
+#[pyo3(signature = (data, /))]
 pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
     // The usual case, without so much as a reference count.
     if let Ok(bytes) = data.cast::<PyBytes>() {
