@@ -39,6 +39,11 @@ impl<'a> Frame<'a> {
         if computed == received { Ok(Self { bytes }) } else { Err(FrameError::Crc { computed, received }) }
     }
 
+    /// Takes `bytes` that the framer has found to be a whole frame, without computing their CRC once more.
+    pub(crate) const fn found(bytes: &'a [u8]) -> Self {
+        Self { bytes }
+    }
+
     /// The address byte, 0..=255.
     pub const fn address(&self) -> u8 {
         self.bytes[0]

@@ -153,10 +153,7 @@ impl Framer {
     /// [`Skipped`]: bytes that belong to no frame, and why.
     pub fn poll(&mut self, now: Instant) -> Option<Result<Frame<'_>, Skipped<'_>>> {
         Some(match self.step(now)? {
-            Step::Frame(range) => match Frame::parse(&self.bytes[range.clone()]) {
-                Ok(frame) => Ok(frame),
-                Err(error) => Err(Skipped { bytes: &self.bytes[range], error }),
-            },
+            Step::Frame(range) => Ok(self.frame(range)),
             Step::Skipped { range, error, .. } => Err(Skipped { bytes: &self.bytes[range], error }),
         })
     }
@@ -176,6 +173,11 @@ impl Framer {
         self.settled = false;
         self.overrun = false;
         dropped
+    }
+
+    /// The frame that a step has found at `range`.
+    pub(crate) fn frame(&self, range: Range<usize>) -> Frame<'_> {
+        Frame::found(&self.bytes[range])
     }
 
     pub(crate) fn held(&self, range: Range<usize>) -> &[u8] {

@@ -12,7 +12,7 @@ use core::time::Duration;
 
 use crate::answer::{AnswerError, Expected};
 use crate::event::{BeginError, Event, Tally};
-use crate::frame::{Adu, Frame};
+use crate::frame::Adu;
 use crate::framer::{Framer, Step};
 use crate::request::Request;
 use crate::unit_set::UnitSet;
@@ -298,10 +298,8 @@ impl Master {
                     self.framer.forget_own();
                 }
                 Step::Frame(range) => {
-                    let Ok(frame) = Frame::parse(self.framer.held(range.clone())) else {
-                        continue;
-                    };
-                    match expected.judge_frame(unit, &frame) {
+                    let judged = expected.judge_frame(unit, &self.framer.frame(range.clone()));
+                    match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => self.count_other(range, unit),
                         // In quarantine another word than the fresh one is a late answer to an earlier echo.
                         Err(AnswerError::Echo { .. }) if self.in_quarantine(unit) => self.tally.late += 1,
@@ -312,7 +310,7 @@ impl Master {
                             if expected.is_echo() || !self.in_quarantine(unit) {
                                 self.busy = Some(now);
                             }
-                            return Some(self.settle(unit, expected, outcome.err(), range));
+                            return Some(self.settle(unit, expected, outcome.is_ok(), range));
                         }
                     }
                 }
@@ -330,23 +328,19 @@ impl Master {
         &mut self,
         unit: UnitAddress,
         expected: Expected,
-        error: Option<AnswerError>,
+        right: bool,
         range: core::ops::Range<usize>,
     ) -> Event<'_> {
-        match error {
-            None if expected.is_echo() => self.quarantine.remove(unit),
-            None => {}
-            Some(_) => self.quarantine.insert(unit),
+        match (right, expected.is_echo()) {
+            (true, true) => self.quarantine.remove(unit),
+            (true, false) => {}
+            (false, _) => self.quarantine.insert(unit),
         }
-        let frame = self.framer.held(range);
-        // Judged twice, because the first verdict could not be kept beside the change of state.
-        let verdict = match Frame::parse(frame) {
-            Ok(parsed) => expected.judge(parsed.pdu()),
-            Err(error) => return Event::Corrupt { error, bytes: frame },
-        };
-        match verdict {
+        let frame = self.framer.frame(range);
+        // Judged again, because the first verdict could not be kept beside the change of state.
+        match expected.judge(frame.pdu()) {
             Ok(answer) => Event::Answer(answer),
-            Err(error) => Event::Wrong { error, frame },
+            Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
         }
     }
 

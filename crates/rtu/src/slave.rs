@@ -92,14 +92,11 @@ impl Slave {
 
     /// What was heard by `now`; `None` when there is nothing to say.
     pub fn poll(&mut self, now: Instant) -> Option<SlaveEvent<'_>> {
-        let (range, error) = match self.framer.step(now)? {
-            Step::Frame(range) => (range, None),
-            Step::Skipped { range, error, .. } => (range, Some(error)),
-        };
-        let bytes = self.framer.held(range);
-        let frame = match (error, Frame::parse(bytes)) {
-            (None, Ok(frame)) => frame,
-            (Some(error), _) | (None, Err(error)) => return Some(SlaveEvent::Bad { error, bytes }),
+        let frame = match self.framer.step(now)? {
+            Step::Frame(range) => self.framer.frame(range),
+            Step::Skipped { range, error, .. } => {
+                return Some(SlaveEvent::Bad { error, bytes: self.framer.held(range) });
+            }
         };
         let broadcast = match Destination::from_wire(frame.address()) {
             Ok(Destination::Broadcast) => true,
