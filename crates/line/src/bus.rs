@@ -9,11 +9,12 @@ use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialForm
 use crate::clock::{monotonic, sleep_until};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::owner::{AdapterEcho, Opener, Owner};
+use crate::opener::Opener;
+use crate::owner::{AdapterEcho, Owner};
 use crate::queue::{LOOK_UP, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
-use crate::{Line, PortError, PortErrorKind};
+use crate::{Line, PortErrorKind};
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]
@@ -70,10 +71,8 @@ pub struct Bus {
 /// How to tell the line's time without the line, which another thread may be waiting on.
 #[derive(Debug, Clone, Copy)]
 enum Clock {
-    /// The line's clock is this far ahead of the system's.
-    Real { ahead: Duration },
-    /// The line's clock is this far behind the system's.
-    RealBehind { behind: Duration },
+    /// It runs as the system's does; both stood so at one moment.
+    Real { line: Instant, system: Instant },
     /// Only the line knows: its time moves only while somebody waits.
     Virtual,
 }
@@ -83,21 +82,13 @@ impl Clock {
         if line.is_virtual() {
             return Self::Virtual;
         }
-        let (line, system) = (line.now(), monotonic());
-        if line >= system {
-            Self::Real { ahead: line.saturating_duration_since(system) }
-        } else {
-            Self::RealBehind { behind: system.saturating_duration_since(line) }
-        }
+        Self::Real { line: line.now(), system: monotonic() }
     }
 
     /// Now on the line's clock; `None` where only the line knows.
     fn now(self) -> Option<Instant> {
         match self {
-            Self::Real { ahead } => Some(monotonic() + ahead),
-            Self::RealBehind { behind } => {
-                Some(Instant::ZERO + monotonic().saturating_duration_since(Instant::ZERO + behind))
-            }
+            Self::Real { line, system } => Some(line + monotonic().saturating_duration_since(system)),
             Self::Virtual => None,
         }
     }
@@ -106,12 +97,15 @@ impl Clock {
 impl Bus {
     /// Opens a line with `opener`, which is called again whenever the line was lost.
     ///
+    /// `opener` runs in a thread of its own, because it may block in the system for seconds; `give_up` is asked about
+    /// every 50 ms meanwhile.
+    ///
     /// # Errors
     ///
-    /// [`PortError`]: the line cannot be opened.
-    pub fn open(opener: Opener, options: BusOptions) -> Result<Self, PortError> {
+    /// [`Failure::Port`]: the line cannot be opened. [`Failure::Interrupted`]: `give_up` said so first.
+    pub fn open(opener: Opener, options: BusOptions, give_up: &mut dyn FnMut() -> bool) -> Result<Self, Failure> {
         let words = Arc::new(FreshWords::new());
-        let mut owner = Owner::open(opener, options.format, options.echo, Arc::clone(&words))?;
+        let mut owner = Owner::open(opener, options.format, options.echo, Arc::clone(&words), give_up)?;
         let (name, clock) =
             owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
@@ -271,7 +265,7 @@ impl Bus {
                     Some(line) => line.sleep(now + slice),
                     None => return,
                 },
-                Clock::Real { .. } | Clock::RealBehind { .. } => sleep_until(monotonic() + slice),
+                Clock::Real { .. } => sleep_until(monotonic() + slice),
             }
             if give_up() {
                 return;

@@ -5,15 +5,12 @@ use std::time::Duration;
 
 use drivebus_rtu::{Adu, Answer, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
+use crate::Line;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
-use crate::reopen::Reopen;
+use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Resync};
 use crate::stats::Stats;
-use crate::{Line, PortError};
-
-/// Opens the line, at first and again after it was lost.
-pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Line>, PortError> + Send>;
 
 /// What is known about the adapter sending our own bytes back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +26,7 @@ pub enum AdapterEcho {
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
-    reopen: Reopen,
+    opener: LineOpener,
     master: Master,
     /// What the user knows about the adapter.
     given_echo: AdapterEcho,
@@ -48,15 +45,17 @@ impl std::fmt::Debug for Owner {
 
 impl Owner {
     pub(crate) fn open(
-        mut opener: Opener,
+        opener: Opener,
         format: SerialFormat,
         echo: AdapterEcho,
         words: Arc<FreshWords>,
-    ) -> Result<Self, PortError> {
-        let line = opener()?;
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, Failure> {
+        let mut opener = LineOpener::new(opener);
+        let line = opener.open(give_up)?;
         let mut owner = Self {
             line: None,
-            reopen: Reopen::new(opener),
+            opener,
             master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
             given_echo: echo,
             echo,
@@ -95,7 +94,7 @@ impl Owner {
     /// Opens the line again if it was lost, unless `give_up` says so first.
     pub(crate) fn reopen(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {
-            let line = self.reopen.open(give_up).ok_or(Failure::Interrupted)?.map_err(Failure::Port)?;
+            let line = self.opener.open(give_up)?;
             // What was asked over the lost port may be answered over the new one.
             self.master.reopened(line.now());
             self.take_line(line);

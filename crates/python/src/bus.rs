@@ -3,7 +3,9 @@
 use std::sync::Mutex;
 use std::time::{Duration, SystemTime};
 
-use drivebus_line::{AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, PortError, PortErrorKind};
+use drivebus_line::{
+    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, PortError, PortErrorKind,
+};
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -46,8 +48,11 @@ impl Bus {
         let (opener, format) = open::opener(port, format.0, rs485)?;
         let options =
             BusOptions { timeout: duration("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
-        let core = open::patiently(py, move || CoreBus::open(opener, options))?;
-        let core = core.map_err(|error| port_error(&error))?;
+        let core =
+            with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(|failure| match failure {
+                Failure::Port(error) => port_error(&error),
+                other => refuse(other),
+            })?;
         let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
         Ok(Self { core, virtual_ahead })
     }

@@ -1,14 +1,12 @@
 //! From what the Python package hands over as a port to a line of the core.
 
-use std::sync::Mutex;
-use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
 use drivebus_line::rs485::Rs485;
 use drivebus_line::tcp::RtuOverTcp;
 use drivebus_line::tty::{Tty, TtyOptions};
-use drivebus_line::{Line, Opener, PortError, PortErrorKind};
+use drivebus_line::{Line, Opener};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -20,8 +18,6 @@ use crate::sim::Simulator;
 
 /// How long a server may take to accept a connection.
 const CONNECT: Duration = Duration::from_secs(3);
-/// How often Ctrl-C is looked for while a port is opened.
-const LOOK_UP: Duration = Duration::from_millis(50);
 
 /// What opens `port`, and the format its characters have.
 pub(crate) fn opener(
@@ -103,34 +99,4 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
         }
     }
     Ok(options)
-}
-
-/// Runs `open`, which may block in the system, in a thread of its own, so that Ctrl-C still ends the wait at once.
-pub(crate) fn patiently<T: Send + 'static>(
-    py: Python<'_>,
-    open: impl FnOnce() -> Result<T, PortError> + Send + 'static,
-) -> PyResult<Result<T, PortError>> {
-    let (done, result) = channel();
-    let opening = std::thread::Builder::new().name(String::from("drivebus-open")).spawn(move || {
-        // Nobody takes the port any more after Ctrl-C: it is closed again.
-        let _ = done.send(open());
-    });
-    if let Err(error) = opening {
-        return Ok(Err(PortError::new(PortErrorKind::Other, "port", format!("no thread to open it: {error}"))));
-    }
-    // Nobody else uses the receiver; the lock only says so to the compiler.
-    let result = Mutex::new(result);
-    let wait = || match result.lock() {
-        Ok(result) => result.recv_timeout(LOOK_UP),
-        Err(_) => Err(RecvTimeoutError::Disconnected),
-    };
-    loop {
-        match py.detach(wait) {
-            Ok(opened) => return Ok(opened),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => {
-                return Ok(Err(PortError::new(PortErrorKind::Other, "port", "opening it failed unexpectedly")));
-            }
-        }
-    }
 }

@@ -22,7 +22,7 @@ fn simulator(format: SerialFormat) -> Simulator {
 fn bus(simulator: &Simulator, options: BusOptions) -> Bus {
     let line: Box<dyn Line> = Box::new(simulator.line());
     let mut line = Some(line);
-    Bus::open(Box::new(move || Ok(line.take().unwrap())), options).unwrap()
+    Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap()
 }
 
 fn pair() -> (Simulator, Bus) {

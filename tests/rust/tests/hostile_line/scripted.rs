@@ -187,7 +187,7 @@ impl Rig {
             Ok(Box::new(line.clone()) as Box<dyn Line>)
         };
         let options = BusOptions { retries: 0, ..BusOptions::new(FORMAT) };
-        Self { bus: Bus::open(Box::new(opener), options).unwrap(), wire, opening }
+        Self { bus: Bus::open(Box::new(opener), options, &mut || false).unwrap(), wire, opening }
     }
 
     /// Asks unit 1; the words read, or none.
