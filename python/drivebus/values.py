@@ -18,11 +18,13 @@ __all__ = [
     "Description",
     "Fault",
     "Found",
+    "Link",
     "Snapshot",
     "State",
     "Stats",
     "Status",
     "Value",
+    "WatchdogSettings",
 ]
 
 
@@ -260,6 +262,46 @@ class Description:
     def writable(self) -> bool:
         """Whether a write makes sense at all."""
         return self.access != "ro"
+
+
+@dataclass(frozen=True)
+class Link:
+    """How well one unit could be reached: its last exchanges, ten at most.
+
+    Attributes:
+        good: How many of them brought an answer; a refusal is one.
+        asked: How many there were, 0..10.
+    """
+
+    good: int
+    asked: int
+
+    @property
+    def failed(self) -> int:
+        """How many of them brought no answer, or a damaged one."""
+        return self.asked - self.good
+
+    def __str__(self) -> str:
+        return f"{self.good} of the last {self.asked} exchanges brought an answer"
+
+
+@dataclass(frozen=True)
+class WatchdogSettings:
+    """Which parameters make a drive act by itself when its bus falls silent.
+
+    Attributes:
+        timeout: The parameter that holds how long the bus may be silent.
+        action: The parameter that holds what the drive then does.
+        actions: The value of *action* for each thing it can do: `"coast"`, `"stop"`.
+        verified: Whether a document of this very family prints them.
+        source: The document that says so.
+    """
+
+    timeout: str
+    action: str
+    actions: Mapping[str, int]
+    verified: bool
+    source: str
 
 
 class Snapshot(Mapping[str, Value]):

@@ -7,7 +7,7 @@ import pickle
 
 import pytest
 
-from drivebus import Choice, Control, ControlItem, Fault, Snapshot, State, Stats
+from drivebus import Choice, Control, ControlItem, Fault, Link, Snapshot, State, Stats
 
 
 def test_a_choice_is_its_number_and_shows_its_label() -> None:
@@ -58,3 +58,8 @@ def test_a_control_list_is_true_when_all_is_well() -> None:
 def test_a_fault_says_when_it_is_not_sure() -> None:
     assert str(Fault(11, "OL1", "Motor overload")) == "OL1 (11): Motor overload"
     assert str(Fault(4, "OC1", "Overcurrent", verified=False)) == "OC1 (4): Overcurrent [unverified]"
+
+
+def test_a_link_counts_what_failed_and_reads_as_a_sentence() -> None:
+    assert Link(good=7, asked=10).failed == 3
+    assert str(Link(7, 10)) == "7 of the last 10 exchanges brought an answer"
