@@ -165,6 +165,9 @@ class Profile:
     @property
     def max_words(self) -> int:
         """Most words in one read or write."""
+    @property
+    def identification_address(self) -> int:
+        """Where the drive says what it is."""
     def identify(self, code: int, /) -> str | None:
         """The family that register 2103H names with *code*, by this profile's list; None if unknown."""
     def names(self) -> list[str]:
@@ -183,6 +186,8 @@ class Profile:
         """
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """The address of *name*; with *store* given, the one to write to for RAM (False) or EEPROM (True)."""
+    def read_back(self, name: str, /) -> int | None:
+        """Where what was written to *name* can be read; None where that would not tell whether the drive took it."""
     def decode(self, name: str, raw: int, /) -> int | float:
         """*raw* (0..=0xFFFF) in engineering units: int where the drive counts or names, float where it measures."""
     def encode(self, name: str, value: object, /) -> int:
@@ -206,6 +211,12 @@ class Profile:
         """State word 1 as `forward`, `reverse`, `stopped`, `fault`, `power_off`, `pre_exciting` or `unknown`."""
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus: `code`, `value`, `label`, `verified`, `note`, in order."""
+    def watchdog(self) -> dict[str, Any] | None:
+        """What makes the drive act when the bus falls silent, or None.
+
+        Keys: `timeout` and `action` (parameter codes), `actions` (the value of `"coast"` and of `"stop"`, where the
+        family has them), `verified`, `source`.
+        """
     def fault(self, code: int, /) -> dict[str, Any]:
         """One fault: `code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `source`.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from drivebus import _native
 from drivebus.errors import NotAllowed
-from drivebus.values import Description, Fault
+from drivebus.values import Description, Fault, WatchdogSettings
 
 __all__ = ["Profile", "identify", "profiles"]
 
@@ -101,6 +101,13 @@ class Profile:
         """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True)."""
         return self._native.address(name, store=store)
 
+    def read_back(self, name: str, /) -> int | None:
+        """Where what was written to *name* can be read; None where that would not tell whether the drive took it.
+
+        A command, and a parameter whose write does something (P00.15 tunes the motor), tell nothing.
+        """
+        return self._native.read_back(name)
+
     def decode(self, name: str, raw: int, /) -> int | float:
         """*raw* (0..0xFFFF) in engineering units."""
         return self._native.decode(name, raw)
@@ -152,6 +159,17 @@ class Profile:
     def identifies(self, code: int) -> str | None:
         """The family that identification *code* names, as far as this profile knows; None if it does not."""
         return self._native.identify(code)
+
+    @property
+    def identification_address(self) -> int:
+        """Where the drive says what it is, 0..0xFFFF."""
+        return self._native.identification_address
+
+    @property
+    def watchdog(self) -> WatchdogSettings | None:
+        """What makes the drive act by itself when its bus falls silent; None where the family has no such thing."""
+        settings = self._native.watchdog()
+        return None if settings is None else WatchdogSettings(**settings)
 
     @property
     def maximum_frequency(self) -> str | None:

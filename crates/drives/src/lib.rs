@@ -54,6 +54,7 @@ mod quantity;
 mod serial;
 mod state;
 mod value;
+mod watchdog;
 
 pub use bits::BitField;
 pub use command::{Command, Control, ParseCommandError};
@@ -67,6 +68,7 @@ pub use quantity::Quantity;
 pub use serial::SerialDefaults;
 pub use state::State;
 pub use value::{Input, Limits, Value, ValueError};
+pub use watchdog::Watchdog;
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

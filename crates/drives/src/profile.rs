@@ -11,6 +11,7 @@ use crate::fault::{Exception, Fault};
 use crate::plan::{ReadSpan, plan_reads};
 use crate::serial::SerialDefaults;
 use crate::state::State;
+use crate::watchdog::Watchdog;
 
 /// What one family of drives means by its registers.
 ///
@@ -26,6 +27,8 @@ pub struct Profile {
     pub(crate) max_words: u16,
     pub(crate) ram_mask: u16,
     pub(crate) closed_groups: Vec<u8>,
+    /// Where a write does something, and is not simply kept.
+    pub(crate) acting: Vec<u16>,
     /// Registers first, then parameters, each in address order.
     pub(crate) entries: Vec<Entry>,
     /// Where in `entries` an address is.
@@ -39,6 +42,7 @@ pub struct Profile {
     pub(crate) states: BTreeMap<State, u16>,
     pub(crate) control: Vec<Control>,
     pub(crate) monitor: Vec<u16>,
+    pub(crate) watchdog: Option<Watchdog>,
     pub(crate) fault_history: Vec<u16>,
     pub(crate) faults: BTreeMap<u16, Fault>,
     pub(crate) exceptions: BTreeMap<u8, Exception>,
@@ -116,6 +120,15 @@ impl Profile {
         }
     }
 
+    /// Where the word that was written to `entry` can be read, to see whether the drive took it.
+    ///
+    /// `None` where that would not tell: it cannot be read, or its write does something, so that something else may
+    /// stand there afterwards.
+    pub fn read_back(&self, entry: &Entry) -> Option<u16> {
+        let kept = entry.access != Access::Wo && !self.acting.contains(&entry.address);
+        (kept && !self.is_command(entry.address)).then_some(entry.address)
+    }
+
     /// The plain address behind one that writes to RAM only (000BH for 800BH), whether or not something is there.
     /// `None` if `address` is no such address.
     pub fn stored_address(&self, address: u16) -> Option<u16> {
@@ -177,6 +190,11 @@ impl Profile {
     /// What must be set before the drive obeys the bus, in order.
     pub fn control(&self) -> &[Control] {
         &self.control
+    }
+
+    /// What makes the drive act by itself when the bus falls silent; `None` where the family has no such thing.
+    pub fn watchdog(&self) -> Option<&Watchdog> {
+        self.watchdog.as_ref()
     }
 
     /// Where the drive keeps its last faults, the latest first; none where it keeps none.

@@ -88,6 +88,10 @@ fn every_mistake_names_file_line_and_reason() {
         ("profile.toml", "bits = [11, 10]", "bits = [11, 9]", "position_control"),
         ("profile.toml", "3 = \"SVPWM\"", "4 = \"SVPWM\"", "does not fit"),
         ("profile.toml", "3 = \"SVPWM\"", "three = \"SVPWM\"", "three"),
+        ("profile.toml", "acts = [\"P00.15\"", "acts = [\"P00.99\"", "P00.99"),
+        ("profile.toml", "timeout = \"P14.04\"", "timeout = \"P14.44\"", "P14.44"),
+        ("profile.toml", "coast = 0", "coast = 4", "0 to 3"),
+        ("profile.toml", "coast = 0", "coast = 0\nrun = 1", "run"),
         // Columns and cells.
         ("registers.csv", "address,name", "address,nombre", "nombre"),
         ("registers.csv", "address,name", "name,name", "address"),
@@ -197,4 +201,18 @@ proptest! {
             prop_assert!(error.to_string().contains(FILES[file]) || file > 0, "{}", error);
         }
     }
+}
+
+#[test]
+fn a_watchdog_may_be_missing_and_must_not_be_empty() {
+    let copy = Copy::new("watchdog");
+    let text = shipped("profile.toml");
+    let (before, rest) = text.split_once("[watchdog]").unwrap();
+    let (table, after) = rest.split_once("\n\n").unwrap();
+    copy.write("profile.toml", format!("{before}\n\n{after}"));
+    assert_eq!(copy.load().unwrap().watchdog(), None);
+    let idle = table.replace("coast = 0\nstop = 3\n", "");
+    assert_ne!(idle, table);
+    copy.write("profile.toml", format!("{before}[watchdog]{idle}\n\n{after}"));
+    assert!(copy.load().unwrap_err().to_string().contains("needs the value of \"coast\" or of \"stop\""));
 }

@@ -353,3 +353,23 @@ fn every_row_names_its_source_and_every_doubt_its_reason() {
         assert!(fault.verified || !fault.note.is_empty(), "fault {}", fault.code);
     }
 }
+
+/// GD300 manual (easymanua.ls gd300-015g-4), p. 122: P14.05 = 0 alarms and coasts, 3 stops whoever is in control.
+#[test]
+fn the_watchdog_is_p14_04_and_p14_05() {
+    let profile = gd350();
+    let watchdog = profile.watchdog().unwrap();
+    assert_eq!((watchdog.timeout.as_str(), watchdog.action.as_str()), ("P14.04", "P14.05"));
+    assert_eq!((watchdog.coast, watchdog.stop, watchdog.verified), (Some(0), Some(3), false));
+}
+
+#[test]
+fn what_acts_cannot_be_read_back() {
+    let profile = gd350();
+    let read_back = |name| profile.read_back(profile.find(name).unwrap());
+    assert_eq!(read_back("P00.11"), Some(0x000B));
+    assert_eq!(read_back("set_frequency"), Some(0x2001));
+    for name in ["P00.15", "P07.00", "control_command", "virtual_input"] {
+        assert_eq!(read_back(name), None, "{name}");
+    }
+}

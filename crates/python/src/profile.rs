@@ -51,6 +51,11 @@ impl Profile {
         self.0.max_words()
     }
 
+    #[getter]
+    fn identification_address(&self) -> u16 {
+        self.0.identification_address()
+    }
+
     #[pyo3(signature = (code, /))]
     fn identify(&self, code: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
         Ok(self.0.identify(one_word("code", code)?).map(|identification| identification.family.as_str()))
@@ -112,6 +117,11 @@ impl Profile {
             Some(false) => self.0.write_address(entry, Store::Ram).map_err(refuse),
             Some(true) => self.0.write_address(entry, Store::Eeprom).map_err(refuse),
         }
+    }
+
+    #[pyo3(signature = (name, /))]
+    fn read_back(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<u16>> {
+        Ok(self.0.read_back(self.find(name)?))
     }
 
     #[pyo3(signature = (name, raw, /))]
@@ -184,6 +194,25 @@ impl Profile {
             Ok(dict)
         });
         rows.collect()
+    }
+
+    fn watchdog<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(watchdog) = self.0.watchdog() else {
+            return Ok(None);
+        };
+        let actions = PyDict::new(py);
+        for (name, word) in [("coast", watchdog.coast), ("stop", watchdog.stop)] {
+            if let Some(word) = word {
+                actions.set_item(name, word)?;
+            }
+        }
+        let dict = PyDict::new(py);
+        dict.set_item("timeout", &watchdog.timeout)?;
+        dict.set_item("action", &watchdog.action)?;
+        dict.set_item("actions", actions)?;
+        dict.set_item("verified", watchdog.verified)?;
+        dict.set_item("source", &watchdog.source)?;
+        Ok(Some(dict))
     }
 
     #[pyo3(signature = (code, /))]

@@ -17,6 +17,7 @@ use crate::profile::{Identification, Profile};
 use crate::quantity::Quantity;
 use crate::serial::SerialDefaults;
 use crate::state::State;
+use crate::watchdog::Watchdog;
 
 /// Reads and checks all of `files`.
 pub(super) fn profile(files: &Files) -> Result<Profile, ProfileError> {
@@ -53,6 +54,8 @@ pub(super) fn profile(files: &Files) -> Result<Profile, ProfileError> {
         states: codes::<State>(&manifest.state.codes),
         control: control(file, &entries, &manifest)?,
         monitor: addresses(file, &entries, &manifest.monitor.registers)?,
+        acting: addresses(file, &entries, &manifest.parameters.acts)?,
+        watchdog: manifest.watchdog.as_ref().map(|row| watchdog(file, &entries, row)).transpose()?,
         fault_history: addresses(file, &entries, &manifest.faults.history)?,
         faults: rows::faults(&files.faults)?,
         exceptions: exceptions(file, &manifest)?,
@@ -234,6 +237,30 @@ fn control(file: &File, entries: &Entries, manifest: &Manifest) -> Result<Vec<Co
         })
     });
     rows.collect()
+}
+
+/// Both parameters must exist, the values must be theirs, and there must be something that the drive can do.
+fn watchdog(file: &File, entries: &Entries, spanned: &Spanned<manifest::Watchdog>) -> Result<Watchdog, ProfileError> {
+    let row = spanned.get_ref();
+    let timeout = entries.get(file, &row.timeout)?;
+    let action = entries.get(file, &row.action)?;
+    let word = |value: &Option<Spanned<i64>>| {
+        let checked =
+            |value: &Spanned<i64>| check(file, line(file, value), &action.quantity, &action.name, *value.get_ref());
+        value.as_ref().map(checked).transpose()
+    };
+    let (coast, stop) = (word(&row.coast)?, word(&row.stop)?);
+    if coast.is_none() && stop.is_none() {
+        return Err(file.broken(line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\""));
+    }
+    Ok(Watchdog {
+        timeout: timeout.name.clone(),
+        action: action.name.clone(),
+        coast,
+        stop,
+        verified: row.verified,
+        source: row.source.clone(),
+    })
 }
 
 fn exceptions(file: &File, manifest: &Manifest) -> Result<BTreeMap<u8, Exception>, ProfileError> {

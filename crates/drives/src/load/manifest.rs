@@ -24,6 +24,7 @@ pub(super) struct Manifest {
     #[serde(default)]
     pub(super) control: Vec<Spanned<Control>>,
     pub(super) monitor: Monitor,
+    pub(super) watchdog: Option<Spanned<Watchdog>>,
     #[serde(default)]
     pub(super) faults: Faults,
     #[serde(default)]
@@ -69,6 +70,8 @@ pub(super) struct Parameters {
     pub(super) ram_bit: Spanned<u8>,
     #[serde(default)]
     pub(super) closed_groups: Vec<u8>,
+    #[serde(default)]
+    pub(super) acts: Vec<Spanned<String>>,
     #[serde(rename = "source")]
     _source: String,
 }
@@ -126,6 +129,17 @@ pub(super) struct Control {
 #[serde(deny_unknown_fields)]
 pub(super) struct Monitor {
     pub(super) registers: Vec<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Watchdog {
+    pub(super) timeout: Spanned<String>,
+    pub(super) action: Spanned<String>,
+    pub(super) coast: Option<Spanned<i64>>,
+    pub(super) stop: Option<Spanned<i64>>,
+    pub(super) verified: bool,
+    pub(super) source: String,
 }
 
 #[derive(Default, Deserialize)]
