@@ -11,7 +11,7 @@ use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
 use crate::opener::Opener;
 use crate::owner::{AdapterEcho, Owner};
-use crate::queue::{LOOK_UP, Queue};
+use crate::queue::{LOOK_UP, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
 use crate::{Line, PortErrorKind};
@@ -52,7 +52,7 @@ pub struct CallOptions {
 
 /// One line and its owner.
 ///
-/// The calling thread works on the line itself when its turn comes; others wait in the order they came. `give_up` is
+/// The calling thread works on the line itself when its turn comes; others wait in the order of [`Priority`]. `give_up` is
 /// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
@@ -150,7 +150,7 @@ impl Bus {
         if self.queue.has_this_thread() {
             return;
         }
-        let _turn = self.queue.turn(true, &mut || false);
+        let _turn = self.queue.turn(Priority::Stop, None, &mut || false);
         self.lock().close();
     }
 
@@ -183,7 +183,16 @@ impl Bus {
             return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now(), &[]));
         }
         let mut give_up = || self.is_closed() || give_up();
-        let Some(_turn) = self.queue.turn(options.urgent, &mut give_up) else {
+        let priority = match options.urgent {
+            true => Priority::Stop,
+            false if request.is_write() => Priority::Write,
+            false => Priority::Read,
+        };
+        let unit = match destination {
+            Destination::Unit(unit) => Some(unit),
+            Destination::Broadcast => None,
+        };
+        let Some(_turn) = self.queue.turn(priority, unit, &mut give_up) else {
             return Err(ask.failed(self.given_up(), None, self.now(), &[]));
         };
         let mut owner = self.lock();

@@ -1,0 +1,394 @@
+//! Who is next among those who wait for the line: the rule alone, without threads and without a clock.
+
+use drivebus_rtu::UnitAddress;
+
+use crate::queue::Priority;
+
+/// How many turns of a higher class, asked for later, somebody who waits lets go before it. Stops do not count.
+///
+/// Chosen so that the higher class keeps 32 of 33 turns however much waits below it, and so that who waits at a line
+/// of 9600 bit/s, where a turn takes some 30 ms, waits about a second for each who came before it.
+pub(crate) const OVERTAKEN_AT_MOST: u32 = 32;
+
+/// Broadcasts are a unit of their own, with the address they have on the wire; 247 is the highest.
+const UNITS: usize = 248;
+const CLASSES: usize = 4;
+
+/// A place in the order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Ticket {
+    /// Lower came earlier.
+    number: u64,
+    priority: Priority,
+    unit: Option<UnitAddress>,
+}
+
+/// Those who wait, and when each unit had its last turn. `T` is what the caller keeps about each.
+#[derive(Debug)]
+pub(crate) struct Order<T> {
+    arrivals: u64,
+    turns: u64,
+    waiting: Vec<Waiting<T>>,
+    /// The number of the last turn, for each unit of each class: a stop or a write takes nothing from the unit's reads.
+    last_turn: Vec<u64>,
+}
+
+#[derive(Debug)]
+struct Waiting<T> {
+    ticket: Ticket,
+    /// How often it was overtaken by later arrivals of a higher class.
+    overtaken: u32,
+    /// It had the turn already, and lets stops pass.
+    aside: bool,
+    whose: T,
+}
+
+impl Ticket {
+    pub(crate) fn is_stop(&self) -> bool {
+        self.priority == Priority::Stop
+    }
+
+    /// Where the last turn of its unit in its class is kept.
+    fn place(&self) -> usize {
+        self.priority as usize * UNITS + self.unit.map_or(0, |unit| usize::from(unit.get()))
+    }
+}
+
+impl<T> Default for Order<T> {
+    fn default() -> Self {
+        Self { arrivals: 0, turns: 0, waiting: Vec::new(), last_turn: vec![0; CLASSES * UNITS] }
+    }
+}
+
+impl<T> Order<T> {
+    /// A ticket for somebody who comes now.
+    pub(crate) fn ticket(&mut self, priority: Priority, unit: Option<UnitAddress>) -> Ticket {
+        self.arrivals += 1;
+        Ticket { number: self.arrivals, priority, unit }
+    }
+
+    /// `ticket` waits.
+    pub(crate) fn wait(&mut self, ticket: Ticket, whose: T) {
+        self.waiting.push(Waiting { ticket, overtaken: 0, aside: false, whose });
+    }
+
+    /// `ticket`, which has the turn, waits until the stops have passed.
+    pub(crate) fn step_aside(&mut self, ticket: Ticket, whose: T) {
+        self.waiting.push(Waiting { ticket, overtaken: 0, aside: true, whose });
+    }
+
+    /// `ticket` waits no longer; `None` if it does not wait.
+    pub(crate) fn leave(&mut self, ticket: Ticket) -> Option<T> {
+        let index = self.waiting.iter().position(|other| other.ticket == ticket)?;
+        Some(self.waiting.swap_remove(index).whose)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// What is kept about those who wait, in no order.
+    pub(crate) fn waiting(&self) -> impl Iterator<Item = &T> {
+        self.waiting.iter().map(|waiting| &waiting.whose)
+    }
+
+    pub(crate) fn has_stop(&self) -> bool {
+        self.waiting.iter().any(|waiting| waiting.ticket.is_stop())
+    }
+
+    /// Who is next.
+    pub(crate) fn next(&self) -> Option<&T> {
+        self.next_index().map(|index| &self.waiting[index].whose)
+    }
+
+    /// `ticket` has the turn now, if it is next.
+    pub(crate) fn take(&mut self, ticket: Ticket) -> Option<T> {
+        let index = self.next_index().filter(|&index| self.waiting[index].ticket == ticket)?;
+        let taken = self.waiting.swap_remove(index);
+        // The turn of one who stepped aside was counted when it began.
+        if !taken.aside {
+            self.count(ticket, taken.is_late());
+        }
+        Some(taken.whose)
+    }
+
+    /// `ticket` has the turn without waiting: nobody waits.
+    pub(crate) fn begin(&mut self, ticket: Ticket) {
+        self.count(ticket, false);
+    }
+
+    fn count(&mut self, ticket: Ticket, late: bool) {
+        self.turns += 1;
+        self.last_turn[ticket.place()] = self.turns;
+        for other in &mut self.waiting {
+            if late && other.ticket.number > ticket.number {
+                // One turn for all who came later, else a crowd of them would hold up the higher classes at one go.
+                other.overtaken = 0;
+            } else if ticket.number > other.ticket.number
+                && ticket.priority < other.ticket.priority
+                && !ticket.is_stop()
+            {
+                other.overtaken += 1;
+            }
+        }
+    }
+
+    fn next_index(&self) -> Option<usize> {
+        (0..self.waiting.len()).min_by_key(|&index| self.rank(&self.waiting[index]))
+    }
+
+    /// The lowest is next: stops, who let them pass, who was overtaken too often, and then class by class. Within a class
+    /// by the last turn of the unit, so that a unit with many tickets takes no more turns than one with few.
+    fn rank(&self, waiting: &Waiting<T>) -> (u8, u64, u64) {
+        let number = waiting.ticket.number;
+        let class = match waiting.ticket.priority {
+            Priority::Stop => return (0, 0, number),
+            _ if waiting.aside => return (1, 0, number),
+            _ if waiting.is_late() => return (2, 0, number),
+            Priority::Write => 3,
+            Priority::Read => 4,
+            Priority::Poll => 5,
+        };
+        (class, self.last_turn[waiting.ticket.place()], number)
+    }
+}
+
+impl<T> Waiting<T> {
+    fn is_late(&self) -> bool {
+        self.overtaken >= OVERTAKEN_AT_MOST
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    use Priority::{Poll, Read, Stop, Write};
+
+    fn unit(raw: u8) -> Option<UnitAddress> {
+        UnitAddress::new(raw).ok()
+    }
+
+    /// Comes and waits; what is kept about it is its name.
+    fn come(order: &mut Order<u32>, priority: Priority, raw: u8, name: u32) -> Ticket {
+        let ticket = order.ticket(priority, unit(raw));
+        order.wait(ticket, name);
+        ticket
+    }
+
+    /// Gives the next one its turn.
+    fn serve(order: &mut Order<u32>) -> u32 {
+        let ticket = order.waiting[order.next_index().unwrap()].ticket;
+        order.take(ticket).unwrap()
+    }
+
+    fn serve_all(order: &mut Order<u32>) -> Vec<u32> {
+        (0..order.waiting.len()).map(|_| serve(order)).collect()
+    }
+
+    #[test]
+    fn stops_come_first_then_writes_reads_and_polling() {
+        let mut order = Order::default();
+        for (name, priority) in (0..).zip([Poll, Read, Write, Stop, Poll, Read, Write, Stop]) {
+            come(&mut order, priority, 1, name);
+        }
+        assert_eq!(serve_all(&mut order), [3, 7, 2, 6, 1, 5, 0, 4]);
+    }
+
+    #[test]
+    fn only_the_next_one_can_take_the_turn() {
+        let mut order = Order::default();
+        let read = come(&mut order, Read, 1, 1);
+        let write = come(&mut order, Write, 1, 2);
+        assert_eq!(order.take(read), None);
+        assert_eq!(order.take(write), Some(2));
+        assert_eq!(order.take(write), None);
+        assert_eq!(order.take(read), Some(1));
+        assert_eq!(order.next(), None);
+    }
+
+    #[test]
+    fn units_take_turns_however_many_ask_for_one_of_them() {
+        let mut order = Order::default();
+        for (name, raw) in [(10, 1), (11, 1), (12, 1), (13, 1), (20, 2), (21, 2), (30, 3), (0, 0), (1, 0)] {
+            come(&mut order, Read, raw, name);
+        }
+        assert_eq!(serve_all(&mut order), [10, 20, 30, 0, 11, 21, 1, 12, 13]);
+        // Unit 3 waited longest for its last turn, though it asks last now.
+        for (name, raw) in [(14, 1), (22, 2), (31, 3)] {
+            come(&mut order, Read, raw, name);
+        }
+        assert_eq!(serve_all(&mut order), [31, 22, 14]);
+    }
+
+    #[test]
+    fn stops_and_writes_take_nothing_from_the_reads_of_their_unit() {
+        let mut order = Order::default();
+        come(&mut order, Read, 2, 20);
+        serve_all(&mut order);
+        for name in 0..3 {
+            come(&mut order, Stop, 1, name);
+            come(&mut order, Write, 1, name);
+        }
+        serve_all(&mut order);
+        come(&mut order, Read, 2, 21);
+        come(&mut order, Read, 1, 10);
+        assert_eq!(serve_all(&mut order), [10, 21]);
+    }
+
+    #[test]
+    fn who_was_overtaken_thirty_two_times_is_next() {
+        let mut order = Order::default();
+        come(&mut order, Poll, 1, 1);
+        come(&mut order, Read, 2, 2);
+        for turn in 0..100 {
+            come(&mut order, Write, 3, 1000 + turn);
+            // The one that came first after 32 turns, the other after 32 more.
+            let expected = match turn {
+                32 => 1,
+                65 => 2,
+                turn => 1000 + turn - u32::from(turn > 32) - u32::from(turn > 65),
+            };
+            assert_eq!(serve(&mut order), expected, "turn {turn}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_never_held_back() {
+        let mut order = Order::default();
+        come(&mut order, Read, 1, 99);
+        for name in 0..100 {
+            come(&mut order, Stop, 2, name);
+            assert_eq!(serve(&mut order), name);
+        }
+        // Nor do stops count as overtaking: a write still goes first.
+        come(&mut order, Write, 2, 100);
+        assert_eq!(serve_all(&mut order), [100, 99]);
+    }
+
+    #[test]
+    fn who_steps_aside_stays_ahead_of_all_but_stops() {
+        let mut order = Order::default();
+        let poll = come(&mut order, Poll, 1, 1);
+        assert_eq!(order.take(poll), Some(1));
+        come(&mut order, Write, 2, 2);
+        come(&mut order, Stop, 3, 3);
+        assert!(order.has_stop());
+        order.step_aside(poll, 1);
+        come(&mut order, Stop, 4, 4);
+        assert_eq!(serve_all(&mut order), [3, 4, 1, 2]);
+        assert!(!order.has_stop());
+    }
+
+    /// One of the callers of the model.
+    #[derive(Debug, Clone)]
+    struct Caller {
+        arrival: usize,
+        class: u8,
+        unit: u8,
+        overtaken: u32,
+    }
+
+    /// The rule as a sort over the whole history: `past` holds the class and unit of every turn there was.
+    fn sorted(callers: &mut [Caller], past: &[(u8, u8)]) {
+        callers.sort_by_key(|caller| {
+            let kin = (caller.class, caller.unit);
+            let last_turn = past.iter().rposition(|&turn| turn == kin).map_or(0, |index| index + 1);
+            let late = caller.overtaken >= 32;
+            match caller.class {
+                0 => (0, 0, 0, caller.arrival),
+                _ if late => (1, 0, 0, caller.arrival),
+                class => (2, class, last_turn, caller.arrival),
+            }
+        });
+    }
+
+    #[derive(Debug, Clone)]
+    enum Step {
+        Come { class: u8, unit: u8 },
+        Serve,
+        Leave(prop::sample::Index),
+    }
+
+    fn step() -> impl Strategy<Value = Step> {
+        prop_oneof![
+            // Mostly writes, so that others are overtaken often.
+            8 => (prop_oneof![1 => Just(0u8), 6 => Just(1), 2 => Just(2), 1 => Just(3)], 0u8..4)
+                .prop_map(|(class, unit)| Step::Come { class, unit }),
+            8 => Just(Step::Serve),
+            1 => any::<prop::sample::Index>().prop_map(Step::Leave),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_is_that_of_the_model(steps in prop::collection::vec(step(), 0..400)) {
+            let mut order = Order::default();
+            let mut callers: Vec<Caller> = Vec::new();
+            let mut past = Vec::new();
+            let mut tickets = Vec::new();
+            for step in steps {
+                match step {
+                    Step::Come { class, unit: raw } => {
+                        let arrival = tickets.len();
+                        let priority = [Stop, Write, Read, Poll][usize::from(class)];
+                        tickets.push(come(&mut order, priority, raw, u32::try_from(arrival).unwrap()));
+                        callers.push(Caller { arrival, class, unit: raw, overtaken: 0 });
+                    }
+                    Step::Leave(index) if !callers.is_empty() => {
+                        let gone = callers.remove(index.index(callers.len()));
+                        order.leave(tickets[gone.arrival]);
+                    }
+                    Step::Serve if !callers.is_empty() => {
+                        sorted(&mut callers, &past);
+                        let first = callers.remove(0);
+                        past.push((first.class, first.unit));
+                        for other in &mut callers {
+                            if first.overtaken >= 32 && other.arrival > first.arrival {
+                                other.overtaken = 0;
+                            } else if (1..other.class).contains(&first.class) && first.arrival > other.arrival {
+                                other.overtaken += 1;
+                            }
+                        }
+                        prop_assert_eq!(serve(&mut order), u32::try_from(first.arrival).unwrap());
+                    }
+                    Step::Leave(_) | Step::Serve => {}
+                }
+                prop_assert_eq!(order.is_empty(), callers.is_empty());
+            }
+        }
+
+        /// Whatever comes later, who waits is served after at most 32 overtaking turns for itself and each who was there.
+        #[test]
+        fn nobody_starves(
+            before in prop::collection::vec((0u8..4, 0u8..4), 0..6),
+            class in 1u8..4,
+            later in prop::collection::vec((1u8..4, 0u8..4), 600),
+        ) {
+            let priorities = [Stop, Write, Read, Poll];
+            let mut order = Order::default();
+            for &(class, raw) in &before {
+                come(&mut order, priorities[usize::from(class)], raw, 0);
+            }
+            come(&mut order, priorities[usize::from(class)], 1, 1);
+            let mut overtaken = 0;
+            let mut served = false;
+            for (other, raw) in later {
+                let name = 2 + u32::from(other);
+                come(&mut order, priorities[usize::from(other)], raw, name);
+                match serve(&mut order) {
+                    1 => {
+                        served = true;
+                        break;
+                    }
+                    name if name >= 2 && name - 2 < u32::from(class) => overtaken += 1,
+                    _ => {}
+                }
+            }
+            prop_assert!(served);
+            prop_assert!(overtaken <= 32 * (before.len() + 1), "overtaken {} times", overtaken);
+        }
+    }
+}
