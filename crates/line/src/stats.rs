@@ -35,6 +35,10 @@ pub struct Counters {
     pub bad_answers: u64,
     /// Requests sent once more.
     pub retries: u64,
+    /// Reads asked twice, because the answer to another one might have been taken for theirs.
+    pub verified: u64,
+    /// Calls that were not sent, because the unit was silent before and others use the line.
+    pub not_asked: u64,
     /// Echoes sent to find the way back after a request was left open.
     pub resyncs: u64,
     /// Whole frames that came before the request went out, or that the unit still owed.
@@ -43,6 +47,8 @@ pub struct Counters {
     pub foreign: u64,
     /// Bytes that belong to no frame.
     pub noise_bytes: u64,
+    /// Those of them that are 00H or FFH.
+    pub noise_idle: u64,
     /// Requests that the adapter sent back to us.
     pub own_echoes: u64,
     /// From the first bit of the request to the last byte of the answer.
@@ -90,6 +96,7 @@ impl Counters {
         self.late += u64::from(tally.late);
         self.foreign += u64::from(tally.foreign);
         self.noise_bytes += u64::from(tally.noise);
+        self.noise_idle += u64::from(tally.noise_idle);
         self.own_echoes += u64::from(tally.own_echo);
     }
 

@@ -309,10 +309,13 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
     all.set_item("crc_errors", figures.crc_errors)?;
     all.set_item("bad_answers", figures.bad_answers)?;
     all.set_item("retries", figures.retries)?;
+    all.set_item("verified", figures.verified)?;
+    all.set_item("not_asked", figures.not_asked)?;
     all.set_item("resyncs", figures.resyncs)?;
     all.set_item("late_replies", figures.late)?;
     all.set_item("foreign_frames", figures.foreign)?;
     all.set_item("noise_bytes", figures.noise_bytes)?;
+    all.set_item("noise_idle", figures.noise_idle)?;
     all.set_item("own_echoes", figures.own_echoes)?;
     let latency = PyDict::new(py);
     latency.set_item("min", figures.round_trip.min.as_secs_f64())?;

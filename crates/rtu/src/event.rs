@@ -43,8 +43,20 @@ pub struct Tally {
     pub foreign: u32,
     /// Bytes that belong to no frame.
     pub noise: u32,
+    /// Those of them that are 00H or FFH, as an idle line gives them that nothing pulls to its rest.
+    pub noise_idle: u32,
     /// Requests that came back from the adapter itself.
     pub own_echo: u32,
+}
+
+impl Tally {
+    pub(crate) const EMPTY: Self = Self { late: 0, foreign: 0, noise: 0, noise_idle: 0, own_echo: 0 };
+
+    pub(crate) fn add_noise(&mut self, bytes: &[u8]) {
+        let idle = bytes.iter().filter(|&&byte| byte == 0x00 || byte == 0xFF).count();
+        self.noise += u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        self.noise_idle += u32::try_from(idle).unwrap_or(u32::MAX);
+    }
 }
 
 /// A request that was not begun. Nothing was sent.

@@ -91,7 +91,7 @@ impl Master {
             echo_due: false,
             busy: None,
             quarantine: UnitSet::EMPTY,
-            tally: Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 },
+            tally: Tally::EMPTY,
         }
     }
 
@@ -270,7 +270,7 @@ impl Master {
 
     /// What was seen beside answers since the last call.
     pub const fn take_tally(&mut self) -> Tally {
-        core::mem::replace(&mut self.tally, Tally { late: 0, foreign: 0, noise: 0, own_echo: 0 })
+        core::mem::replace(&mut self.tally, Tally::EMPTY)
     }
 
     fn silent_at(&self) -> Instant {
@@ -286,7 +286,7 @@ impl Master {
     ) -> Option<Event<'_>> {
         while let Some(step) = self.framer.step(now) {
             match step {
-                Step::Skipped { range, expected: false, .. } => self.tally.noise += count(&range),
+                Step::Skipped { range, expected: false, .. } => self.tally.add_noise(self.framer.held(range)),
                 Step::Skipped { range, error, expected: true } => {
                     self.state = State::Idle;
                     self.quarantine.insert(unit);
@@ -367,12 +367,8 @@ impl Master {
                     self.tally.own_echo += 1;
                 }
                 Step::Frame(_) => self.tally.late += 1,
-                Step::Skipped { range, .. } => self.tally.noise += count(&range),
+                Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
             }
         }
     }
-}
-
-fn count(range: &core::ops::Range<usize>) -> u32 {
-    u32::try_from(range.len()).unwrap_or(u32::MAX)
 }
