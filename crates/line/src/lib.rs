@@ -5,10 +5,14 @@
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
 //! over at its last byte.
 
+#[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line asks it"))]
+mod backoff;
 mod bus;
 pub mod clock;
 mod error;
 mod exchange;
+#[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line keeps it"))]
+mod link;
 pub mod mbap;
 mod opener;
 mod order;
@@ -24,6 +28,7 @@ pub mod tty;
 pub use bus::{Bus, BusOptions, CallOptions};
 pub use error::{CallError, Failure};
 pub use exchange::Done;
+pub use link::Link;
 pub use opener::Opener;
 pub use owner::AdapterEcho;
 pub use port::{Line, PortError, PortErrorKind};
