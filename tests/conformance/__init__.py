@@ -1,0 +1,6 @@
+"""The same hostile line for drivebus and for other Modbus libraries, and a neutral slave that judges them.
+
+`wire` and `slave` are the judge: plain Python, nothing of drivebus in them. `libraries` holds one adapter for each
+library, `worker` runs one of them in a process of its own, `child` is that process seen from here. `rows` says what the
+slave does and what is asked, `play` runs one row against one library.
+"""
