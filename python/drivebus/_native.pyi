@@ -144,7 +144,7 @@ class Bus:
     def transact(self, unit: int, pdu: Buffer, reply_length: int | None = None, /) -> bytes:
         """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known."""
     def stats(self) -> dict[str, Any]:
-        """`{"requests": …, "answers": …, …, "units": {1: {…}}}`; counters are ints, latencies seconds."""
+        """`{"requests": …, …, "hints": ["…"], "units": {1: {…}}}`; counters are ints, latencies seconds."""
 
 @final
 class Profile:

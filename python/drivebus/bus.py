@@ -250,7 +250,10 @@ class Bus:
         return Profile.builtin(family)
 
     def stats(self) -> Stats:
-        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit."""
+        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
+
+        `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
+        """
         return Stats(self._native.stats())
 
 

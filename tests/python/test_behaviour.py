@@ -395,6 +395,15 @@ class TestASpoiltLine:
         assert stats.units[1].answers >= 1
         assert stats.units[2].refusals == 1
         assert stats["refusals"] == stats.refusals
+        assert stats.hints == []
+
+    def test_statistics_say_what_noise_means(self, simulator: Simulator, bus: Bus) -> None:
+        simulator.line.noise_before(b"\x00", 100)
+        for _ in range(10):
+            bus.read(1, 0x2103)
+        [hint] = bus.stats().hints
+        assert hint.startswith("line: ")
+        assert "bias" in hint
 
 
 def test_the_silence_between_frames_is_kept(simulator: Simulator, obedient: Drive) -> None:

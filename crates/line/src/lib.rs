@@ -11,6 +11,8 @@ mod bus;
 pub mod clock;
 mod error;
 mod exchange;
+mod hint;
+mod hints;
 #[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line keeps it"))]
 mod link;
 pub mod mbap;
@@ -28,6 +30,7 @@ pub mod tty;
 pub use bus::{Bus, BusOptions, CallOptions};
 pub use error::{CallError, Failure};
 pub use exchange::Done;
+pub use hint::Hint;
 pub use link::Link;
 pub use opener::Opener;
 pub use owner::AdapterEcho;

@@ -182,6 +182,7 @@ impl Bus {
         let all = counters(py, &stats.total)?;
         all.set_item("reconnects", stats.reconnects)?;
         all.set_item("notes", notes)?;
+        all.set_item("hints", stats.hints().iter().map(ToString::to_string).collect::<Vec<_>>())?;
         let units = PyDict::new(py);
         for (unit, figures) in &stats.units {
             units.set_item(unit.get(), counters(py, figures)?)?;

@@ -145,6 +145,8 @@ class _Job:
         self.title("The line, in figures")
         stats = self.bus.stats()
         self.out.facts({name: value for name, value in stats.items() if isinstance(value, (int, float, str))})
+        for hint in stats.hints:
+            self.out.say(hint)
         self.expect(self.simulator.line.silence_violations == 0, "not one request broke the silence between frames")
 
     def farewell(self) -> None:

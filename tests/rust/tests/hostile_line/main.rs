@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 mod echoing;
+mod hints;
 mod masters_table;
 mod odd;
 mod scripted;
