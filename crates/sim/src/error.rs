@@ -3,6 +3,7 @@
 use drivebus_drives::ProfileError;
 use drivebus_rtu::AddressError;
 
+use crate::faults::FaultKind;
 use crate::simulator::SIMULATED;
 
 /// Why a simulation cannot be as asked.
@@ -62,6 +63,20 @@ pub enum SimError {
     /// 0 is no fault.
     #[error("0 is no fault; fault numbers are 1..=65535")]
     NoFault,
+    /// There is no such kind of fault.
+    #[error("fault {name:?} is unknown; there are {}", FaultKind::ALL.map(FaultKind::name).join(", "))]
+    Fault {
+        /// The name asked for.
+        name: String,
+    },
+    /// The rate is not a share of 0.0..=1.0.
+    #[error("rate {share} of {kind} is not in 0.0..=1.0")]
+    Rate {
+        /// What was to happen.
+        kind: FaultKind,
+        /// What was given.
+        share: f64,
+    },
     /// The system has no port to give.
     #[error("cannot serve the simulated line: {0}")]
     Io(#[from] std::io::Error),

@@ -1,14 +1,12 @@
-//! Handles to parts of the simulation: one drive, and the wire.
+//! The handle to one simulated drive.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use drivebus_rtu::{ExceptionCode, UnitAddress};
 
 use crate::drive::{Drive, WriteRecord};
 use crate::error::SimError;
 use crate::simulator::Shared;
-use crate::trace::Transmission;
 
 /// The heaviest load, as a share of rated torque.
 const MAX_LOAD: f64 = 4.0;
@@ -182,70 +180,18 @@ impl SimulatedDrive {
         self.with(|drive| drive.writes()).unwrap_or_default()
     }
 
+    /// As [`writes`](Self::writes), and forgets them: who takes them often enough misses none.
+    pub fn take_writes(&self) -> Vec<WriteRecord> {
+        self.with(Drive::take_writes).unwrap_or_default()
+    }
+
+    /// How many words the drive has taken from the bus, ever.
+    pub fn words_written(&self) -> u64 {
+        self.with(|drive| drive.words_written()).unwrap_or(0)
+    }
+
     /// A handle is given out only for a unit that exists, and units never go, so `None` does not happen.
     fn with<T>(&self, ask: impl FnOnce(&mut Drive) -> T) -> Option<T> {
         self.shared.present().drive(self.unit).map(ask)
-    }
-}
-
-/// The wire: what it saw, and what it is told to spoil.
-#[derive(Debug, Clone)]
-pub struct SimulatedLine {
-    shared: Arc<Shared>,
-}
-
-impl SimulatedLine {
-    pub(crate) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
-
-    /// Transmissions of masters, right or wrong, that silence or the next one has told apart.
-    pub fn requests(&self) -> u64 {
-        self.shared.present().wire.requests
-    }
-
-    /// Requests whose first bit came less than 3.5 characters after the last bit on the wire.
-    pub fn silence_violations(&self) -> u64 {
-        self.shared.present().wire.silence_violations
-    }
-
-    /// Characters that were spoilt because both sides spoke at once.
-    pub fn collisions(&self) -> u64 {
-        self.shared.present().wire.collisions
-    }
-
-    /// The next answer on the line is `bytes` instead, as they are. Several wait in order.
-    pub fn answer_with(&self, bytes: &[u8]) {
-        self.shared.present().wire.spoil.answer_with(bytes);
-    }
-
-    /// The next `count` answers are lost.
-    pub fn drop_answers(&self, count: u32) {
-        self.shared.present().wire.spoil.drop_answers(count);
-    }
-
-    /// The next `count` answers come this much later.
-    pub fn delay_answers(&self, delay: Duration, count: u32) {
-        self.shared.present().wire.spoil.delay_answers(delay, count);
-    }
-
-    /// `bytes` come right before the next `count` answers.
-    pub fn noise_before(&self, bytes: &[u8], count: u32) {
-        self.shared.present().wire.spoil.noise_before(bytes, count);
-    }
-
-    /// `bytes` come right after the next `count` answers.
-    pub fn noise_after(&self, bytes: &[u8], count: u32) {
-        self.shared.present().wire.spoil.noise_after(bytes, count);
-    }
-
-    /// Forgets every fault that waits.
-    pub fn clear(&self) {
-        self.shared.present().wire.spoil.clear();
-    }
-
-    /// The last 1000 transmissions, oldest first.
-    pub fn trace(&self) -> Vec<Transmission> {
-        self.shared.present().wire.trace.to_vec()
     }
 }

@@ -42,15 +42,19 @@
 //! - Assumption: where both sides speak at once, each hears the other's characters spoilt by chance (from the seed), and
 //!   nobody hears the third side's.
 //! - Assumption: two units never speak at once; the later one waits.
+//! - Assumption: whoever speaks in pieces ([`FaultKind::Split`]) holds the line in the pauses too.
 //! - Bits, parity and noise levels are not simulated: a character arrives, or it arrives spoilt.
 //! - What a drive does that its manual does not say is marked "Assumption:" in the source, beside the code that does it.
 
 mod clock;
 mod drive;
 mod error;
+mod faults;
 mod handles;
+mod heard;
 mod line;
 mod motor;
+mod outlet;
 #[cfg(target_os = "linux")]
 mod pty;
 mod ramp;
@@ -63,11 +67,13 @@ mod spoil;
 mod tcp;
 mod trace;
 mod wire;
+mod wire_handle;
 mod world;
 
 pub use drive::WriteRecord;
 pub use error::SimError;
-pub use handles::{SimulatedDrive, SimulatedLine};
+pub use faults::FaultKind;
+pub use handles::SimulatedDrive;
 pub use line::SimLine;
 #[cfg(target_os = "linux")]
 pub use pty::PtyServer;
@@ -75,3 +81,4 @@ pub use simulator::{Options, Simulator};
 #[cfg(unix)]
 pub use tcp::TcpServer;
 pub use trace::{Side, Transmission};
+pub use wire_handle::SimulatedLine;

@@ -2,32 +2,46 @@
 
 use std::sync::Arc;
 
-use drivebus_line::{Line, PortError};
+use drivebus_line::{Line, PortError, PortErrorKind};
 use drivebus_rtu::Instant;
 
 use crate::simulator::Shared;
-use crate::world::Listener;
+use crate::world::{Listener, World};
 
 /// A master's connection to a simulated line. Waiting on it makes virtual time jump.
 #[derive(Debug)]
 pub struct SimLine {
     shared: Arc<Shared>,
     listener: Listener,
+    /// How often the adapter had been pulled out when this was opened.
+    pulls: u64,
 }
 
 impl SimLine {
     pub(crate) fn new(shared: Arc<Shared>) -> Self {
-        let listener = shared.lock().attach();
-        Self { shared, listener }
+        let mut world = shared.present();
+        let (listener, pulls) = (world.attach(), world.pulls());
+        drop(world);
+        Self { shared, listener, pulls }
+    }
+
+    /// Whether the adapter that this was opened on is still plugged in.
+    fn check(&self, world: &World) -> Result<(), PortError> {
+        if world.is_plugged() && world.pulls() == self.pulls {
+            return Ok(());
+        }
+        let message = "the simulated adapter was unplugged; open the line again when it is back";
+        Err(PortError::new(PortErrorKind::Lost, &self.shared.name, message))
     }
 
     /// Lets time pass until `until`, or until bytes arrive if `buffer` has room for them; returns how many did.
-    fn wait(&mut self, buffer: &mut [u8], until: Instant) -> usize {
+    fn wait(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
         loop {
             let mut world = self.shared.present();
+            self.check(&world)?;
             let count = world.take(self.listener, buffer);
             if count > 0 || world.now() >= until {
-                return count;
+                return Ok(count);
             }
             let wakeup = world.next_wakeup().filter(|wakeup| wakeup.at < until);
             let next = wakeup.map_or(until, |wakeup| wakeup.at);
@@ -49,20 +63,29 @@ impl Line for SimLine {
 
     fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
         let mut world = self.shared.present();
+        self.check(&world)?;
         let now = world.now();
-        Ok(world.transmit(now, bytes))
+        Ok(world.transmit(self.listener, now, bytes))
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
-        Ok(self.wait(buffer, until))
+        self.wait(buffer, until)
     }
 
     fn sleep(&mut self, until: Instant) {
-        self.wait(&mut [], until);
+        if self.wait(&mut [], until).is_err() {
+            // Time goes on without the adapter.
+            self.shared.pass(until);
+        }
     }
 
     fn name(&self) -> String {
         self.shared.name.clone()
+    }
+
+    /// Adapters do, and this one may be told to.
+    fn may_echo(&self) -> bool {
+        true
     }
 
     fn is_virtual(&self) -> bool {

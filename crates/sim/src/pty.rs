@@ -1,16 +1,19 @@
 //! The simulated line behind a pseudo-terminal: what opens it takes it for a serial port. Linux only.
 
 use std::ffi::OsStr;
+use std::fs;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
+use crate::outlet::Outlet;
 use crate::server::{Worker, serve};
 use crate::simulator::Shared;
 
@@ -19,16 +22,70 @@ use crate::simulator::Shared;
 /// A pseudo-terminal has no speed and no parity: whatever a program sets, the characters take the time of the
 /// simulation's format.
 #[derive(Debug)]
-pub struct PtyServer {
+pub struct PtyServer(Arc<Socket>);
+
+impl PtyServer {
+    pub(crate) fn start(shared: Arc<Shared>, link: Option<PathBuf>) -> io::Result<Self> {
+        let pty = Pty::open(&shared)?;
+        let link = link.map(|path| Link::new(path, &pty.path)).transpose()?;
+        let socket = Arc::new(Socket { shared, link, pty: Mutex::new(pty) });
+        socket.shared.outlets.add(&socket);
+        Ok(Self(socket))
+    }
+
+    /// What to open: `/dev/pts/N`. While it is unplugged, what it was.
+    pub fn path(&self) -> PathBuf {
+        self.0.lock().path.clone()
+    }
+}
+
+/// Where a pseudo-terminal is plugged in.
+#[derive(Debug)]
+struct Socket {
+    shared: Arc<Shared>,
+    link: Option<Link>,
+    pty: Mutex<Pty>,
+}
+
+impl Socket {
+    fn lock(&self) -> MutexGuard<'_, Pty> {
+        self.pty.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Outlet for Socket {
+    /// Programs see a hang-up. Their side of the old one stays open here, so that nobody else gets its name.
+    fn unplug(&self) {
+        self.lock().worker = None;
+    }
+
+    fn replug(&self) -> io::Result<()> {
+        let mut pty = self.lock();
+        if pty.worker.is_some() {
+            return Ok(());
+        }
+        // Opened before the old one is let go, so that it has another name.
+        let new = Pty::open(&self.shared)?;
+        if let Some(link) = &self.link {
+            link.lead_to(&new.path)?;
+        }
+        *pty = new;
+        Ok(())
+    }
+}
+
+/// One pseudo-terminal.
+#[derive(Debug)]
+struct Pty {
     path: PathBuf,
-    // Before `_held`, so that the thread has ended when the pseudo-terminal closes.
-    _worker: Worker,
-    /// The programs' side, kept open so that the simulation's side does not fail between two programs.
+    /// Holds our side and closes it. Before `_held`, so that the thread has ended when the pseudo-terminal is given up.
+    worker: Option<Worker>,
+    /// The programs' side, kept open so that ours does not fail between two programs.
     _held: OwnedFd,
 }
 
-impl PtyServer {
-    pub(crate) fn start(shared: Arc<Shared>) -> io::Result<Self> {
+impl Pty {
+    fn open(shared: &Arc<Shared>) -> io::Result<Self> {
         let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&ours)?;
         unlockpt(&ours)?;
@@ -41,15 +98,48 @@ impl PtyServer {
         tcsetattr(&held, OptionalActions::Now, &raw)?;
         rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
 
+        let shared = Arc::clone(shared);
         let worker = Worker::start("drivebus-sim-pty", move |stop| {
             // The only failure is that of the pseudo-terminal itself; its users then see it closed.
             let _ = serve(&shared, ours.as_fd(), stop.as_fd());
         })?;
-        Ok(Self { path, _worker: worker, _held: held })
+        Ok(Self { path, worker: Some(worker), _held: held })
+    }
+}
+
+/// A symbolic link that leads to the pseudo-terminal, whatever its name is by now; removed when this is dropped.
+#[derive(Debug)]
+struct Link {
+    path: PathBuf,
+}
+
+impl Link {
+    fn new(path: PathBuf, target: &Path) -> io::Result<Self> {
+        match fs::symlink_metadata(&path) {
+            Ok(there) if !there.is_symlink() => {
+                let message = format!("{} is there and is no link; give another name", path.display());
+                return Err(io::Error::new(io::ErrorKind::AlreadyExists, message));
+            }
+            _ => {}
+        }
+        let link = Self { path };
+        link.lead_to(target)?;
+        Ok(link)
     }
 
-    /// What to open: `/dev/pts/N`.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// In one step: there is no moment without the link.
+    fn lead_to(&self, target: &Path) -> io::Result<()> {
+        let mut name = self.path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}", std::process::id()));
+        let new = self.path.with_file_name(name);
+        symlink(target, &new)?;
+        fs::rename(&new, &self.path)
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // Somebody may have removed it already.
+        let _ = fs::remove_file(&self.path);
     }
 }

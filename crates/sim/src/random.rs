@@ -1,5 +1,7 @@
 //! Chance from a seed: the same seed, the same simulation.
 
+use std::time::Duration;
+
 /// A small generator (SplitMix64), good enough for noise and the same everywhere.
 #[derive(Debug, Clone)]
 pub(crate) struct Random(u64);
@@ -22,6 +24,31 @@ impl Random {
         let byte = self.next() % 255 + 1;
         u8::try_from(byte).unwrap_or(u8::MAX)
     }
+
+    /// Any byte.
+    pub(crate) fn byte(&mut self) -> u8 {
+        let [byte, ..] = self.next().to_be_bytes();
+        byte
+    }
+
+    /// 0..`bound`, nearly evenly; 0 where `bound` is 0.
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
+        let bound = u64::try_from(bound).unwrap_or(u64::MAX).max(1);
+        usize::try_from(self.next() % bound).unwrap_or(0)
+    }
+
+    /// True in this share (0.0..=1.0) of all cases.
+    pub(crate) fn happens(&mut self, share: f64) -> bool {
+        #[expect(clippy::cast_precision_loss, reason = "53 bits, which is what a float holds")]
+        let drawn = (self.next() >> 11) as f64 / (1_u64 << 53) as f64;
+        drawn < share
+    }
+
+    /// 0 to `longest`, in whole nanoseconds.
+    pub(crate) fn up_to(&mut self, longest: Duration) -> Duration {
+        let nanos = u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX - 1);
+        Duration::from_nanos(self.next() % (nanos + 1))
+    }
 }
 
 #[cfg(test)]
@@ -36,5 +63,13 @@ mod tests {
             [random.next(), random.next(), random.next()],
             [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]
         );
+    }
+
+    #[test]
+    fn shares_are_kept_at_both_ends() {
+        let mut random = Random::new(1);
+        assert!((0..1_000).all(|_| random.happens(1.0)));
+        assert!(!(0..1_000).any(|_| random.happens(0.0)));
+        assert_eq!((random.below(0), random.below(1), random.up_to(Duration::ZERO)), (0, 0, Duration::ZERO));
     }
 }

@@ -138,7 +138,7 @@ impl Session<'_> {
         match rustix::io::read(self.port.as_fd(), &mut *buffer) {
             Ok(0) | Err(Errno::CONNRESET | Errno::PIPE) => Ok(Ended::Disconnected),
             Ok(count) => {
-                self.shared.lock().transmit(arrived, &buffer[..count]);
+                self.shared.lock().transmit(self.listener, arrived, &buffer[..count]);
                 Ok(Ended::Stopped)
             }
             Err(Errno::AGAIN | Errno::INTR) => Ok(Ended::Stopped),

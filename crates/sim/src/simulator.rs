@@ -4,14 +4,20 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use drivebus_line::{PortError, PortErrorKind};
 use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 
 use crate::clock::Clock;
 use crate::drive::{Drive, Map};
 use crate::error::SimError;
-use crate::handles::{SimulatedDrive, SimulatedLine};
+use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
+use crate::outlet::Outlets;
+use crate::wire_handle::SimulatedLine;
 use crate::world::World;
+
+/// How long a vain attempt to open the line takes in virtual time, so that whoever tries again comes to its end.
+const OPENING: Duration = Duration::from_millis(10);
 
 /// The family whose behaviour is simulated.
 pub(crate) const SIMULATED: &str = "gd350";
@@ -60,6 +66,7 @@ pub(crate) struct Shared {
     pub(crate) name: String,
     units: Vec<u8>,
     world: Mutex<World>,
+    pub(crate) outlets: Outlets,
 }
 
 impl Shared {
@@ -74,6 +81,15 @@ impl Shared {
         let now = self.clock.now(world.now());
         world.advance(now);
         world
+    }
+
+    /// Lets time pass until `until` without a line.
+    pub(crate) fn pass(&self, until: Instant) {
+        self.clock.wait(until, true);
+        let mut world = self.present();
+        if !self.clock.is_real() {
+            world.advance(until);
+        }
     }
 }
 
@@ -108,13 +124,35 @@ impl Simulator {
             name: format!("sim:{}", named.join(",")),
             units: drives.keys().copied().collect(),
             world: Mutex::new(World::new(options.format, options.strict_silence, options.seed, drives)),
+            outlets: Outlets::default(),
         };
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// A master's connection to the line, in this process.
+    /// A master's connection to the line, in this process. While the adapter is unplugged it is lost at its first use.
     pub fn line(&self) -> SimLine {
         SimLine::new(Arc::clone(&self.shared))
+    }
+
+    /// As [`line`](Self::line), for an opener that is asked again and again.
+    ///
+    /// In virtual time an attempt in vain takes 10 ms, so that an adapter that comes back by itself does.
+    ///
+    /// # Errors
+    ///
+    /// [`PortErrorKind::NotFound`]: the adapter is unplugged.
+    pub fn open_line(&self) -> Result<SimLine, PortError> {
+        let mut world = self.shared.present();
+        if world.is_plugged() {
+            drop(world);
+            return Ok(self.line());
+        }
+        if !self.is_realtime() {
+            let later = world.now() + OPENING;
+            world.advance(later);
+        }
+        let message = "the simulated adapter is unplugged; replug() puts it back";
+        Err(PortError::new(PortErrorKind::NotFound, &self.shared.name, message))
     }
 
     /// A pseudo-terminal that other programs open as a serial port. Served by a thread until it is dropped.
@@ -125,7 +163,19 @@ impl Simulator {
     #[cfg(target_os = "linux")]
     pub fn serve_pty(&self) -> Result<crate::PtyServer, SimError> {
         self.require_real_time()?;
-        Ok(crate::PtyServer::start(Arc::clone(&self.shared))?)
+        Ok(crate::PtyServer::start(Arc::clone(&self.shared), None)?)
+    }
+
+    /// As [`serve_pty`](Self::serve_pty), with a symbolic link that always leads to it, also where unplugging has given
+    /// it another name. A link that is there is replaced; it is removed at the end.
+    ///
+    /// # Errors
+    ///
+    /// As above, and [`SimError::Io`] where `link` is something else than a link, or cannot be made.
+    #[cfg(target_os = "linux")]
+    pub fn serve_pty_linked(&self, link: &std::path::Path) -> Result<crate::PtyServer, SimError> {
+        self.require_real_time()?;
+        Ok(crate::PtyServer::start(Arc::clone(&self.shared), Some(link.to_owned()))?)
     }
 
     /// RTU over TCP on 127.0.0.1, at a port of the system's choosing. Served by a thread until it is dropped.

@@ -1,7 +1,11 @@
-//! What the wire was told to do to the next answers: lose, replace, delay them, put noise around them.
+//! What a test told the wire to do to the next answers, exactly so: lose, replace, delay them, put noise around them.
+//!
+//! What happens by chance or by script is in `faults`, and comes on top.
 
 use std::collections::VecDeque;
 use std::time::Duration;
+
+use crate::faults::Outgoing;
 
 /// Something that happens to a number of answers.
 #[derive(Debug)]
@@ -65,8 +69,8 @@ impl Spoil {
         *self = Self::default();
     }
 
-    /// What becomes of `answer`: the bytes to send and how much later; `None` where it is lost.
-    pub(crate) fn apply(&mut self, answer: &[u8]) -> Option<(Vec<u8>, Duration)> {
+    /// What becomes of `answer`; `None` where it is lost.
+    pub(crate) fn apply(&mut self, answer: &[u8]) -> Option<Outgoing> {
         if self.drop > 0 {
             self.drop -= 1;
             return None;
@@ -77,13 +81,18 @@ impl Spoil {
             None => bytes.extend_from_slice(answer),
         }
         bytes.extend(Counted::take(&mut self.after).unwrap_or_default());
-        Some((bytes, Counted::take(&mut self.delay).unwrap_or_default()))
+        let delay = Counted::take(&mut self.delay).unwrap_or_default();
+        Some(Outgoing { bytes, delay, pauses: Vec::new() })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn sent(bytes: &[u8], millis: u64) -> Outgoing {
+        Outgoing { bytes: bytes.to_vec(), delay: Duration::from_millis(millis), pauses: Vec::new() }
+    }
 
     #[test]
     fn each_fault_lasts_for_its_number_of_answers() {
@@ -93,9 +102,9 @@ mod tests {
         spoil.delay_answers(Duration::from_millis(3), 1);
         spoil.drop_answers(1);
         assert_eq!(spoil.apply(&[1]), None);
-        assert_eq!(spoil.apply(&[1]), Some((vec![0, 1, 0xFF, 0xFF], Duration::from_millis(3))));
-        assert_eq!(spoil.apply(&[1]), Some((vec![0, 1], Duration::ZERO)));
-        assert_eq!(spoil.apply(&[1]), Some((vec![1], Duration::ZERO)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[0, 1, 0xFF, 0xFF], 3)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[0, 1], 0)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[1], 0)));
     }
 
     #[test]
@@ -104,9 +113,9 @@ mod tests {
         spoil.answer_with(&[7]);
         spoil.answer_with(&[8, 9]);
         spoil.answer_with(&[10]);
-        assert_eq!(spoil.apply(&[1]), Some((vec![7], Duration::ZERO)));
-        assert_eq!(spoil.apply(&[1]), Some((vec![8, 9], Duration::ZERO)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[7], 0)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[8, 9], 0)));
         spoil.clear();
-        assert_eq!(spoil.apply(&[1]), Some((vec![1], Duration::ZERO)));
+        assert_eq!(spoil.apply(&[1]), Some(sent(&[1], 0)));
     }
 }

@@ -3,12 +3,11 @@
 //! It reads no clock. Whoever holds it says how far time has come.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::time::Duration;
 
 use drivebus_rtu::{Destination, Frame, Instant, SerialFormat, UnitAddress};
 
 use crate::drive::Drive;
-use crate::random::Random;
+use crate::faults::FaultKind;
 use crate::wire::{Step, Wakeup, Wire};
 
 /// Bytes kept for a master that does not read; older ones are lost, as in a serial port.
@@ -26,16 +25,28 @@ pub(crate) struct World {
     drives: BTreeMap<u8, Drive>,
     inboxes: BTreeMap<Listener, VecDeque<u8>>,
     next_listener: u64,
+    plug: Plug,
+}
+
+/// The adapter between the masters and the wire.
+#[derive(Debug)]
+struct Plug {
+    is_in: bool,
+    /// How often it was pulled out: what was opened before is lost for good.
+    pulls: u64,
+    /// When it comes back by itself.
+    back_at: Option<Instant>,
 }
 
 impl World {
     pub(crate) fn new(format: SerialFormat, strict_silence: bool, seed: u64, drives: BTreeMap<u8, Drive>) -> Self {
         Self {
             now: Instant::ZERO,
-            wire: Wire::new(format, strict_silence, Random::new(seed)),
+            wire: Wire::new(format, strict_silence, seed),
             drives,
             inboxes: BTreeMap::new(),
             next_listener: 0,
+            plug: Plug { is_in: true, pulls: 0, back_at: None },
         }
     }
 
@@ -47,24 +58,69 @@ impl World {
     /// Lets everything happen that is due until `to`.
     pub(crate) fn advance(&mut self, to: Instant) {
         let to = to.max(self.now);
-        while let Some(step) = self.wire.step(to) {
-            match step {
-                Step::Delivered(byte) => self.deliver(byte),
-                Step::Heard { bytes, silent } => self.hear(&bytes, silent),
+        while let Some(back) = self.plug.back_at.filter(|&back| back <= to) {
+            self.run(back);
+            // Whoever pulled it out once more meanwhile has said when it comes back.
+            if self.plug.back_at == Some(back) {
+                self.replug();
             }
         }
-        self.now = to;
+        self.run(to);
     }
 
-    /// A master sends at `at`; returns when its last character has left.
-    pub(crate) fn transmit(&mut self, at: Instant, bytes: &[u8]) -> Instant {
+    fn run(&mut self, to: Instant) {
+        while let Some(step) = self.wire.step(to) {
+            match step {
+                Step::Delivered(byte) => self.inboxes.values_mut().for_each(|inbox| put(inbox, byte)),
+                Step::Echoed(to, byte) => {
+                    if let Some(inbox) = self.inboxes.get_mut(&to) {
+                        put(inbox, byte);
+                    }
+                }
+                Step::Heard { bytes, silent } => self.hear(&bytes, silent),
+            }
+            if !self.plug.is_in {
+                self.inboxes.values_mut().for_each(VecDeque::clear);
+            }
+        }
+        self.now = self.now.max(to);
+    }
+
+    /// The master `from` sends at `at`; returns when its last character has left.
+    pub(crate) fn transmit(&mut self, from: Listener, at: Instant, bytes: &[u8]) -> Instant {
         self.advance(at);
-        self.wire.transmit(self.now, bytes)
+        self.wire.transmit(from, self.now, bytes)
     }
 
     /// When to [`advance`](Self::advance) next.
     pub(crate) fn next_wakeup(&self) -> Option<Wakeup> {
         self.wire.next_wakeup()
+    }
+
+    /// Pulls the adapter out at `at`, until [`replug`](Self::replug) or, where it is known, until `back_at`.
+    pub(crate) fn unplug(&mut self, at: Instant, back_at: Option<Instant>) {
+        if self.plug.is_in {
+            self.plug.is_in = false;
+            self.plug.pulls += 1;
+            self.wire.cut_off(at);
+            self.inboxes.values_mut().for_each(VecDeque::clear);
+        }
+        self.plug.back_at = back_at;
+    }
+
+    /// Puts the adapter back.
+    pub(crate) fn replug(&mut self) {
+        self.plug.is_in = true;
+        self.plug.back_at = None;
+    }
+
+    pub(crate) fn is_plugged(&self) -> bool {
+        self.plug.is_in
+    }
+
+    /// How often the adapter was pulled out.
+    pub(crate) fn pulls(&self) -> u64 {
+        self.plug.pulls
     }
 
     /// The drive with the address `unit`, as it is now.
@@ -97,15 +153,6 @@ impl World {
         count
     }
 
-    fn deliver(&mut self, byte: u8) {
-        for inbox in self.inboxes.values_mut() {
-            if inbox.len() == INBOX {
-                inbox.pop_front();
-            }
-            inbox.push_back(byte);
-        }
-    }
-
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.
     fn hear(&mut self, bytes: &[u8], silent: Instant) {
         let Ok(frame) = Frame::parse(bytes) else { return };
@@ -117,11 +164,30 @@ impl World {
             }
             Ok(Destination::Unit(unit)) => {
                 let Some(drive) = self.drives.get_mut(&unit.get()) else { return };
-                let Some(answer) = drive.handle(silent, frame.pdu()) else { return };
-                let delay: Duration = drive.response_delay();
-                self.wire.answer(unit.get(), silent + delay, answer.as_bytes());
+                let hits = self.wire.faults.next();
+                if hits.has(FaultKind::Deaf) {
+                    self.wire.faults.happened(FaultKind::Deaf);
+                    return;
+                }
+                let answer = drive.handle(silent, frame.pdu());
+                let ready = silent + drive.response_delay();
+                if hits.has(FaultKind::Unplug) && self.plug.is_in {
+                    self.wire.faults.happened(FaultKind::Unplug);
+                    self.unplug(silent, Some(silent + self.wire.faults.times.replug));
+                }
+                if let Some(answer) = answer {
+                    self.wire.answer(unit.get(), ready, answer.as_bytes(), hits);
+                }
             }
             Err(_) => {}
         }
     }
+}
+
+/// A byte arrives.
+fn put(inbox: &mut VecDeque<u8>, byte: u8) {
+    if inbox.len() == INBOX {
+        inbox.pop_front();
+    }
+    inbox.push_back(byte);
 }

@@ -145,6 +145,7 @@ impl Drive {
         if self.writes.len() == WRITES_KEPT {
             self.writes.pop_front();
         }
+        self.words_written += 1;
         self.writes.push_back(WriteRecord { at: now, address, value: word });
 
         if address & !at::RAM_BIT == at::PASSWORD && self.is_locked() {

@@ -67,6 +67,7 @@ pub(crate) struct Drive {
     /// The last frame for this unit; `None` until the first one, and after a silence was dealt with.
     last_heard: Option<Instant>,
     writes: VecDeque<WriteRecord>,
+    words_written: u64,
 }
 
 impl Drive {
@@ -87,6 +88,7 @@ impl Drive {
             analog: [0; 4],
             last_heard: None,
             writes: VecDeque::new(),
+            words_written: 0,
         }
     }
 
@@ -190,6 +192,14 @@ impl Drive {
 
     pub(crate) fn writes(&self) -> Vec<WriteRecord> {
         self.writes.iter().copied().collect()
+    }
+
+    pub(crate) fn take_writes(&mut self) -> Vec<WriteRecord> {
+        std::mem::take(&mut self.writes).into()
+    }
+
+    pub(crate) fn words_written(&self) -> u64 {
+        self.words_written
     }
 
     /// How long after a request's silence the answer begins: P14.03, or the drive's own processing time if longer.

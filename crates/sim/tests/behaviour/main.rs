@@ -7,6 +7,7 @@
 
 mod anything;
 mod bench;
+mod faults;
 mod memory;
 mod ports;
 mod refusals;

@@ -3,13 +3,13 @@
 //! Nothing here judges how long something took, except that no character may be early.
 
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
 use drivebus_line::Line;
 use drivebus_rtu::Instant;
-use drivebus_sim::{Options, SimError, Simulator};
+use drivebus_sim::{FaultKind, Options, SimError, Simulator};
 
 use crate::bench::{framed, hex, pdu};
 
@@ -56,6 +56,67 @@ fn a_pseudo_terminal_is_gone_when_its_server_is_dropped() {
     drop(server);
     // The read end of a terminal whose other side is closed: end of file, or EIO.
     assert!(matches!(port.read(&mut [0; 1]), Ok(0) | Err(_)));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pseudo_terminal_that_is_plugged_in_again_has_another_name_and_its_link_leads_there() {
+    let simulator = simulator();
+    let folder = std::env::temp_dir().join(format!("drivebus-link-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let link = folder.join("drive");
+    std::fs::write(&link, "precious").unwrap();
+    assert!(simulator.serve_pty_linked(&link).unwrap_err().to_string().contains("is no link"));
+    std::fs::remove_file(&link).unwrap();
+
+    let server = simulator.serve_pty_linked(&link).unwrap();
+    let mut names = vec![server.path()];
+    for _ in 0..20 {
+        let open_link = || OpenOptions::new().read(true).write(true).open(&link);
+        let mut port = open_link().unwrap();
+        ask_thrice(&simulator, &mut port);
+        simulator.wire().unplug();
+        assert!(matches!(port.read(&mut [0; 1]), Ok(0) | Err(_)), "a hang-up");
+        assert!(open_link().is_err(), "there is nothing to open");
+        simulator.wire().unplug();
+        simulator.wire().replug().unwrap();
+        simulator.wire().replug().unwrap();
+        assert_ne!(Some(&server.path()), names.last());
+        names.push(server.path());
+        assert_eq!(std::fs::read_link(&link).unwrap(), server.path());
+    }
+    drop(server);
+    assert!(std::fs::symlink_metadata(&link).is_err());
+    std::fs::remove_dir(&folder).unwrap();
+}
+
+#[test]
+fn tcp_is_refused_while_it_is_unplugged() {
+    let simulator = simulator();
+    let server = simulator.serve_tcp().unwrap();
+    let mut port = TcpStream::connect(server.address()).unwrap();
+    ask_thrice(&simulator, &mut port);
+    simulator.wire().unplug();
+    assert!(matches!(port.read(&mut [0; 1]), Ok(0) | Err(_)));
+    assert_eq!(TcpStream::connect(server.address()).unwrap_err().kind(), ErrorKind::ConnectionRefused);
+    simulator.wire().replug().unwrap();
+    ask_thrice(&simulator, &mut TcpStream::connect(server.address()).unwrap());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn faults_and_echo_are_on_the_wire_behind_a_pseudo_terminal_too() {
+    let simulator = simulator();
+    let server = simulator.serve_pty().unwrap();
+    let mut port = open(&server);
+    let request = framed(1, &pdu(0x03, &[0x2103, 1]));
+    simulator.wire().set_echo(true);
+    simulator.wire().script(&[(1, FaultKind::Split)]);
+    port.write_all(&request).unwrap();
+    let mut came = [0; 15];
+    port.read_exact(&mut came).unwrap();
+    assert_eq!(came[..], [request, hex("01 03 02 01 A0 B9 AC")].concat());
+    assert_eq!(simulator.wire().counts(FaultKind::Split), 1);
 }
 
 #[test]
