@@ -5,7 +5,7 @@ Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing wa
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, final
 
 from typing_extensions import Buffer
@@ -25,6 +25,7 @@ __all__ = [
     "encode_echo",
     "encode_read",
     "encode_write",
+    "fault_kinds",
 ]
 
 def crc16(data: Buffer, /) -> int:
@@ -239,14 +240,16 @@ class Simulator:
         transport: str = "pty",
         realtime: bool = True,
         strict_silence: bool = False,
+        link: str | os.PathLike[str] | None = None,
     ) -> Simulator:
         """*transport*: `"pty"`, `"tcp"` (RTU over TCP on 127.0.0.1), or `"process"` (only by `Bus(simulator)`).
 
-        *realtime* False needs `"process"`: the clock jumps to what happens next.
+        *realtime* False needs `"process"`: the clock jumps to what happens next. *link* is a symbolic link that is kept
+        leading to the pseudo-terminal.
         """
     @property
     def port(self) -> str:
-        """A path, `socket://127.0.0.1:N`, or `sim:` and the units."""
+        """A path, `socket://127.0.0.1:N`, or `sim:` and the units. A path changes with each `SimulatedLine.replug`."""
     def close(self) -> None: ...
     def now(self) -> float:
         """Seconds since the simulation began."""
@@ -255,6 +258,9 @@ class Simulator:
     def drive(self, unit: int, /) -> SimulatedDrive: ...
     @property
     def line(self) -> SimulatedLine: ...
+
+def fault_kinds() -> tuple[str, ...]:
+    """The names of what can go wrong with an answer on a simulated line."""
 
 @final
 class SimulatedDrive:
@@ -288,7 +294,12 @@ class SimulatedDrive:
     @property
     def eeprom_writes(self) -> int: ...
     def writes(self) -> list[tuple[float, int, int]]:
-        """Every word the drive took from the bus: seconds, address, value."""
+        """Every word the drive took from the bus: seconds, address, value. The last 100 000."""
+    def take_writes(self) -> list[tuple[float, int, int]]:
+        """As `writes`, and forgets them."""
+    @property
+    def words_written(self) -> int:
+        """How many words the drive has taken from the bus, ever."""
 
 @final
 class SimulatedLine:
@@ -306,6 +317,32 @@ class SimulatedLine:
     def noise_before(self, data: Buffer, count: int = 1, /) -> None: ...
     def noise_after(self, data: Buffer, count: int = 1, /) -> None: ...
     def clear(self) -> None:
-        """Forgets every fault that waits."""
+        """Forgets every fault: those that wait, the rates and the script. An adapter that echoes goes on echoing."""
+    def set_faults(self, **rates: float) -> None:
+        """Sets the share (0.0..1.0) of answers that each kind of fault hits; kinds that are not named have none.
+
+        `all` is every kind but `unplug`. docs/simulator.md says what each does.
+        """
+    @property
+    def faults(self) -> dict[str, float]:
+        """The kinds that have a rate, and the rate."""
+    def script(self, faults: Iterable[tuple[int, str]], /) -> None:
+        """Says which answer, counted from now (the next one is 1), is hit by what kind. Rates go on beside it."""
+    def fault_counts(self) -> dict[str, int]:
+        """How often each kind has happened."""
+    def set_times(self, *, delay: float | None = None, late: float | None = None, replug: float | None = None) -> None:
+        """Sets how long faults take, in seconds.
+
+        *delay* at most (0.05), *late* at least and twice that at most (0.6), *replug* until an adapter that fell out by
+        rate is back (0.5).
+        """
+    echo: bool
+    """Whether the adapter hands back what it sends."""
+    def unplug(self) -> None:
+        """Pulls the adapter out: the port is gone, and what it was sending is cut off."""
+    def replug(self) -> None:
+        """Puts it back. A pseudo-terminal then has another name. PortError where the system has no port to give."""
+    @property
+    def plugged(self) -> bool: ...
     def trace(self) -> list[tuple[float, str, bytes]]:
         """The last 1000 transmissions: seconds of their first bit, `"master"` or `"unit"`, bytes."""

@@ -16,13 +16,13 @@ from drivebus import checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed, PortError
 from drivebus.profile import profiles
-from drivebus.sim import Simulator
+from drivebus.sim import FAULT_KINDS, Simulator
 
 __all__ = ["format_of", "open_simulator", "resolve"]
 
 _CORE_SCHEMES = ("socket", "tcp")
 _PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
-_SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence")
+_SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence", "echo", "faults")
 
 
 def resolve(port: object, line: SerialFormat) -> Any:
@@ -91,7 +91,11 @@ def _open_pyserial(url: str, line: SerialFormat) -> Any:
 
 
 def open_simulator(url: str, line: SerialFormat) -> Simulator:
-    """`sim://gd350` or `sim://1=gd350,2=gd350`, with `?clock=virtual&seed=1`, as a simulator in this process."""
+    """`sim://gd350` or `sim://1=gd350,2=gd350`, with `?clock=virtual&seed=1`, as a simulator in this process.
+
+    `faults=0.02` is the share of answers that each kind of fault hits, `late=0.1` that of one kind, `echo=1` an adapter
+    that echoes.
+    """
     body, _, query = url.removeprefix("sim://").partition("?")
     units: dict[int, str] = {}
     for part in body.strip("/").split(","):
@@ -102,9 +106,14 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
         if int(unit) in units:
             raise NotAllowed(f"unit {unit} stands twice in {url!r}; give each unit once, as in sim://1=gd350,2=gd350")
         units[checks.unit(int(unit))] = checks.one_of("profile", family, profiles())
-    options = {"clock": "real", "seed": "0", "strict_silence": "0"}
+    options = {"clock": "real", "seed": "0", "strict_silence": "0", "echo": "0"}
+    faults: dict[str, float] = {}
     for key, value in parse_qsl(query, keep_blank_values=True):
-        options[checks.one_of("simulator option", key, _SIMULATOR_OPTIONS)] = value
+        checks.one_of("simulator option", key, (*_SIMULATOR_OPTIONS, *FAULT_KINDS))
+        if key == "faults" or key in FAULT_KINDS:
+            faults["all" if key == "faults" else key] = _share(key, value, url)
+        else:
+            options[key] = value
     if not options["seed"].isdecimal():
         raise NotAllowed(f"seed {options['seed']!r} in {url!r} is not a whole number; allowed is 0 or more")
     return Simulator(
@@ -117,5 +126,18 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
         seed=int(options["seed"]),
         transport="process",
         clock=options["clock"],
-        strict_silence=options["strict_silence"] not in ("0", "false", ""),
+        strict_silence=_is_on(options["strict_silence"]),
+        faults=faults,
+        echo=_is_on(options["echo"]),
     )
+
+
+def _is_on(text: str) -> bool:
+    return text not in ("0", "false", "")
+
+
+def _share(kind: str, text: str, url: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise NotAllowed(f"rate {text!r} of {kind} in {url!r} is not a number; allowed is 0..1") from None

@@ -9,6 +9,7 @@ The line keeps real character times, in real time or in virtual time. `Simulator
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from types import TracebackType
 
@@ -17,7 +18,10 @@ from drivebus._native import SerialFormat, SimulatedLine
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
 
-__all__ = ["SimulatedDrive", "SimulatedLine", "Simulator"]
+__all__ = ["FAULT_KINDS", "SimulatedDrive", "SimulatedLine", "Simulator", "check_faults"]
+
+FAULT_KINDS = _native.fault_kinds()
+"""What can go wrong with an answer, by name: `"flip_bit"`, `"lose_byte"`, ..."""
 
 
 class SimulatedDrive:
@@ -104,8 +108,17 @@ class SimulatedDrive:
         return self._native.eeprom_writes
 
     def writes(self) -> list[tuple[float, int, int]]:
-        """Every word the drive took from the bus: seconds since the simulation began, address, value."""
+        """The last 100 000 words the drive took from the bus: seconds since the simulation began, address, value."""
         return self._native.writes()
+
+    def take_writes(self) -> list[tuple[float, int, int]]:
+        """As `writes`, and forgets them: who takes them often enough misses none."""
+        return self._native.take_writes()
+
+    @property
+    def words_written(self) -> int:
+        """How many words the drive has taken from the bus, ever."""
+        return self._native.words_written
 
     def __repr__(self) -> str:
         return f"<SimulatedDrive {self.unit}: {self.profile}, {self.state}, {self.frequency:.2f} Hz>"
@@ -126,13 +139,22 @@ class Simulator:
             (only for `drivebus.Bus(simulator)`).
         clock: `"real"`, or `"virtual"` (only with `"process"`): time jumps to what happens next, nobody waits.
         strict_silence: Whether drives ignore requests that come before the silence is over, as real ones do.
+        faults: The share (0.0..1.0) of answers that each kind of fault hits, such as `{"flip_bit": 0.02}`;
+            `"all"` is every kind but `"unplug"`. docs/simulator.md says what each does.
+        echo: Whether the adapter hands back what it sends.
+        link: A symbolic link that is kept leading to the pseudo-terminal, whatever name `line.replug()` gave it.
 
     Raises:
         NotAllowed: An argument is wrong.
         PortError: The pseudo-terminal or TCP port could not be opened.
+
+    Attributes:
+        format: The `SerialFormat` of the line.
+        transport: As above.
+        seed: As above: the same seed, arguments and requests give the same run in virtual time.
     """
 
-    __slots__ = ("_native", "format", "transport")
+    __slots__ = ("_native", "format", "seed", "transport")
 
     def __init__(
         self,
@@ -147,6 +169,9 @@ class Simulator:
         transport: str = "pty",
         clock: str = "real",
         strict_silence: bool = False,
+        faults: Mapping[str, float] | None = None,
+        echo: bool = False,
+        link: str | os.PathLike[str] | None = None,
     ) -> None:
         checks.one_of("transport", transport, ("pty", "tcp", "process"))
         checks.one_of("clock", clock, ("real", "virtual"))
@@ -154,17 +179,24 @@ class Simulator:
             raise NotAllowed(
                 f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
             )
+        if link is not None and transport != "pty":
+            raise NotAllowed(f'link {os.fspath(link)!r} leads to a pseudo-terminal: it needs transport "pty"')
         _check_units(units)
+        rates = check_faults(faults or {}, transport)
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
         self.transport = transport
+        self.seed = checks.whole("seed", seed, 0, 2**64 - 1)
         self._native = _native.Simulator(
             units,
             self.format,
-            seed=checks.whole("seed", seed, 0, 2**64 - 1),
+            seed=self.seed,
             transport=transport,
             realtime=clock == "real",
             strict_silence=strict_silence,
+            link=link,
         )
+        self.line.set_faults(**rates)
+        self.line.echo = echo
 
     @property
     def port(self) -> str:
@@ -202,6 +234,17 @@ class Simulator:
 
     def __repr__(self) -> str:
         return f"<Simulator on {self.port}>"
+
+
+def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:
+    """*faults* as rates, if each is a kind of fault (or "all") with a share that this transport can have."""
+    rates = {}
+    for kind, rate in faults.items():
+        checks.one_of("fault", kind, ("all", *FAULT_KINDS))
+        rates[kind] = checks.number(f"rate of {kind}", rate, 0.0, 1.0)
+    if rates.get("unplug") and transport != "process":
+        raise NotAllowed('"unplug" by rate needs transport "process"; line.unplug() pulls out any port')
+    return rates
 
 
 def _check_units(units: object) -> None:

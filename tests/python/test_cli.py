@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -337,6 +338,29 @@ def test_sim_serves_until_ctrl_c() -> None:
         child.send_signal(signal.SIGINT)
         child.communicate(timeout=20)
     assert child.returncode == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path) -> None:
+    link = tmp_path / "drive"
+    words = [sys.executable, "-m", "drivebus", "sim", "--faults", "0.02", "--fault", "deaf=1", "--seed", "7", "--echo"]
+    with subprocess.Popen([*words, "--link", link], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        said = [child.stdout.readline().strip() for _ in range(3)]
+        assert said[0] == str(link.readlink())
+        assert said[1].startswith("Faults: flip_bit 0.02, ")
+        assert "deaf 1" in said[1]
+        assert said[2] == "Seed: 7"
+        with drivebus.Bus(link, timeout=0.05, retries=0) as bus, pytest.raises(drivebus.NoAnswer):
+            bus.read(1, 0x2103)
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=20)
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize("words", [["--fault", "late"], ["--fault", "latest=0.1"], ["--faults", "2"]])
+def test_sim_knows_its_faults(words: list[str]) -> None:
+    assert run("sim", *words, port=None).exit_code == 2
 
 
 def test_the_demonstration_holds() -> None:

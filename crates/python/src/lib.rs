@@ -14,6 +14,7 @@ mod open;
 mod profile;
 mod pyserial;
 mod sim;
+mod sim_line;
 
 /// Nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]
@@ -29,7 +30,9 @@ mod _native {
     #[pymodule_export]
     use crate::profile::Profile;
     #[pymodule_export]
-    use crate::sim::{SimulatedDrive, SimulatedLine, Simulator};
+    use crate::sim::{SimulatedDrive, Simulator};
+    #[pymodule_export]
+    use crate::sim_line::{SimulatedLine, fault_kinds};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,16 +1,17 @@
-//! The simulator for Python.
+//! The simulator and its drives for Python.
 
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_line::{Line, PortError, PortErrorKind};
-use drivebus_sim::{self as sim, Options, Side, SimError};
+use drivebus_sim::{self as sim, Options, SimError};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 
-use crate::convert::{bytes_of, one_word, shown, unit_address};
+use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{not_allowed, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::sim_line::SimulatedLine;
 
 /// What other programs reach the simulated line by. It is served until this is dropped.
 enum Server {
@@ -22,17 +23,20 @@ enum Server {
 }
 
 impl Server {
-    fn start(simulator: &sim::Simulator, transport: &str) -> PyResult<Self> {
-        let failed = |error| match error {
-            SimError::Io(error) => {
-                port_error(&PortError::new(PortErrorKind::Other, format!("simulator ({transport})"), error.to_string()))
-            }
-            error => refuse(error),
-        };
+    fn start(simulator: &sim::Simulator, transport: &str, link: Option<PathBuf>) -> PyResult<Self> {
+        let failed = |error| sim_error(&format!("simulator ({transport})"), error);
+        if link.is_some() && transport != "pty" {
+            return Err(not_allowed(format!(
+                "a link leads to a pseudo-terminal, and there is none with {transport:?}"
+            )));
+        }
         match transport {
             "process" => Ok(Self::InProcess),
             #[cfg(target_os = "linux")]
-            "pty" => simulator.serve_pty().map(Self::Pty).map_err(failed),
+            "pty" => match link {
+                None => simulator.serve_pty().map(Self::Pty).map_err(failed),
+                Some(link) => simulator.serve_pty_linked(&link).map(Self::Pty).map_err(failed),
+            },
             #[cfg(unix)]
             "tcp" => simulator.serve_tcp().map(Self::Tcp).map_err(failed),
             #[cfg(not(target_os = "linux"))]
@@ -58,7 +62,8 @@ impl Server {
 #[pyclass(frozen, module = "drivebus._native")]
 pub(crate) struct Simulator {
     core: sim::Simulator,
-    port: String,
+    /// Where it was to be reached when that was last asked.
+    port: Mutex<String>,
     /// `None` once it is closed.
     server: Mutex<Option<Server>>,
 }
@@ -68,9 +73,18 @@ impl Simulator {
     pub(crate) fn sim_line(&self) -> Result<Box<dyn Line>, PortError> {
         if self.server().is_none() {
             let message = "the simulation is closed; make a new Simulator";
-            return Err(PortError::new(PortErrorKind::Closed, &self.port, message));
+            return Err(PortError::new(PortErrorKind::Closed, self.current_port(), message));
         }
-        Ok(Box::new(self.core.line()))
+        Ok(Box::new(self.core.open_line()?))
+    }
+
+    /// Where it is reached now: a pseudo-terminal gets another name by unplugging. What it was, once it is closed.
+    fn current_port(&self) -> String {
+        let mut port = self.port.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(server) = &*self.server() {
+            *port = server.port(&self.core);
+        }
+        port.clone()
     }
 
     fn server(&self) -> MutexGuard<'_, Option<Server>> {
@@ -82,8 +96,8 @@ impl Simulator {
 impl Simulator {
     #[new]
     #[pyo3(
-        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false),
-        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False)"
+        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false, link = None),
+        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False, link=None)"
     )]
     fn new(
         units: &Bound<'_, PyAny>,
@@ -92,22 +106,24 @@ impl Simulator {
         transport: &str,
         realtime: bool,
         strict_silence: bool,
+        link: Option<PathBuf>,
     ) -> PyResult<Self> {
         let units = units_of(units)?;
         let options = Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
         let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
         let core = sim::Simulator::new(named, options).map_err(refuse)?;
-        let server = Server::start(&core, transport)?;
-        let port = server.port(&core);
+        let server = Server::start(&core, transport, link)?;
+        let port = Mutex::new(server.port(&core));
         Ok(Self { core, port, server: Mutex::new(Some(server)) })
     }
 
     #[getter]
-    fn port(&self) -> &str {
-        &self.port
+    fn port(&self) -> String {
+        self.current_port()
     }
 
     fn close(&self, py: Python<'_>) {
+        self.current_port();
         let server = self.server().take();
         // Ending a server waits for its thread.
         py.detach(|| drop(server));
@@ -130,11 +146,11 @@ impl Simulator {
 
     #[getter]
     fn line(&self) -> SimulatedLine {
-        SimulatedLine(self.core.wire())
+        SimulatedLine::new(self.core.wire())
     }
 
     fn __repr__(&self) -> String {
-        format!("<Simulator {} at {}>", self.core.name(), self.port)
+        format!("<Simulator {} at {}>", self.core.name(), self.current_port())
     }
 }
 
@@ -221,65 +237,25 @@ impl SimulatedDrive {
         self.0.writes().iter().map(|write| (seconds(write.at), write.address, write.value)).collect()
     }
 
+    fn take_writes(&self) -> Vec<(f64, u16, u16)> {
+        self.0.take_writes().iter().map(|write| (seconds(write.at), write.address, write.value)).collect()
+    }
+
+    #[getter]
+    fn words_written(&self) -> u64 {
+        self.0.words_written()
+    }
+
     fn __repr__(&self) -> String {
         format!("<SimulatedDrive {}: {}, {}>", self.0.unit(), self.0.profile(), self.0.state())
     }
 }
 
-/// The wire: what it saw, and what it is told to spoil.
-#[pyclass(frozen, module = "drivebus._native")]
-pub(crate) struct SimulatedLine(sim::SimulatedLine);
-
-#[pymethods]
-impl SimulatedLine {
-    #[getter]
-    fn requests(&self) -> u64 {
-        self.0.requests()
-    }
-
-    #[getter]
-    fn silence_violations(&self) -> u64 {
-        self.0.silence_violations()
-    }
-
-    #[pyo3(signature = (data, /))]
-    fn answer_with(&self, data: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.0.answer_with(bytes_of(data)?.as_bytes());
-        Ok(())
-    }
-
-    #[pyo3(signature = (count = None, /), text_signature = "($self, count=1, /)")]
-    fn drop_answers(&self, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        self.0.drop_answers(answers(count)?);
-        Ok(())
-    }
-
-    #[pyo3(signature = (seconds, count = None, /), text_signature = "($self, seconds, count=1, /)")]
-    fn delay_answers(&self, seconds: f64, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        self.0.delay_answers(duration(seconds)?, answers(count)?);
-        Ok(())
-    }
-
-    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
-    fn noise_before(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        self.0.noise_before(bytes_of(data)?.as_bytes(), answers(count)?);
-        Ok(())
-    }
-
-    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
-    fn noise_after(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        self.0.noise_after(bytes_of(data)?.as_bytes(), answers(count)?);
-        Ok(())
-    }
-
-    fn clear(&self) {
-        self.0.clear();
-    }
-
-    fn trace<'py>(&self, py: Python<'py>) -> Vec<(f64, &'static str, Bound<'py, PyBytes>)> {
-        let sent = self.0.trace();
-        let side = |side| if side == Side::Master { "master" } else { "unit" };
-        sent.iter().map(|sent| (seconds(sent.begin), side(sent.side), PyBytes::new(py, &sent.bytes))).collect()
+/// What the system refused is the port's trouble, anything else was asked for wrongly.
+pub(crate) fn sim_error(what: &str, error: SimError) -> PyErr {
+    match error {
+        SimError::Io(error) => port_error(&PortError::new(PortErrorKind::Other, what, error.to_string())),
+        error => refuse(error),
     }
 }
 
@@ -297,19 +273,12 @@ fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, String)>> {
         .collect()
 }
 
-/// How many answers a fault is for: one, unless it is said.
-fn answers(count: Option<&Bound<'_, PyAny>>) -> PyResult<u32> {
-    count.map_or(Ok(1), |count| {
-        count.extract().map_err(|_| not_allowed(format!("count {} is not in 0..{}", shown(count), u32::MAX)))
-    })
-}
-
 /// A moment of the simulation in seconds.
 #[expect(clippy::cast_precision_loss, reason = "a float is what Python counts seconds in; 104 days are exact")]
-fn seconds(moment: drivebus_rtu::Instant) -> f64 {
+pub(crate) fn seconds(moment: drivebus_rtu::Instant) -> f64 {
     moment.as_nanos() as f64 / 1e9
 }
 
-fn duration(seconds: f64) -> PyResult<Duration> {
+pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is no time to wait")))
 }

@@ -74,8 +74,23 @@ def _show_frame(session: Session, what: str, frame: bytes) -> None:
 @click.option("--units", default="1=gd350", show_default=True, metavar="LIST", help="Such as 1=gd350,2=gd350.")
 @click.option("--transport", type=click.Choice(["pty", "tcp"]), default="pty", show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Makes chance repeatable.")
+@click.option(
+    "--faults", type=click.FloatRange(0, 1), metavar="RATE", help="Share of answers that each kind of fault hits."
+)
+@click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind, such as late=0.02.")
+@click.option("--echo", is_flag=True, help="As an adapter that hands back what it sends.")
+@click.option("--link", type=click.Path(), help="A symbolic link to keep leading to the pseudo-terminal.")
 @pass_session
-def sim(session: Session, units: str, transport: str, seed: int) -> None:
+def sim(
+    session: Session,
+    units: str,
+    transport: str,
+    seed: int,
+    faults: float | None,
+    single: tuple[str, ...],
+    echo: bool,
+    link: str | None,
+) -> None:
     """Serve simulated drives until Ctrl-C, for this program or any other."""
     bits, parity, stop = session.line_format
     simulator = drivebus.Simulator(
@@ -86,17 +101,32 @@ def sim(session: Session, units: str, transport: str, seed: int) -> None:
         stopbits=int(stop),
         seed=seed,
         transport=transport,
+        faults=({} if faults is None else {"all": faults}) | dict(map(_rate, single)),
+        echo=echo,
+        link=link,
     )
     with simulator:
         if session.out.as_json:
-            session.out.record({"port": simulator.port})
+            session.out.record({"port": simulator.port, "seed": seed, "faults": simulator.line.faults})
         else:
             session.out.say(simulator.port)
+            if simulator.line.faults:
+                rates = ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items())
+                session.out.say(f"Faults: {rates}")
+            session.out.say(f"Seed: {seed}")
             session.out.say(f"Try: drivebus --port {simulator.port} info     Ctrl-C ends it.")
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
             session.out.say("")
+
+
+def _rate(text: str) -> tuple[str, float]:
+    kind, _, rate = text.partition("=")
+    try:
+        return kind.strip().replace("-", "_"), float(rate)
+    except ValueError:
+        raise click.UsageError(f"{text!r} is no fault; write KIND=RATE, such as late=0.02") from None
 
 
 def _simulated(text: str) -> dict[int, str]:

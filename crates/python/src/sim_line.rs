@@ -1,0 +1,181 @@
+//! The simulated wire for Python: what it saw, and what it is told to spoil.
+
+use drivebus_sim::{self as sim, FaultKind, Side, SimError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+
+use crate::convert::{bytes_of, shown};
+use crate::errors::{not_allowed, refuse};
+use crate::sim::{duration, seconds, sim_error};
+
+/// The wire: what it saw, and what it is told to spoil.
+#[pyclass(frozen, module = "drivebus._native")]
+pub(crate) struct SimulatedLine(sim::SimulatedLine);
+
+impl SimulatedLine {
+    pub(crate) fn new(line: sim::SimulatedLine) -> Self {
+        Self(line)
+    }
+}
+
+#[pymethods]
+impl SimulatedLine {
+    #[getter]
+    fn requests(&self) -> u64 {
+        self.0.requests()
+    }
+
+    #[getter]
+    fn silence_violations(&self) -> u64 {
+        self.0.silence_violations()
+    }
+
+    #[pyo3(signature = (data, /))]
+    fn answer_with(&self, data: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.answer_with(bytes_of(data)?.as_bytes());
+        Ok(())
+    }
+
+    #[pyo3(signature = (count = None, /), text_signature = "($self, count=1, /)")]
+    fn drop_answers(&self, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.drop_answers(answers(count)?);
+        Ok(())
+    }
+
+    #[pyo3(signature = (seconds, count = None, /), text_signature = "($self, seconds, count=1, /)")]
+    fn delay_answers(&self, seconds: f64, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.delay_answers(duration(seconds)?, answers(count)?);
+        Ok(())
+    }
+
+    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
+    fn noise_before(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.noise_before(bytes_of(data)?.as_bytes(), answers(count)?);
+        Ok(())
+    }
+
+    #[pyo3(signature = (data, count = None, /), text_signature = "($self, data, count=1, /)")]
+    fn noise_after(&self, data: &Bound<'_, PyAny>, count: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        self.0.noise_after(bytes_of(data)?.as_bytes(), answers(count)?);
+        Ok(())
+    }
+
+    fn clear(&self) {
+        self.0.clear();
+    }
+
+    #[pyo3(signature = (**rates), text_signature = "($self, **rates)")]
+    fn set_faults(&self, rates: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+        let rates = rates_of(rates)?;
+        for kind in FaultKind::ALL {
+            let named = rates.iter().rev().find(|(named, _)| named.is_some_and(|named| named == kind));
+            let general = rates.iter().find(|(named, _)| named.is_none() && kind != FaultKind::Unplug);
+            self.0.set_rate(kind, named.or(general).map_or(0.0, |&(_, rate)| rate)).map_err(refuse)?;
+        }
+        Ok(())
+    }
+
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rates = PyDict::new(py);
+        for (kind, rate) in self.0.rates() {
+            rates.set_item(kind.name(), rate)?;
+        }
+        Ok(rates)
+    }
+
+    #[pyo3(signature = (faults, /))]
+    fn script(&self, faults: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mistake = || not_allowed(format!("script {} is no list of (answer number from 1, kind)", shown(faults)));
+        let listed = faults.try_iter().map_err(|_| mistake())?.map(|item| {
+            let (answer, kind): (u64, String) = item?.extract().map_err(|_| mistake())?;
+            if answer == 0 { Err(mistake()) } else { Ok((answer, kind_of(&kind)?)) }
+        });
+        self.0.script(&listed.collect::<PyResult<Vec<_>>>()?);
+        Ok(())
+    }
+
+    fn fault_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counts = PyDict::new(py);
+        for kind in FaultKind::ALL {
+            counts.set_item(kind.name(), self.0.counts(kind))?;
+        }
+        Ok(counts)
+    }
+
+    #[pyo3(signature = (*, delay = None, late = None, replug = None))]
+    fn set_times(&self, delay: Option<f64>, late: Option<f64>, replug: Option<f64>) -> PyResult<()> {
+        let [delay, late, replug] = [delay, late, replug].map(|given| given.map(duration).transpose());
+        if let Some(delay) = delay? {
+            self.0.set_delay(delay);
+        }
+        if let Some(late) = late? {
+            self.0.set_late(late);
+        }
+        if let Some(replug) = replug? {
+            self.0.set_replug(replug);
+        }
+        Ok(())
+    }
+
+    #[getter]
+    fn echo(&self) -> bool {
+        self.0.echo()
+    }
+
+    #[setter]
+    fn set_echo(&self, echo: bool) {
+        self.0.set_echo(echo);
+    }
+
+    fn unplug(&self, py: Python<'_>) {
+        // Ending a server waits for its thread.
+        py.detach(|| self.0.unplug());
+    }
+
+    fn replug(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.0.replug()).map_err(|error| sim_error("simulator", error))
+    }
+
+    #[getter]
+    fn plugged(&self) -> bool {
+        self.0.is_plugged()
+    }
+
+    fn trace<'py>(&self, py: Python<'py>) -> Vec<(f64, &'static str, Bound<'py, PyBytes>)> {
+        let sent = self.0.trace();
+        let side = |side| if side == Side::Master { "master" } else { "unit" };
+        sent.iter().map(|sent| (seconds(sent.begin), side(sent.side), PyBytes::new(py, &sent.bytes))).collect()
+    }
+}
+
+/// Keyword arguments as rates; `None` is `all`.
+fn rates_of(rates: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(Option<FaultKind>, f64)>> {
+    let rates = rates.into_iter().flatten();
+    rates
+        .map(|(name, rate)| {
+            let name: String = name.extract()?;
+            let kind = if name == "all" { None } else { Some(kind_of(&name)?) };
+            let rate = rate.extract().ok().filter(|rate| (0.0..=1.0).contains(rate));
+            let mistake = || not_allowed(format!("a rate of {name} is not in 0.0..1.0"));
+            Ok((kind, rate.ok_or_else(mistake)?))
+        })
+        .collect()
+}
+
+/// The names of all kinds of faults.
+#[pyfunction]
+pub(crate) fn fault_kinds(py: Python<'_>) -> PyResult<Bound<'_, PyTuple>> {
+    PyTuple::new(py, FaultKind::ALL.map(FaultKind::name))
+}
+
+fn kind_of(name: &str) -> PyResult<FaultKind> {
+    name.parse().map_err(|error: SimError| refuse(error))
+}
+
+/// How many answers a fault is for: one, unless it is said.
+fn answers(count: Option<&Bound<'_, PyAny>>) -> PyResult<u32> {
+    count.map_or(Ok(1), |count| {
+        count.extract().map_err(|_| not_allowed(format!("count {} is not in 0..{}", shown(count), u32::MAX)))
+    })
+}
