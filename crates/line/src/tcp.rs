@@ -14,6 +14,13 @@ use crate::{Line, PortError, PortErrorKind};
 /// How long the network may take no byte of what it is given before the connection counts as lost.
 const STALL: Duration = Duration::from_millis(80);
 
+/// How long what was sent may stay unconfirmed before the connection counts as lost.
+///
+/// Without it the system keeps on trying for a quarter of an hour, and a server that is reached again then gets every
+/// request of that time at once, commands that nobody wants any more among them.
+#[cfg(target_os = "linux")]
+const UNCONFIRMED: Duration = Duration::from_secs(3);
+
 /// A TCP connection to a serial server that passes bytes through.
 #[derive(Debug)]
 pub struct RtuOverTcp {
@@ -130,8 +137,8 @@ impl Connection {
     /// The connection is of no more use, for `reason`.
     pub(crate) fn lost(&self, reason: impl std::fmt::Display) -> PortError {
         let message = format!(
-            "the connection is gone: {reason}; check the network and whether the server allows one client only, then \
-             open the port again"
+            "the connection is gone: {reason}; check the network and whether the server allows one client only; a bus \
+             connects again at its next call"
         );
         PortError::new(PortErrorKind::Lost, &self.name, message)
     }
@@ -141,6 +148,8 @@ impl Connection {
 fn prepared(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(STALL))?;
+    #[cfg(target_os = "linux")]
+    rustix::net::sockopt::set_tcp_user_timeout(&stream, u32::try_from(UNCONFIRMED.as_millis()).unwrap_or(u32::MAX))?;
     Ok(stream)
 }
 
@@ -189,4 +198,19 @@ fn connect_error(name: String, timeout: Duration, error: &io::Error) -> PortErro
         _ => (PortErrorKind::NotFound, format!("it cannot be reached ({error}); check the address and the network")),
     };
     PortError::new(kind, name, message)
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    #[test]
+    fn what_nobody_confirms_is_not_kept_for_long() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let connection = Connection::open("socket", "127.0.0.1", port, Duration::from_secs(20)).unwrap();
+        assert_eq!(rustix::net::sockopt::tcp_user_timeout(&connection.stream).unwrap(), 3_000); // milliseconds
+    }
 }
