@@ -189,6 +189,9 @@ impl Owner {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
         };
+        if result.is_ok() && unit.is_some() {
+            self.opener.answered();
+        }
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);
         if let (Some(unit), Err(error)) = (unit, &result)
