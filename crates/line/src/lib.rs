@@ -13,6 +13,8 @@ mod error;
 mod exchange;
 mod hint;
 mod hints;
+mod holder;
+mod identity;
 #[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line keeps it"))]
 mod link;
 pub mod mbap;
@@ -31,6 +33,7 @@ pub use bus::{Bus, BusOptions, CallOptions};
 pub use error::{CallError, Failure};
 pub use exchange::Done;
 pub use hint::Hint;
+pub use identity::Places;
 pub use link::Link;
 pub use opener::Opener;
 pub use owner::AdapterEcho;

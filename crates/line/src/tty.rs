@@ -5,12 +5,14 @@
 //! reading and writing with time-outs in milliseconds, where a silence here is counted in microseconds. `serial2` gives
 //! out the descriptor, takes any baud rate, and reads back what the driver made of the settings.
 
+mod adapter;
 #[cfg(not(unix))]
 mod plain;
 #[cfg(unix)]
 mod posix;
 
 use std::io;
+use std::path::Path;
 
 use drivebus_rtu::{DataBits, Duration, Instant, Parity, SerialFormat, StopBits};
 use serial2::SerialPort;
@@ -20,7 +22,11 @@ use plain as system;
 #[cfg(unix)]
 use posix as system;
 
+pub use adapter::Adapter;
+
 use crate::clock::{monotonic, sleep_until};
+use crate::holder;
+use crate::identity::DeviceNumber;
 use crate::rs485::Rs485;
 use crate::{Line, PortError, PortErrorKind};
 
@@ -56,7 +62,6 @@ pub struct Tty {
     /// When the last character handed over will have left the wire.
     wire_free: Instant,
     exclusive: bool,
-    pseudo_terminal: bool,
     notes: Vec<String>,
 }
 
@@ -85,7 +90,6 @@ impl Tty {
             delay_before: Duration::ZERO,
             wire_free: Instant::ZERO,
             exclusive: options.exclusive,
-            pseudo_terminal,
             notes: Vec::new(),
         };
         let (mut parity, mut data_bits) = (format.parity(), format.data_bits());
@@ -108,6 +112,11 @@ impl Tty {
         }
         tty.port.discard_buffers().map_err(|error| open_error(path, &error))?;
         Ok(tty)
+    }
+
+    /// The number the system gives this port for as long as it is open.
+    pub(crate) fn device_number(&self) -> Option<DeviceNumber> {
+        system::device_number(&self.port)
     }
 
     fn lost(&self, error: &io::Error) -> PortError {
@@ -143,8 +152,9 @@ impl Line for Tty {
         self.name.clone()
     }
 
+    /// Also behind a pseudo-terminal: the simulator's line has an adapter too.
     fn may_echo(&self) -> bool {
-        !self.pseudo_terminal
+        true
     }
 
     fn notes(&self) -> Vec<String> {
@@ -189,9 +199,7 @@ fn open_error(path: &str, error: &io::Error) -> PortError {
     let kind = system::open_error_kind(error);
     let message = match kind {
         PortErrorKind::NotFound => format!("there is no such port ({error}); {}", present_ports()),
-        PortErrorKind::Busy => {
-            "another program has it; close that program (on Linux, `fuser -v` on the port names it)".to_owned()
-        }
+        PortErrorKind::Busy => holder::advice(Path::new(path)),
         PortErrorKind::Denied => format!(
             "this user may not open it ({error}); join the group that owns it, usually `sudo usermod -aG dialout \
              $USER`, and log in again"

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
 use drivebus_line::rs485::Rs485;
 use drivebus_line::tcp::RtuOverTcp;
-use drivebus_line::tty::{Tty, TtyOptions};
+use drivebus_line::tty::{Adapter, TtyOptions};
 use drivebus_line::{Line, Opener};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
@@ -53,7 +53,8 @@ fn named(port: &str, format: SerialFormat, rs485: Option<Rs485>) -> PyResult<Ope
     match scheme {
         "" => {
             let options = TtyOptions { rs485, ..TtyOptions::default() };
-            Ok(Box::new(move || Ok(Box::new(Tty::open(&port, &format, &options)?))))
+            let mut adapter = Adapter::new(port, format, options);
+            Ok(Box::new(move || Ok(Box::new(adapter.open()?))))
         }
         "socket" => {
             let (host, number) = host_and_port(&port, rest, None)?;

@@ -9,6 +9,7 @@ use serial2::SerialPort;
 
 use crate::PortErrorKind;
 use crate::clock::{monotonic, sleep_until};
+use crate::identity::DeviceNumber;
 
 /// Opens `path` as it is. The system gives a port to one program only.
 pub(super) fn open(path: &str) -> io::Result<SerialPort> {
@@ -23,6 +24,11 @@ pub(super) fn lock(_port: &SerialPort, _pseudo_terminal: bool) -> io::Result<()>
 
 /// Nothing: closing the port unlocks it.
 pub(super) fn unlock(_port: &SerialPort) {}
+
+/// Nothing is known of a port but its name.
+pub(super) fn device_number(_port: &SerialPort) -> Option<DeviceNumber> {
+    None
+}
 
 /// There are no pseudo-terminals here.
 pub(super) fn is_pseudo_terminal(_port: &SerialPort, _path: &str) -> bool {

@@ -8,12 +8,14 @@ use rustix::event::PollFlags;
 use rustix::fs::{FlockOperation, Mode, OFlags, flock};
 use rustix::io::Errno;
 use rustix::termios::{
-    ControlModes, InputModes, OptionalActions, SpecialCodeIndex, ioctl_tiocexcl, ioctl_tiocnxcl, tcgetattr, tcsetattr,
+    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl, ioctl_tiocnxcl,
+    tcflush, tcgetattr, tcsetattr,
 };
 use serial2::SerialPort;
 
 use crate::PortErrorKind;
 use crate::clock::{monotonic, sleep_until, wait_for};
+use crate::identity::DeviceNumber;
 
 /// Opens `path` without changing anything about it: it may be another program's.
 pub(super) fn open(path: &str) -> io::Result<SerialPort> {
@@ -48,6 +50,19 @@ pub(super) fn unlock(port: &SerialPort) {
     // A port that was unplugged refuses both; it is unlocked anyhow.
     let _ = ioctl_tiocnxcl(port);
     let _ = flock(port, FlockOperation::Unlock);
+}
+
+/// The number of the port in the system.
+#[cfg(target_os = "linux")]
+pub(super) fn device_number(port: &SerialPort) -> Option<DeviceNumber> {
+    let number = rustix::fs::fstat(port).ok()?.st_rdev;
+    Some((rustix::fs::major(number), rustix::fs::minor(number)))
+}
+
+/// Nothing: there is nowhere to look it up.
+#[cfg(not(target_os = "linux"))]
+pub(super) fn device_number(_port: &SerialPort) -> Option<DeviceNumber> {
+    None
 }
 
 /// Whether `port`, opened as `path`, is the user's side of a pseudo-terminal.
@@ -98,7 +113,11 @@ pub(super) fn send(port: &mut SerialPort, bytes: &[u8], stall: Duration) -> io::
             Err(Errno::AGAIN) => match wait_for(port.as_fd(), PollFlags::OUT, give_up)? {
                 Some(ready) if ready.contains(PollFlags::OUT) => {}
                 Some(_) => return Err(Errno::IO.into()),
-                None => return Err(io::Error::new(io::ErrorKind::TimedOut, "it takes no more bytes")),
+                None => {
+                    // Closing would wait for the rest to leave, half a minute on Linux.
+                    let _ = tcflush(&*port, QueueSelector::OFlush);
+                    return Err(io::Error::new(io::ErrorKind::TimedOut, "it takes no more bytes"));
+                }
             },
             Err(error) => return Err(error.into()),
         }
@@ -119,6 +138,7 @@ pub(super) fn receive(port: &mut SerialPort, buffer: &mut [u8], until: Instant) 
             Ok(count) => return Ok(count),
             // Someone else read the bytes. Only a living port is asked again, or this would spin.
             Err(Errno::AGAIN) if ready == PollFlags::IN => {}
+            Err(Errno::AGAIN) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "hung up")),
             Err(Errno::INTR) => {}
             Err(error) => return Err(error.into()),
         }
