@@ -1,5 +1,5 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -18,7 +18,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench wheel clean \
+.PHONY: help demo test lint bench conformance wheel clean \
         machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -26,6 +26,7 @@ help: ## what can be made
 	@echo "make test    sets everything up and runs every check"
 	@echo "make lint    format, clippy, rustdoc, ruff, mypy, stubtest, layers"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
+	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -114,5 +115,20 @@ format: $(VENV)/.dev ## changes files
 bench: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/python tools/bench_report.py
 
+# The other masters live apart: what they need shall not be what drivebus is tested with.
+# One of them needs Python 3.12, so the newest that runs is taken.
+PEERS := .venv-conformance
+CONFORMANCE_PYTHON ?= $(shell for each in python3.14 python3.13 python3.12; do \
+    $$each -c '' 2>/dev/null && echo $$each && break; done || echo $(PYTHON))
+
+$(PEERS)/.installed: pyproject.toml dist/.wheel
+	$(CONFORMANCE_PYTHON) -m venv --clear $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(PEERS)/bin/python -m pip install --quiet --group conformance dist/drivebus-*.whl
+	@touch $@
+
+conformance: $(PEERS)/.installed ## writes docs/conformance.md
+	$(PEERS)/bin/python -m tests.conformance.run --out docs/conformance.md
+
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -20,14 +20,14 @@ class Result:
     recovery: Recovery
 
 
-def play(row: Row, library: str, *, mute: bool = False) -> Result:
+def play(row: Row, library: str, *, mute: bool = False, timeout: float = 0.2) -> Result:
     """Runs one row. `mute`: the unit does not answer 08H."""
     with (
         tempfile.TemporaryDirectory() as folder,
         Slave(Path(folder), row.behaviour, mute=mute, echo=row.echo) as slave,
         Child(library) as child,
     ):
-        opened = child.open(slave.port, retries=row.retries)
+        opened = child.open(slave.port, timeout=timeout, retries=row.retries)
         if not opened.returned:
             return Result(Verdict(ERROR, f"open: {opened.error}", opened.seconds), Recovery(None))
         if row.fresh:

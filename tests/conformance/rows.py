@@ -7,6 +7,7 @@ there.
 from __future__ import annotations
 
 import statistics
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ OTHER_VALUE = 0xBAD
 APART = 0.020  # seconds between a foreign frame and the reply
 LUMP, LUMP_EVERY = 4, 0.016  # bytes and seconds, as USB adapters deliver
 THREADS, READS = 3, 60
+ABSENT = 0.5  # seconds without the port
 
 Play = Callable[[Slave, Child], Verdict]
 
@@ -121,8 +123,10 @@ def in_threads(_: Slave, child: Child) -> Verdict:
 
 def vanished(slave: Slave, child: Child) -> Verdict:
     slave.vanish()
+    back = threading.Timer(ABSENT, slave.appear)
+    back.start()
     verdict = of_read(child.read(200), 200, 1)
-    slave.appear()
+    back.join()
     return verdict
 
 
@@ -217,7 +221,7 @@ ROWS: Sequence[Row] = (
     Row("threads", f"{THREADS} threads, each {READS} reads, on one port", in_threads),
     Row(
         "port vanishes",
-        "port closed; a read; port opened again under another name behind a link",
+        "a read while the port is away for 0.5 s; it returns under another name behind its link",
         vanished,
         must=("PortError",),
     ),

@@ -9,16 +9,31 @@ import pytest
 if os.name == "nt":
     pytest.skip("no pty", allow_module_level=True)
 
+from . import wire
+from .faults import ALL, spoilt
 from .play import play
 from .rows import ROWS, Row
 
+# Longer than for the published table: on a busy machine a right answer shall not come too late.
+TIMEOUT = 0.5
+
 SILENT = pytest.mark.parametrize("silent_on_08", [False, True], ids=["08H", "no 08H"])
+
+
+def test_the_judge_knows_the_check_value_of_crc_16_modbus() -> None:
+    assert wire.crc(b"123456789") == bytes.fromhex("37 4B")
 
 
 @SILENT
 @pytest.mark.parametrize("row", ROWS, ids=[row.key for row in ROWS])
 def test_the_truth_is_told_in_every_row(row: Row, silent_on_08: bool) -> None:
-    result = play(row, "drivebus", mute=silent_on_08)
+    result = play(row, "drivebus", mute=silent_on_08, timeout=TIMEOUT)
     assert result.verdict.keeps(row.must), result
     assert result.recovery.wrong == 0, result
     assert result.recovery.seconds is not None, result
+
+
+def test_no_fault_of_the_simulator_makes_an_answer_wrong() -> None:
+    tally = spoilt("drivebus", ALL, reads=60)
+    assert tally.hits > 0, tally
+    assert tally.ends["wrong"] == tally.ends["hung"] == 0, tally

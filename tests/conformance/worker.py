@@ -78,7 +78,7 @@ class Worker:
                 try:
                     ends["right" if list(self.master.read(address, 1)) == [address] else "wrong"] += 1
                 except Exception as error:
-                    ends[f"error: {type(error).__name__}"] += 1
+                    ends[f"error: {name_of(error)}"] += 1
 
         running = [threading.Thread(target=one, args=(1000 * (number + 1),)) for number in range(threads)]
         for thread in running:
@@ -88,14 +88,21 @@ class Worker:
         return dict(ends)
 
 
+def name_of(error: Exception) -> str:
+    """What the error is called; with its module where it is only called `error`."""
+    if isinstance(error, libraries.ErrorReturned):
+        return str(error)
+    kind = type(error)
+    return f"{kind.__module__}.{kind.__name__}" if kind.__name__.islower() else kind.__name__
+
+
 def answer(call: Callable[[], object]) -> dict[str, object]:
     """What became of one call, and how long it took."""
     began = time.perf_counter()
     try:
         told: dict[str, object] = {"result": call()}
     except Exception as error:
-        name = str(error) if isinstance(error, libraries.ErrorReturned) else type(error).__name__
-        told = {"error": name, "text": str(error)}
+        told = {"error": name_of(error), "text": str(error)}
     return {**told, "seconds": time.perf_counter() - began}
 
 
