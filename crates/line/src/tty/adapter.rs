@@ -47,7 +47,7 @@ impl Adapter {
             Some(known) => self.whereabouts(known)?,
             None => self.name.clone(),
         };
-        let tty = Tty::open(&name, &self.format, &self.options)?;
+        let tty = Tty::open(&name, &self.format, &self.options).map_err(|error| self.still_missing(error))?;
         // Asked of what is open, whose number is given to nothing else meanwhile; the name may lead elsewhere by now.
         let found = tty.device_number().and_then(|number| self.places.identify(number));
         self.known = match (self.known.take(), found) {
@@ -80,6 +80,19 @@ impl Adapter {
                 let there_now = given.and_then(|number| self.places.identify(number));
                 Err(self.missing(known, there_now.as_ref()))
             }
+        }
+    }
+
+    /// `error` of an opening, with what is known of the adapter.
+    fn still_missing(&self, error: PortError) -> PortError {
+        match (&self.known, error.kind) {
+            (Some(known), PortErrorKind::NotFound) => self.missing(known, None),
+            // It was opened before, so the user is not to blame.
+            (Some(_), PortErrorKind::Denied) => {
+                let message = format!("{}; right after plugging in, the rights may not be set yet", error.message);
+                PortError { message, ..error }
+            }
+            _ => error,
         }
     }
 

@@ -111,9 +111,10 @@ pub(super) fn send(port: &mut SerialPort, bytes: &[u8], stall: Duration) -> io::
             }
             Err(Errno::INTR) => {}
             Err(Errno::AGAIN) => match wait_for(port.as_fd(), PollFlags::OUT, give_up)? {
-                Some(ready) if ready.contains(PollFlags::OUT) => {}
-                Some(_) => return Err(Errno::IO.into()),
-                None => {
+                Some(ready) if !ready.contains(PollFlags::OUT) => return Err(Errno::IO.into()),
+                // A driver that says it has room and takes nothing must not keep us.
+                Some(_) if monotonic() < give_up => {}
+                _ => {
                     // Closing would wait for the rest to leave, half a minute on Linux.
                     let _ = tcflush(&*port, QueueSelector::OFlush);
                     return Err(io::Error::new(io::ErrorKind::TimedOut, "it takes no more bytes"));
@@ -137,7 +138,8 @@ pub(super) fn receive(port: &mut SerialPort, buffer: &mut [u8], until: Instant) 
             Ok(0) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "hung up")),
             Ok(count) => return Ok(count),
             // Someone else read the bytes. Only a living port is asked again, or this would spin.
-            Err(Errno::AGAIN) if ready == PollFlags::IN => {}
+            Err(Errno::AGAIN) if ready == PollFlags::IN && monotonic() < until => {}
+            Err(Errno::AGAIN) if ready == PollFlags::IN => return Ok(0),
             Err(Errno::AGAIN) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "hung up")),
             Err(Errno::INTR) => {}
             Err(error) => return Err(error.into()),

@@ -2,7 +2,7 @@
 //! go, with folders that tell of them.
 //!
 //! Nothing here judges by how long something took: a deadline is only held not to end early, on the line's own clock.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 #[cfg(target_os = "linux")]
 mod adapters;
