@@ -2,7 +2,7 @@
 //!
 //! And not too often: who polls a port that is unplugged would otherwise do nothing but try to open it.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -25,26 +25,40 @@ pub(crate) struct LineOpener {
     /// An opening that is under way; who asks next waits for the same.
     coming: Option<Receiver<Opened>>,
     backoff: Backoff,
-    /// Whether the latest line had a simulation's clock: nothing waits in real time for such a line.
-    was_virtual: bool,
+    /// How long a call waits while a line that was lost is being opened.
+    patience: Duration,
+    before: Option<Before>,
+}
+
+/// What is known of the line that was opened last.
+struct Before {
+    name: String,
+    /// Whether it had a simulation's clock: nothing waits in real time for such a line.
+    is_virtual: bool,
 }
 
 impl LineOpener {
     pub(crate) fn new(opener: Opener) -> Self {
-        Self { opener: Arc::new(Mutex::new(opener)), coming: None, backoff: Backoff::default(), was_virtual: false }
+        let (opener, backoff) = (Arc::new(Mutex::new(opener)), Backoff::default());
+        Self { opener, coming: None, backoff, patience: Duration::from_secs(1), before: None }
     }
 
     /// Opens the line, unless `give_up`, asked every 50 ms, says so first. The opening then goes on, and the next call
-    /// gets what becomes of it.
+    /// gets the line that comes of it.
     ///
-    /// It is tried once, as soon as the last try is long enough ago: at most 250 ms from now.
+    /// It is tried once, as soon as the last try is long enough ago: at most 250 ms from now. What becomes of it is
+    /// waited for, at first for as long as it takes, of a lost line for a second: a connection may take much longer.
     pub(crate) fn open(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<Box<dyn Line>, Failure> {
-        let coming = if let Some(coming) = self.coming.take() {
-            coming
-        } else {
-            self.wait(give_up)?;
-            self.start().map_err(|error| failed(&error.to_string()))?
+        let coming = match self.coming.take().map(|coming| (coming.try_recv(), coming)) {
+            Some((Ok(Ok(line)), _)) => return Ok(self.opened(line)),
+            Some((Err(TryRecvError::Empty), coming)) => coming,
+            // One that failed meanwhile says nothing about now.
+            None | Some(_) => {
+                self.wait(give_up)?;
+                self.start().map_err(|error| failed(&error.to_string()))?
+            }
         };
+        let give_in = monotonic() + self.patience;
         let opened = loop {
             match coming.recv_timeout(LOOK_UP) {
                 Ok(opened) => break opened.map_err(Failure::Port),
@@ -55,12 +69,21 @@ impl LineOpener {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
+            if let Some(Before { name, .. }) = &self.before
+                && monotonic() >= give_in
+            {
+                self.coming = Some(coming);
+                let message = "it was lost and is still being opened; the next call looks again";
+                return Err(Failure::Port(PortError::new(PortErrorKind::NotFound, name, message)));
+            }
         };
         self.backoff.tried(monotonic());
-        if let Ok(line) = &opened {
-            self.was_virtual = line.is_virtual();
-        }
-        opened
+        opened.map(|line| self.opened(line))
+    }
+
+    fn opened(&mut self, line: Box<dyn Line>) -> Box<dyn Line> {
+        self.before = Some(Before { name: line.name(), is_virtual: line.is_virtual() });
+        line
     }
 
     /// A unit has answered over the line that was opened last: when it is lost, that is a new loss.
@@ -70,7 +93,7 @@ impl LineOpener {
 
     /// Waits until it may be tried again.
     fn wait(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
-        if self.was_virtual {
+        if self.before.as_ref().is_some_and(|before| before.is_virtual) {
             return Ok(());
         }
         let due = self.backoff.due(monotonic());
@@ -209,7 +232,7 @@ mod tests {
     #[test]
     fn a_line_of_a_simulation_is_opened_without_a_pause() {
         let (mut opener, tries) = waiting();
-        opener.was_virtual = true;
+        opener.before = Some(Before { name: "simulation".to_owned(), is_virtual: true });
         let mut asked = 0;
         let mut give_up = || {
             asked += 1;
@@ -219,5 +242,27 @@ mod tests {
             assert!(matches!(opener.open(&mut give_up), Err(Failure::Port(_))));
             assert_eq!(*tries.lock().unwrap(), count);
         }
+    }
+
+    #[test]
+    fn an_opening_that_takes_long_keeps_only_the_first_call() {
+        let (let_go, wait) = channel::<()>();
+        let mut opener = LineOpener::new(Box::new(move || {
+            wait.recv().unwrap();
+            Err(PortError::new(PortErrorKind::NotFound, "tcp://gateway:502", "nobody answers"))
+        }));
+        let message = |result: Result<_, Failure>| result.map(drop).unwrap_err().to_string();
+        let before = Before { name: "tcp://gateway:502".to_owned(), is_virtual: false };
+        opener.patience = Duration::ZERO;
+        opener.before = Some(before);
+        for _ in 0..2 {
+            let said = message(opener.open(&mut || false));
+            assert!(said.starts_with("tcp://gateway:502: it was lost and is still being opened"), "{said}");
+        }
+        // The one that is under way, and another if that has failed by now.
+        let_go.send(()).unwrap();
+        let_go.send(()).unwrap();
+        opener.before = None;
+        assert_eq!(message(opener.open(&mut || false)), "tcp://gateway:502: nobody answers");
     }
 }
