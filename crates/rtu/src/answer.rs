@@ -139,7 +139,10 @@ impl<'a> Answer<'a> {
         match *pdu {
             [function, code] if function & EXCEPTION_BIT != 0 => Ok(Self::exception(function, ExceptionCode(code))),
             [READ_HOLDING, bytes, ref data @ ..] => match Words::from_wire(data) {
-                Some(words) if usize::from(bytes) == data.len() && !words.is_empty() => Ok(Self::Read { words }),
+                // No frame is long enough for 126 words, but a byte count is.
+                Some(words) if usize::from(bytes) == data.len() && (1..=MAX_READ.into()).contains(&words.len()) => {
+                    Ok(Self::Read { words })
+                }
                 _ => Err(AnswerError::Length { len: pdu.len() }),
             },
             [WRITE_SINGLE, a1, a0, v1, v0] => {

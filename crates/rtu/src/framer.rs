@@ -289,7 +289,8 @@ impl Framer {
     /// means: wait.
     fn lengths(&self, here: &[u8], expected: bool, fresh: bool) -> [Option<usize>; 3] {
         let [first, second] = if expected { Self::answer_lengths(here) } else { self.known_lengths(here) };
-        let more = Some(here.len() + 1).filter(|&more| more <= MAX_ADU);
+        // The longest frame is whole only when nothing follows it.
+        let more = Some(here.len() + 1).filter(|_| here.len() <= MAX_ADU);
         let asked = match *here {
             [_, function, ..] if expected && function & EXCEPTION_BIT == 0 => self.answer_len().or(more),
             // Only silence can tell where an unknown function ends, and a master that did not ask for it does not

@@ -155,6 +155,19 @@ fn silence_ends_what_no_length_can() {
 }
 
 #[test]
+fn the_longest_frame_is_not_cut_into_what_it_carries() {
+    // An echo stands in it as it would on the line; only silence tells that it is not one.
+    let inner = Adu::request(UnitAddress::MIN.into(), &Request::echo(0x12AB));
+    let pdu = [&[0x41][..], inner.as_bytes(), &[0; 244]].concat();
+    let adu = Adu::request(UnitAddress::MIN.into(), &Request::custom(&pdu, AnswerLength::BySilence).unwrap());
+    assert_eq!(adu.as_bytes().len(), MAX_ADU);
+    let mut framer = Framer::new(SILENCE);
+    framer.receive(at(0), adu.as_bytes());
+    assert_eq!(framer.poll(at(1_749)), None);
+    assert_eq!(framer.poll(at(1_750)).unwrap().unwrap().as_bytes(), adu.as_bytes());
+}
+
+#[test]
 fn a_frame_broken_off_does_not_swallow_the_next() {
     let request = Adu::request(UnitAddress::MIN.into(), &Request::read(0x2100, 1).unwrap());
     let mut framer = Framer::new(SILENCE);

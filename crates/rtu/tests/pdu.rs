@@ -106,3 +106,13 @@ fn a_refusal_of_another_function_is_no_answer() {
     assert_eq!(expected.judge(&[0x03, 4, 0, 1, 0, 2]), Err(AnswerError::Count { asked: 1, came: 2 }));
     assert_eq!(expected.judge(&[0x03, 2, 0]), Err(AnswerError::Length { len: 3 }));
 }
+
+#[test]
+fn an_answer_longer_than_a_frame_is_none() {
+    let longest = [&[0x03, 250][..], &[0; 250]].concat();
+    assert!(matches!(Answer::parse(&longest), Ok(Answer::Read { words, .. }) if words.len() == 125));
+    for bytes in [252, 254] {
+        let pdu = [&[0x03, bytes][..], &vec![0; usize::from(bytes)]].concat();
+        assert_eq!(Answer::parse(&pdu), Err(AnswerError::Length { len: pdu.len() }));
+    }
+}
