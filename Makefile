@@ -18,7 +18,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus wheel clean \
         machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -27,6 +27,7 @@ help: ## what can be made
 	@echo "make lint    format, clippy, rustdoc, ruff, mypy, stubtest, layers"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
+	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -129,6 +130,32 @@ $(PEERS)/.installed: pyproject.toml dist/.wheel
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run --out docs/conformance.md
+
+# libFuzzer needs no nightly compiler: without a sanitizer its counters are plain code generation options. The memory
+# limit is the oracle of "bounded". What is found is kept out of the work tree until `make fuzz-corpus` chooses from it.
+CARGO_FUZZ := .tools/cargo-fuzz/bin/cargo-fuzz
+FUZZ       := $(CARGO_FUZZ) fuzz run --features libfuzzer --sanitizer none
+FUZZ_FOUND := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)/fuzz
+TARGET     ?= $(basename $(notdir $(wildcard fuzz/targets/*.rs)))
+TIME       ?= 60
+
+$(CARGO_FUZZ):
+	@sh tools/check_machine.sh $(PYTHON) rust c++
+	$(CARGO) install --quiet --locked --version 0.13.2 --root .tools/cargo-fuzz cargo-fuzz
+
+fuzz: $(CARGO_FUZZ) ## TIME in seconds for each TARGET
+	@set -e; for target in $(TARGET); do \
+	    mkdir -p $(FUZZ_FOUND)/$$target; \
+	    echo "make fuzz: $$target, $(TIME) s"; \
+	    $(FUZZ) $$target $(FUZZ_FOUND)/$$target fuzz/corpus/$$target -- \
+	        -max_total_time=$(TIME) -max_len=2048 -rss_limit_mb=512 -timeout=10 -print_final_stats=1; \
+	done
+
+fuzz-corpus: $(CARGO_FUZZ) ## adds what reaches code that nothing in fuzz/corpus reaches
+	@set -e; for target in $(TARGET); do \
+	    mkdir -p $(FUZZ_FOUND)/$$target; \
+	    $(FUZZ) $$target fuzz/corpus/$$target $(FUZZ_FOUND)/$$target -- -merge=1 -use_counters=0; \
+	done
 
 clean: ## removes what was built and set up here
 	rm -rf $(VENV) $(PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

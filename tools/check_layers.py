@@ -199,8 +199,9 @@ def copy(root: Path, to: Path) -> None:
     to.mkdir(parents=True)
     for name in ("Cargo.toml", "Cargo.lock"):
         shutil.copy(root / name, to / name)
-    for name in ("crates", "python", "tests/rust", "benches/rust"):
-        shutil.copytree(root / name, to / name, ignore=shutil.ignore_patterns("__pycache__", "target", "*.so"))
+    for name in ("crates", "python", "tests/rust", "benches/rust", "fuzz"):
+        ignored = shutil.ignore_patterns("__pycache__", "target", "*.so", "corpus")
+        shutil.copytree(root / name, to / name, ignore=ignored)
 
 
 def self_test(root: Path) -> int:

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Names what this machine lacks before anything is built, and how to get it. Prints nothing when all is there.
 #
-# usage: check_machine.sh PYTHON [rust]
+# usage: check_machine.sh PYTHON [rust [c++]]
 set -u
 python=$1
 missing=0
@@ -31,5 +31,10 @@ if [ "${2:-}" = rust ]; then
     done
     command -v cc >/dev/null 2>&1 ||
         lacks "a C compiler (Rust links with it)" "apt-get install build-essential" "xcode-select --install"
+fi
+
+if [ "${3:-}" = c++ ]; then
+    command -v c++ >/dev/null 2>&1 ||
+        lacks "a C++ compiler (libFuzzer is built with it)" "apt-get install build-essential" "xcode-select --install"
 fi
 exit $missing

@@ -1,0 +1,239 @@
+"""Writes the corpus's first files: frames of the manuals, and cases made by hand, each named by its kind.
+
+`.venv/bin/python fuzz/seeds.py`. What libFuzzer found stands beside them, under the name that it gave. The language of
+the streams is described in `src/stream.rs`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tomli
+
+HERE = Path(__file__).resolve().parent
+VECTORS = HERE.parent / "tests/vectors"
+PROFILE = HERE / "src/profile"
+
+# Records of a stream: the low half of their first byte. The high half is the time before: 0 none, 8 the silence, 12
+# 16 ms, 14 300 ms.
+ANYTHING, SEALED, TWO_WORDS, WORDS, MANY, EXCEPTION, RUN, NAMELESS = range(8)
+ANSWER, OWN, DAMAGED, ODD, REFUSAL, ONE, LUMPS = 8, 10, 11, 12, 13, 14, 15
+SILENT, LATER, LATE = 8 << 4, 12 << 4, 14 << 4
+
+
+def crc(data: bytes) -> bytes:
+    """CRC-16/MODBUS, bit by bit, as it travels."""
+    register = 0xFFFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = register >> 1 ^ (0xA001 if register & 1 else 0)
+    return register.to_bytes(2, "little")
+
+
+def sealed(body: bytes) -> bytes:
+    """*body* with its CRC."""
+    return body + crc(body)
+
+
+def anything(data: bytes, gap: int = 0) -> bytes:
+    """A record of bytes as they are."""
+    return bytes([ANYTHING | gap, len(data)]) + data
+
+
+def exchanges() -> list[tuple[str, bytes, bytes | None]]:
+    """Every printed exchange: a name, the request and the answer, whichever there are."""
+    found = []
+    for path in sorted(VECTORS.glob("*.toml")):
+        for number, row in enumerate(tomli.loads(path.read_text("utf-8")).get("exchange", [])):
+            sides = [row.get(side, {}) for side in ("request", "answer")]
+            request, answer = (bytes.fromhex(side.get("wire") or side.get("printed") or "") for side in sides)
+            found.append((f"{path.stem}-{number:02}", request or answer, answer if request else None))
+    return found
+
+
+def streams() -> dict[str, bytes]:
+    """Streams that a listener, a framer and a unit hear alike."""
+    read = sealed(bytes([1, 3, 0x21, 3, 0, 1]))
+    answer = sealed(bytes([1, 3, 2, 1, 0xA0]))
+    inner = sealed(bytes([1, 6, 0x20, 0, 0, 1]))
+    seeds = {
+        "request-and-answer": anything(read) + anything(answer, SILENT),
+        "answer-in-lumps": bytes([LUMPS, LATER | 4]) + anything(answer),
+        "bytes-one-by-one": bytes([LUMPS, 5 << 4 | 1]) + anything(read) + anything(answer, SILENT),
+        "noise-before-and-after": bytes([RUN, 1, 9]) + anything(answer) + bytes([RUN, 0, 9]),
+        "cut-short-then-whole": anything(read[:5]) + anything(read, LATER),
+        "flipped-bit-then-whole": anything(bytes([1, 3, 2, 1, 0xA1]) + answer[5:]) + anything(answer, SILENT),
+        "broadcast": bytes([TWO_WORDS, 0, 1, 0x20, 0, 0, 5]),
+        "echo": bytes([TWO_WORDS, 1, 2, 0, 0, 0x12, 0xAB]),
+        "other-diagnostic": bytes([TWO_WORDS, 1, 2, 0, 1, 0xFF, 0]),
+        "longest-read": bytes([WORDS, 1, 125, 0, 0]) + bytes([WORDS | SILENT, 2, 125, 1, 3]),
+        "longest-write": bytes([MANY, 1, 123, 0x20, 0]) + bytes([TWO_WORDS | SILENT, 1, 3, 0x20, 0, 0, 123]),
+        "exceptions": b"".join(bytes([EXCEPTION | SILENT, unit, 3, unit]) for unit in range(4)),
+        "nameless-by-silence": bytes([NAMELESS, 1, 0, 7, 9]) + bytes([NAMELESS | SILENT, 1, 1, 7, 9]),
+        "longest-nameless": bytes([NAMELESS, 1, 0, 7, 252]) + anything(answer, SILENT),
+        "frame-inside-the-longest": bytes([SEALED, 254, 1, 0x41]) + inner + bytes(244),
+        "frame-inside-a-frame": bytes([SEALED, len(inner) + 6, 1, 3, 12, 0]) + inner + b"\0\0",
+        "reserved-address": bytes([SEALED, 4, 250, 3, 1, 1]) + anything(read, SILENT),
+        "odd-byte-count": bytes([SEALED, 4, 1, 3, 1, 7]),
+        "no-registers": bytes([TWO_WORDS, 1, 0, 0, 0, 0, 0]) + bytes([WORDS | SILENT, 1, 0, 0, 0]),
+        "missing-bias": bytes([RUN, 0, 255]) + bytes([RUN, 1, 255]) + anything(read, SILENT),
+        "longer-than-is-held": bytes([RUN, 2, 255, RUN, 3, 255]) + anything(read) + bytes([RUN, 0, 99]),
+        "two-in-one-burst": anything(read + answer) + anything(answer + read, SILENT),
+    }
+    both = (anything(request) + (anything(answer, SILENT) if answer else b"") for _, request, answer in exchanges())
+    return seeds | {f"printed-{name[0]}": stream for name, stream in zip(exchanges(), both, strict=True)}
+
+
+def frames() -> dict[str, bytes]:
+    """For `frame`: where to cut, then bytes; a request before the cut is judged against what stands behind it."""
+    seeds = {}
+    for name, request, answer in exchanges():
+        pdu = request[1:-2]
+        seeds[f"printed-{name}"] = len(request).to_bytes(2, "big") + request
+        if answer:
+            seeds[f"pair-{name}"] = len(pdu).to_bytes(2, "big") + pdu + answer[1:-2]
+    longest = bytes([3, 250]) + bytes(250)
+    return seeds | {
+        "empty": b"",
+        "longest-answer": b"\0\0" + longest,
+        "longer-than-any-answer": b"\0\0" + bytes([3, 254]) + bytes(254),
+        "longest-write": b"\0\0" + bytes([16, 0, 0, 0, 123, 246]) + bytes(246),
+        "longest-frame": b"\0\0" + sealed(bytes([1]) + longest + bytes(1)),
+        "too-long-a-frame": b"\0\0" + sealed(bytes([1]) + longest + bytes(4)),
+        "last-register": b"\0\5" + bytes([3, 0xFF, 0xFF, 0, 1]) + bytes([3, 2, 0, 0]),
+        "beyond-the-last-register": b"\0\5" + bytes([3, 0xFF, 0xFF, 0, 2]) + bytes([3, 4, 0, 0, 0, 0]),
+    }
+
+
+def masters() -> dict[str, bytes]:
+    """For `master`: the line, then what is asked (kind and time-out, two words) and what happens meanwhile."""
+    # 13: 49 ms of patience. Nothing comes (0) before the request goes out and while it does; then records, with a byte
+    # before each.
+    read, write, echo, many = (bytes([6, kind | 13 << 4, 0, 5, 0, 2]) for kind in (1, 2, 3, 5))
+    go = b"\0\0"
+
+    def then(*records: bytes) -> bytes:
+        return b"".join(b"\0" + record for record in records)
+
+    answer, refusal = bytes([ANSWER | SILENT, 0, 0x13, 0x88]), bytes([REFUSAL | SILENT, 0, 2])
+    late, old = bytes([ANSWER | LATE, 0, 1, 1]), bytes([ANSWER | SILENT, 1, 1, 1])
+    asks = {"read": read, "write": write, "echo": echo, "write-many": many}
+    seeds = {f"{name}-answered": b"\0" + ask + go + then(answer) for name, ask in asks.items()}
+    seeds |= {f"{name}-refused": b"\0" + ask + go + then(refusal) for name, ask in asks.items()}
+    adapter = bytes([OWN, 0])
+    nameless = bytes([6, 6 | 13 << 4, 0, 5, 0, 2])
+    urgent = bytes([5]) + read[1:]
+    return seeds | {
+        "late-then-echo": b"\0" + read + go + then(late) + read + echo + go + then(answer) + read + go + then(answer),
+        "late-then-wrong-echo": b"\0" + read + go + then(late) + echo + go + then(late) + echo + go + then(old, answer),
+        "echoing-adapter": b"\1" + write + go + then(adapter, answer) + read + go + then(adapter, answer),
+        "only-the-adapter": b"\1" + write + go + then(adapter),
+        "gapless": b"\2" + read + go + then(answer) + write + go + then(answer),
+        "in-lumps": b"\0" + read + go + then(bytes([LUMPS, LATER | 4]), answer),
+        "damaged": b"\0" + read + go + then(bytes([DAMAGED | SILENT, 0, 1, 1, 3, 4])) + echo + go + then(answer),
+        "odd": b"\0" + read + go + then(bytes([ODD | SILENT, 0, 1, 1, 1, 0]), bytes([ODD | SILENT, 0, 1, 1, 1, 1])),
+        "foreign-then-right": b"\0" + read + go + then(bytes([WORDS | SILENT, 2, 2, 0, 0]), answer),
+        "noise-while-sending": b"\0" + read + bytes([0, 7, RUN, 1, 4]) + then(answer),
+        "given-up": b"\0" + read + go + b"\xff" + read + b"\xff" + echo + go + then(answer),
+        "stop-in-doubt": b"\0" + read + go + then(late) + urgent + go + then(answer) + read,
+        "broadcast": b"\0" + bytes([4, 2, 0x20, 0, 0, 5]) + go + bytes([4, 0, 0, 0, 0, 1]),
+        "nameless": b"\0" + nameless + go + then(bytes([ANSWER | SILENT, 0, 0, 0])),
+        "strays": b"\0" + bytes([2, WORDS, 1, 1, 0, 0]) + bytes([2, RUN | SILENT, 1, 9]) + read + go + then(answer),
+        "busy-line": b"\0" + bytes([2, LUMPS, 6 << 4 | 1]) + read + bytes([7, RUN, 1, 200]) + read + go + then(answer),
+        "released-and-reopened": b"\0" + read + go + then(late) + b"\0\1" + read + go + then(answer),
+    }
+
+
+def buses() -> dict[str, bytes]:
+    """For `bus`: how many calls (and whether the adapter may echo), the calls, what comes after each transmission."""
+    read, write, echo, custom = (bytes([kind, 0, 0x10, 5, 0, 1]) for kind in (0, 3, 5, 6))
+    answer, late, own = bytes([ANSWER | SILENT, 0, 0, 7]), bytes([ANSWER | LATE, 0, 0, 7]), bytes([OWN, 0])
+    one, two, none, lost = b"\1", b"\2", b"\0", b"\xff"
+    return {
+        "read": b"\0" + read + (one + answer) * 4,
+        "write": b"\0" + write + (one + answer) * 4,
+        "calls": b"\3" + read + write + echo + custom + (one + answer) * 12,
+        "late": b"\1" + read + read + one + late + (one + answer) * 8,
+        "late-and-repeated": b"\1" + read + read + two + late + late + (two + late + answer) * 8,
+        "mute": b"\1" + read + write + none * 12 + (one + answer) * 6,
+        "echoing-adapter": b"\x0a" + read + write + read + (two + own + answer) * 9,
+        "only-the-adapter": b"\x0a" + read + write + read + (one + own) * 9,
+        "unplugged": b"\1" + read + read + lost + answer + (one + answer) * 6,
+        "broadcast": b"\1" + bytes([0xF3]) + write[1:] + read + none + (one + answer) * 6,
+        "noise": b"\1" + read + write + (two + bytes([RUN | SILENT, 1, 30]) + answer) * 8,
+        "damaged": b"\1" + read + write + (one + bytes([DAMAGED | SILENT, 0, 0, 7, 3, 4])) * 4 + (one + answer) * 8,
+        "refused": b"\1" + read + write + (one + bytes([REFUSAL | SILENT, 0, 2])) * 8,
+        "in-lumps": b"\0" + read + (two + bytes([LUMPS, LATER | 4]) + answer) * 4,
+        "foreign-first": b"\0" + read + (two + bytes([WORDS | SILENT, 9, 2, 0, 0]) + answer) * 4,
+    }
+
+
+def profiles() -> dict[str, bytes]:
+    """For `profile`: each file of the small profile by itself, and cases that are easily got wrong."""
+    names = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"]
+    texts = {number: (PROFILE / name).read_text("utf-8") for number, name in enumerate(names)}
+
+    def instead(number: int, old: str, new: str) -> bytes:
+        if old not in texts[number]:
+            raise SystemExit(f"seeds: {names[number]} does not hold {old!r}")
+        return f"=== {number}\n{texts[number].replace(old, new, 1)}".encode()
+
+    seeds = {f"all-of-{name}": f"=== {number}\n{texts[number]}".encode() for number, name in enumerate(names)}
+    seeds |= {f"empty-{name}": f"=== {number}\n".encode() for number, name in enumerate(names)}
+    head = texts[1].splitlines()[0]
+    return seeds | {
+        "nothing-said": b"",
+        "not-utf-8": b"=== 3\n" + texts[3].encode() + b"\xff\xfe\n",
+        "byte-order-mark": b"=== 1\n\xef\xbb\xbf" + texts[1].encode(),
+        "carriage-returns": b"=== 2\n" + texts[2].replace("\n", "\r\n").encode(),
+        "open-quote": instead(1, '"a, b"', '"a, b'),
+        "nul": instead(1, "made up", "made\0up"),
+        "header-only": f"=== 1\n{head}\n".encode(),
+        "huge-number": instead(1, "630.00", "1e999999999999999999999"),
+        "tiny-number": instead(1, "630.00", "1e-999999999"),
+        "many-digits": instead(1, "630.00", "0" * 400 + "1." + "0" * 400),
+        "least-word": instead(1, "-20.0,120.0", "-3276.8,3276.7"),
+        "one-value": instead(1, "-20.0,120.0", "0x0A,0x0A"),
+        "no-bounds": instead(1, "10,yes,-20.0,120.0", ",no,,"),
+        "last-addresses": instead(1, "3004H", "7FFFH"),
+        "hex-default": instead(2, ",50.00,stop", ",0x1388,stop"),
+        "choice-twice": instead(2, "0=keypad;2=bus", "0=bus;2=BUS"),
+        "choice-out-of-range": instead(2, "0=keypad;2=bus", "0=keypad;65535=bus"),
+        "deep-toml": b"=== 0\nx = " + b"[" * 200 + b"\n",
+        "dotted-toml": b"=== 0\n" + b".".join([b"a"] * 200) + b" = 1\n",
+        "long-name": instead(0, 'registers = ["frequency"', f'registers = ["{"frequency" * 60}"'),
+        "bits-overlap": instead(0, "bits = [2, 1]", "bits = [15, 0]"),
+        "max-words": instead(0, "max_words = 4", "max_words = 125"),
+    }
+
+
+def main() -> None:
+    """The command."""
+    listened = streams()
+    framer = {name: bytes([0, 1, 2, 3]) + stream for name, stream in listened.items() if not name.startswith("printed")}
+    hunts = {"words": 1, "write": 2, "echo": 3, "nameless": 4, "nameless-of-7": 5 | 6 << 3}
+    answer, noise = anything(sealed(bytes([1, 3, 2, 1, 0xA0]))), bytes([RUN, 1, 9])
+    framer |= {f"hunt-{name}": bytes([hunt, 1, 2, 3]) + noise + answer + noise for name, hunt in hunts.items()}
+    framer |= {
+        f"lumps-of-{size}": bytes([6 | 31 << 3, 0, 0, 0, 1, 2]) + bytes([LATER | size]) * 90 for size in (1, 4, 9)
+    }
+    corpus = {
+        "bus": buses(),
+        "frame": frames(),
+        "framer": framer,
+        "listener": listened,
+        "master": masters(),
+        "profile": profiles(),
+        "slave": {name: b"\0" + stream for name, stream in listened.items()},
+    }
+    for target, seeds in corpus.items():
+        folder = HERE / "corpus" / target
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in seeds.items():
+            (folder / name).write_bytes(data)
+        print(f"{target}: {len(seeds)} seeds")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+//! Fuzz targets: each states an invariant in its first sentence and compares with an oracle.
+//!
+//! A target is a function of bytes. libFuzzer calls it (`make fuzz`), and so do ordinary tests, with every file of the
+//! corpus (`tests/replay.rs`). Here stands all but libFuzzer's main functions, which are in `targets/`.
+
+#![allow(clippy::missing_panics_doc, reason = "to panic is how a target says that its invariant does not hold")]
+
+mod bus;
+mod frame;
+mod framer;
+mod listener;
+mod master;
+mod oracle;
+mod profile;
+mod slave;
+mod stream;
+
+pub use bus::bus;
+pub use frame::frame;
+pub use framer::framer;
+pub use listener::listener;
+pub use master::master;
+pub use profile::profile;
+pub use slave::slave;
+
+/// A target: panics when its invariant does not hold.
+pub type Target = fn(&[u8]);
+
+/// Every target by the name of its corpus and of its program.
+pub const TARGETS: [(&str, Target); 7] = [
+    ("frame", frame),
+    ("framer", framer),
+    ("listener", listener),
+    ("slave", slave),
+    ("master", master),
+    ("profile", profile),
+    ("bus", bus),
+];

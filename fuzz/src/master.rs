@@ -1,0 +1,387 @@
+//! Invariant: whatever bytes come at whatever moments, the master tells an answer only if the bytes that came since it
+//! sent hold a valid one, ends every request within its time, and takes a unit out of quarantine only for the echo of
+//! the word that it was sent.
+//!
+//! The model beside it knows what was sent, what came since, who is in quarantine, and when each request must end.
+
+use std::time::Duration;
+
+use drivebus_rtu::{
+    Answer, AnswerError, AnswerLength, BeginError, Destination, Event, Instant, Master, Request, TURNAROUND, Tally,
+    UnitAddress,
+};
+
+use crate::oracle::{self, Asked, Length, Verdict};
+use crate::stream::{Arrival, GAPS, Input, Lumps, SILENCE};
+
+const UNITS: u8 = 3;
+
+/// See the file's first lines. The input: the line, then requests with what happens while each is under way.
+pub fn master(data: &[u8]) {
+    let mut input = Input::new(data);
+    let how = input.byte();
+    // Zero: frames are told apart by something else than silence.
+    let silence = if how & 2 == 0 { SILENCE } else { Duration::ZERO };
+    let mut run = Run {
+        master: Master::with_silence(silence),
+        silence,
+        strips_echo: how & 1 == 1,
+        now: Instant::ZERO,
+        quiet_from: Instant::ZERO,
+        open: [false; UNITS as usize + 1],
+        sent: Vec::new(),
+        fed: 0,
+        lumps: Lumps::default(),
+    };
+    run.master.strip_echo(run.strips_echo);
+    while !input.is_empty() {
+        run.act(&mut input);
+        run.check();
+    }
+}
+
+/// A request as the model knows it.
+struct Job {
+    destination: Destination,
+    asked: Asked,
+    frame: Vec<u8>,
+    timeout: Duration,
+}
+
+/// How far a request has come.
+struct Progress {
+    /// When it must have ended, as far as is known by now.
+    limit: Instant,
+    /// It went out.
+    transmitted: bool,
+    /// What came since.
+    heard: Vec<u8>,
+}
+
+struct Run {
+    master: Master,
+    silence: Duration,
+    strips_echo: bool,
+    now: Instant,
+    /// Since when nothing was on the line, as far as the master can know.
+    quiet_from: Instant,
+    /// Who is in quarantine; number 0 is nobody.
+    open: [bool; UNITS as usize + 1],
+    sent: Vec<Vec<u8>>,
+    fed: usize,
+    lumps: Lumps,
+}
+
+impl Run {
+    fn act(&mut self, input: &mut Input<'_>) {
+        let what = input.byte();
+        let number = 1 + (what >> 4) % UNITS;
+        let Ok(unit) = UnitAddress::new(number) else { return };
+        match what & 0x0F {
+            0 => {
+                self.master.release(unit);
+                self.open[usize::from(number)] = false;
+            }
+            1 => {
+                self.master.reopened(self.now);
+                self.quiet_from = self.quiet_from.max(self.now);
+            }
+            // Something comes although nothing was asked.
+            2 | 3 => {
+                for arrival in self.lumps.next(input, &self.sent) {
+                    self.now = self.now + arrival.gap;
+                    self.feed(&arrival.bytes, |_, event| assert!(event.is_none(), "{event:?} out of nothing"));
+                }
+            }
+            4 => self.request(Destination::Broadcast, false, input),
+            5 => self.request(unit.into(), true, input),
+            _ => self.request(unit.into(), false, input),
+        }
+    }
+
+    /// Gives `bytes` to the master as they fit, and looks after each part.
+    fn feed(&mut self, bytes: &[u8], mut look: impl FnMut(&mut Self, Option<Said>)) {
+        let mut rest = bytes;
+        loop {
+            let count = self.master.receive(self.now, rest);
+            assert!(count > 0 || rest.is_empty(), "no room after looking");
+            self.fed += count;
+            rest = &rest[count..];
+            if count > 0 {
+                self.quiet_from = self.quiet_from.max(self.now);
+            }
+            let said = self.master.poll(self.now).map(Said::of);
+            let ended = said.as_ref().is_some_and(|said| !matches!(said, Said::Transmit(_)));
+            look(self, said);
+            if rest.is_empty() || ended {
+                return;
+            }
+        }
+    }
+
+    fn request(&mut self, destination: Destination, in_doubt: bool, input: &mut Input<'_>) {
+        let kind = input.byte();
+        let timeout = Duration::from_micros(GAPS[usize::from(kind >> 4)]);
+        let (first, second) = (input.word(), input.word());
+        let words: Vec<u16> = (0..=second % 123).map(|n| n ^ first).collect();
+        let custom = [0x41, first.to_be_bytes()[1]];
+        let len = u8::try_from(1 + second % 253).unwrap_or(1);
+        let request = match kind & 7 {
+            0 => Request::read(first, 1 + second % 125),
+            1 => Request::read(first, 1 + second % 3),
+            2 => Ok(Request::write(first, second)),
+            3 | 4 => Ok(Request::echo(second)),
+            5 => Request::write_many(first, &words),
+            6 => Request::custom(&custom, AnswerLength::BySilence),
+            _ => Request::custom(&custom, AnswerLength::Bytes(len)),
+        };
+        let Ok(request) = request else { return };
+        let timeout = if destination == Destination::Broadcast { TURNAROUND } else { timeout };
+        let begun = if in_doubt {
+            self.master.begin_in_doubt(self.now, destination, &request, timeout)
+        } else {
+            self.master.begin(self.now, destination, &request, timeout)
+        };
+        let open = self.open[usize::from(destination.to_wire())];
+        let is_echo = matches!(request, Request::Echo { .. });
+        match (begun, destination) {
+            (Err(BeginError::BroadcastRead), Destination::Broadcast) => return assert!(!request.is_write()),
+            (Err(BeginError::Quarantine { unit }), Destination::Unit(asked)) => {
+                return assert!(open && !is_echo && !in_doubt && unit == asked);
+            }
+            (begun, _) => assert_eq!(begun, Ok(())),
+        }
+        assert!(!open || is_echo || in_doubt, "a unit in quarantine was asked {request:?}");
+        let length = match kind & 7 {
+            6 => Length::Any,
+            7 => Length::Given(len),
+            _ => Length::Named,
+        };
+        let asked = Asked { pdu: pdu_of(&request), length };
+        let frame = oracle::sealed(&[&[destination.to_wire()], &asked.pdu[..]].concat());
+        let job = Job { destination, asked, frame, timeout };
+        self.follow(&job, input);
+    }
+
+    /// Sees the request to its end: what comes before it goes out, while it does, and after it.
+    fn follow(&mut self, job: &Job, input: &mut Input<'_>) {
+        let mut progress =
+            Progress { limit: self.now + self.silence + job.timeout, transmitted: false, heard: Vec::new() };
+        let mut coming = match input.byte() {
+            7 => self.lumps.next(input, &self.sent),
+            0xFF => return self.give_up(job, &progress),
+            _ => Vec::new(),
+        };
+        let mut said = self.master.poll(self.now).map(Said::of);
+        loop {
+            if let Some(event) = said.take() {
+                if self.hear(job, &mut progress, event, input) {
+                    return;
+                }
+                said = self.master.poll(self.now).map(Said::of);
+                continue;
+            }
+            let Some(deadline) = self.master.deadline() else {
+                unreachable!("a request under way without a deadline");
+            };
+            assert!(self.now < deadline && deadline <= progress.limit, "{deadline:?}, {:?}", progress.limit);
+            if coming.is_empty() && !input.is_empty() && progress.transmitted {
+                if input.byte() == 0xFF {
+                    return self.give_up(job, &progress);
+                }
+                coming = self.lumps.next(input, &self.sent);
+            }
+            match coming.first().cloned() {
+                Some(Arrival { gap, bytes }) if self.now + gap < deadline => {
+                    coming.remove(0);
+                    self.now = self.now + gap;
+                    let transmitted = progress.transmitted;
+                    let before = self.fed;
+                    let mut events = Vec::new();
+                    self.feed(&bytes, |_, event| events.extend(event));
+                    if transmitted {
+                        progress.heard.extend_from_slice(&bytes[..self.fed - before]);
+                    }
+                    assert!(events.len() <= 1);
+                    said = events.pop();
+                }
+                next => {
+                    // What comes later comes so much sooner after this moment.
+                    if let (Some(_), Some(first)) = (next, coming.first_mut()) {
+                        first.gap = first.gap.saturating_sub(deadline.saturating_duration_since(self.now));
+                    }
+                    self.now = deadline;
+                    said = self.master.poll(self.now).map(Said::of);
+                }
+            }
+        }
+    }
+
+    fn give_up(&mut self, job: &Job, progress: &Progress) {
+        let was_sent = self.master.abort();
+        assert_eq!(was_sent, progress.transmitted);
+        self.leave_open(job, was_sent);
+    }
+
+    /// Judges what the master says; whether that ends the request.
+    fn hear(&mut self, job: &Job, progress: &mut Progress, said: Said, input: &mut Input<'_>) -> bool {
+        let Progress { limit, transmitted, heard } = progress;
+        if let Said::Transmit(frame) = said {
+            assert!(!*transmitted, "sent twice");
+            assert_eq!(frame, job.frame);
+            assert!(self.now >= self.quiet_from + self.silence, "the silence before a request was cut short");
+            self.sent.push(frame);
+            *transmitted = true;
+            assert_eq!(self.master.deadline(), None);
+            let end = self.now + Duration::from_micros(573) * u32::try_from(job.frame.len()).unwrap_or(0);
+            // What is whole before the request has left is no answer to it; what has only begun may become one.
+            if input.byte() & 7 == 7 {
+                for arrival in self.lumps.next(input, &self.sent) {
+                    self.feed(&arrival.bytes, |_, event| assert!(event.is_none(), "{event:?} while sending"));
+                    heard.extend_from_slice(&arrival.bytes);
+                }
+            }
+            self.master.sent(end);
+            self.quiet_from = self.quiet_from.max(end);
+            *limit = end + job.timeout;
+            return false;
+        }
+        assert_eq!(*transmitted, !matches!(said, Said::Busy));
+        let unit = match job.destination {
+            Destination::Unit(unit) => unit.get(),
+            Destination::Broadcast => {
+                assert!(matches!(said, Said::BroadcastDone | Said::Busy), "{said:?} to a broadcast");
+                assert!(self.now >= *limit);
+                return true;
+            }
+        };
+        let is_echo = job.asked.pdu[0] == 8;
+        let open = self.open[usize::from(unit)];
+        match said {
+            Said::Answer { pdu, exception } => {
+                let verdict = job.asked.judge(&pdu);
+                assert_eq!(verdict, if exception { Verdict::Refusal } else { Verdict::Right }, "{pdu:02X?}");
+                let wire = oracle::sealed(&[&[unit], &pdu[..]].concat());
+                // Where the adapter sends the request back, the first copy of it was the adapter's.
+                let copies = 1 + usize::from(self.strips_echo && wire == job.frame);
+                let came = heard.windows(wire.len()).filter(|part| *part == wire).count();
+                assert!(came >= copies, "{wire:02X?} told, {heard:02X?} came");
+                if is_echo {
+                    self.open[usize::from(unit)] = false;
+                }
+                if is_echo || !open {
+                    self.quiet_from = self.now;
+                }
+            }
+            Said::Wrong { frame, error } => {
+                let Some((address, pdu)) = oracle::frame(&frame) else {
+                    unreachable!("{frame:02X?} is no frame");
+                };
+                assert!(address == unit && pdu[0] & 0x7F == job.asked.pdu[0], "{frame:02X?} is foreign");
+                assert_eq!(job.asked.judge(pdu), Verdict::Wrong);
+                assert!(!(open && is_echo && matches!(error, AnswerError::Echo { .. })), "a late echo is no answer");
+                assert!(heard.windows(frame.len()).any(|part| part == frame));
+                if is_echo || !open {
+                    self.quiet_from = self.now;
+                }
+                self.open[usize::from(unit)] = true;
+            }
+            Said::Corrupt(bytes) => {
+                assert!(!bytes.is_empty() && heard.windows(bytes.len()).any(|part| part == bytes));
+                self.leave_open(job, true);
+            }
+            Said::NoAnswer(bytes) => {
+                assert!(self.now >= *limit && heard.ends_with(&bytes));
+                self.leave_open(job, true);
+            }
+            Said::Busy => assert!(self.now >= *limit),
+            Said::BroadcastDone | Said::Transmit(_) => unreachable!("{said:?} to a request for one unit"),
+        }
+        true
+    }
+
+    fn leave_open(&mut self, job: &Job, sent: bool) {
+        if let (Destination::Unit(unit), true) = (job.destination, sent) {
+            self.open[usize::from(unit.get())] = true;
+        }
+    }
+
+    /// What holds whenever nothing is under way.
+    fn check(&mut self) {
+        assert_eq!(self.master.poll(self.now).map(Said::of), None);
+        assert!(self.master.deadline().is_none_or(|deadline| deadline > self.now), "a deadline in the past for ever");
+        for number in 1..=UNITS {
+            let unit = UnitAddress::new(number).unwrap_or(UnitAddress::MIN);
+            assert_eq!(self.master.in_quarantine(unit), self.open[usize::from(number)], "unit {number}");
+        }
+        let Tally { late, foreign, noise, own_echo, .. } = self.master.take_tally();
+        let frames = usize::try_from(late + foreign + own_echo).unwrap_or(usize::MAX);
+        assert!(4 * frames + usize::try_from(noise).unwrap_or(usize::MAX) <= self.fed, "counted what never came");
+        // What is held may be counted later.
+        self.fed = self.fed.min(2 * 256);
+    }
+}
+
+/// An event, kept.
+#[derive(Debug, PartialEq)]
+enum Said {
+    Transmit(Vec<u8>),
+    Answer { pdu: Vec<u8>, exception: bool },
+    Wrong { frame: Vec<u8>, error: AnswerError },
+    Corrupt(Vec<u8>),
+    NoAnswer(Vec<u8>),
+    BroadcastDone,
+    Busy,
+}
+
+impl Said {
+    fn of(event: Event<'_>) -> Self {
+        match event {
+            Event::Transmit(frame) => Self::Transmit(frame.to_vec()),
+            Event::Answer(answer) => {
+                Self::Answer { pdu: pdu_told(&answer), exception: matches!(answer, Answer::Exception { .. }) }
+            }
+            Event::Wrong { error, frame } => Self::Wrong { frame: frame.to_vec(), error },
+            Event::Corrupt { bytes, .. } => Self::Corrupt(bytes.to_vec()),
+            Event::NoAnswer { bytes } => Self::NoAnswer(bytes.to_vec()),
+            Event::BroadcastDone => Self::BroadcastDone,
+            Event::Busy => Self::Busy,
+        }
+    }
+}
+
+fn four(function: u8, first: u16, second: u16) -> Vec<u8> {
+    [&[function][..], &first.to_be_bytes(), &second.to_be_bytes()].concat()
+}
+
+/// The PDU of a request, put together here.
+pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
+    match *request {
+        Request::ReadHolding { address, count, .. } => four(3, address, count),
+        Request::WriteSingle { address, value, .. } => four(6, address, value),
+        Request::Echo { data, .. } => four(8, 0, data),
+        Request::WriteMultiple { address, words, .. } => {
+            let count = u8::try_from(words.len()).unwrap_or(0);
+            let mut pdu = four(16, address, count.into());
+            pdu.push(2 * count);
+            pdu.extend(words.iter().flat_map(u16::to_be_bytes));
+            pdu
+        }
+        Request::Custom { pdu, .. } => pdu.to_vec(),
+    }
+}
+
+/// The PDU that an answer must have been told by, put together here.
+pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
+    match *answer {
+        Answer::Read { words, .. } => {
+            let count = u8::try_from(2 * words.len()).unwrap_or(0);
+            [3, count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
+        }
+        Answer::WriteSingle { address, value, .. } => four(6, address, value),
+        Answer::Echo { data, .. } => four(8, 0, data),
+        Answer::WriteMultiple { address, count, .. } => four(16, address, count),
+        Answer::Exception { function, code, .. } => vec![function | 0x80, code.0],
+        Answer::Custom { pdu, .. } => pdu.to_vec(),
+    }
+}
