@@ -20,7 +20,7 @@ const FILES: [(&str, &str); 4] = [
 /// Before the text of a file, at the beginning of a line; the digit after it says which file.
 const MARK: &[u8] = b"=== ";
 
-/// See the file's first lines. The input: files, each after a line `=== N`; the missing ones are [`FILES`]'.
+/// See the file's first lines. The input: files, each after a line `=== N`; the missing ones are the small profile's.
 pub fn profile(data: &[u8]) {
     thread_local! { static FOLDER: OnceCell<Folder> = const { OnceCell::new() } }
     FOLDER.with(|folder| {
