@@ -204,6 +204,9 @@ enum Kind {
 }
 
 impl Expected {
+    /// The echo of some word.
+    pub(crate) const ECHO: Self = Self(Kind::Echo { data: 0 });
+
     pub(crate) fn of(request: &Request<'_>) -> Self {
         Self(match *request {
             Request::ReadHolding { count, .. } => Kind::Read { count },
@@ -239,6 +242,25 @@ impl Expected {
     /// Whether the answer returns a word of the request's own choosing: proof that it is the answer to this request.
     pub(crate) const fn is_echo(self) -> bool {
         matches!(self.0, Kind::Echo { .. })
+    }
+
+    /// Whether words are read.
+    pub(crate) const fn is_read(self) -> bool {
+        matches!(self.0, Kind::Read { .. })
+    }
+
+    /// Whether an answer to this could be taken for one to `other`. Refusals aside: those of one function look alike.
+    pub(crate) fn could_pass_for(self, other: Self) -> bool {
+        match (self.0, other.0) {
+            (Kind::Custom { .. }, _) | (_, Kind::Custom { .. }) => {
+                let (ours, theirs) = (self.length(), other.length());
+                let fits = ours == theirs
+                    || matches!(ours, AnswerLength::BySilence)
+                    || matches!(theirs, AnswerLength::BySilence);
+                self.function() == other.function() && fits
+            }
+            _ => self == other,
+        }
     }
 
     /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.

@@ -67,7 +67,7 @@ pub enum BeginError {
     OutOfTurn,
     /// Nobody answers a broadcast, so nothing can be read by one.
     BroadcastRead,
-    /// The unit may still answer an earlier request: send it an echo first.
+    /// The unit may still answer an earlier request, or another program's: send it an echo first.
     Quarantine {
         /// The unit.
         unit: UnitAddress,

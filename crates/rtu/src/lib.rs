@@ -2,8 +2,10 @@
 #![no_std]
 
 mod address;
+mod agreement;
 mod answer;
 pub mod crc;
+mod doubt;
 mod event;
 mod frame;
 mod framer;
@@ -18,8 +20,10 @@ mod words;
 pub use core::time::Duration;
 
 pub use address::{AddressError, Destination, UnitAddress};
+pub use agreement::Agreement;
 pub use answer::{Answer, AnswerError, ExceptionCode, Expected};
 pub use crc::crc16;
+pub use doubt::{Attribution, FIRST_CONTACT, OVERTAKING, PATIENCE};
 pub use event::{BeginError, Event, Tally};
 pub use frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
 pub use framer::{Framer, Skipped};

@@ -1,21 +1,19 @@
 //! One request at a time: keep silence, send, wait, judge.
 //!
 //! The rule of this file: **an answer is accepted only if it can only belong to the request in flight.** RTU has no
-//! transaction number, so after a time-out the answer may still come and look like the answer to a later request. A
-//! unit that left a request open is therefore in *quarantine*: only an echo (08H/0000) with a fresh word is sent to
-//! it, and only the return of that word ends the quarantine.
-//!
-//! What is assumed of a unit: it answers in the order it was asked, at most once each. A gateway that reorders
-//! answers breaks that.
+//! transaction number, so after a time-out the answer may still come and look like the answer to a later request, and on
+//! a line that was just opened so may the answer to another program's. Such a unit is in *quarantine*: it is sent only
+//! what no answer still to come could be mistaken for, an echo (08H/0000) of a fresh word or a read of another length.
+//! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
 use core::time::Duration;
 
-use crate::answer::{AnswerError, Expected};
+use crate::answer::{Answer, AnswerError, Expected};
+use crate::doubt::{Attribution, Doubts};
 use crate::event::{BeginError, Event, Tally};
 use crate::frame::Adu;
 use crate::framer::{Framer, Step};
 use crate::request::Request;
-use crate::unit_set::UnitSet;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
@@ -40,7 +38,7 @@ pub struct Master {
     echo_due: bool,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
-    quarantine: UnitSet,
+    doubts: Doubts,
     tally: Tally,
 }
 
@@ -75,7 +73,7 @@ struct Job {
 }
 
 impl Master {
-    /// A master on a line of `format`.
+    /// A master on a line of `format` that nobody else has asked anything on; otherwise call [`opened`](Self::opened).
     pub const fn new(format: &SerialFormat) -> Self {
         Self::with_silence(format.t35())
     }
@@ -90,7 +88,7 @@ impl Master {
             strips_echo: false,
             echo_due: false,
             busy: None,
-            quarantine: UnitSet::EMPTY,
+            doubts: Doubts::NONE,
             tally: Tally::EMPTY,
         }
     }
@@ -112,7 +110,9 @@ impl Master {
         timeout: Duration,
     ) -> Result<(), BeginError> {
         match destination {
-            Destination::Unit(unit) if self.in_quarantine(unit) && !matches!(request, Request::Echo { .. }) => {
+            Destination::Unit(unit)
+                if self.in_quarantine(now, unit) && !self.doubts.tells_apart(now, unit, request.expected()) =>
+            {
                 Err(BeginError::Quarantine { unit })
             }
             _ => self.begin_in_doubt(now, destination, request, timeout),
@@ -225,18 +225,18 @@ impl Master {
         }
     }
 
-    /// Gives the request up. Returns whether the unit may have received it; then it is in quarantine.
-    pub fn abort(&mut self) -> bool {
+    /// Gives the request up at `now`. Returns whether the unit may have received it; then it is in quarantine.
+    pub fn abort(&mut self, now: Instant) -> bool {
         let sent = match self.state {
             State::Idle | State::Quiet { .. } => false,
             State::Sending { job } => {
                 if let Destination::Unit(unit) = job.destination {
-                    self.quarantine.insert(unit);
+                    self.doubts.left_open(now, unit, job.expected);
                 }
                 true
             }
-            State::Waiting { unit, .. } => {
-                self.quarantine.insert(unit);
+            State::Waiting { unit, expected, .. } => {
+                self.doubts.left_open(now, unit, expected);
                 true
             }
             State::Turnaround { .. } => true,
@@ -245,22 +245,46 @@ impl Master {
         sent
     }
 
-    /// Says that the line was opened anew: a request in flight is given up, quarantines stay, and nothing is known of
-    /// what was on the line before `now`.
-    pub fn reopened(&mut self, now: Instant) {
-        self.abort();
+    /// Says that the line was opened at `now`, for the first time or again: another program may have asked any unit,
+    /// so all are in quarantine for [`FIRST_CONTACT`](crate::FIRST_CONTACT) or until they have returned an echo.
+    ///
+    /// A request in flight is given up, and what units owed before they still owe.
+    pub fn opened(&mut self, now: Instant) {
+        self.abort(now);
         self.framer.expect_anything();
         self.busy = self.busy.max(Some(now));
+        self.doubts.opened(now);
     }
 
-    /// Whether `unit` left a request open, so that only an echo may be sent to it.
-    pub const fn in_quarantine(&self, unit: UnitAddress) -> bool {
-        self.quarantine.contains(unit)
+    /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or
+    /// a read whose answer cannot be mistaken.
+    pub fn in_quarantine(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.doubts.contains(now, unit)
     }
 
-    /// Ends the quarantine of `unit` on the caller's own judgement: for a unit that does not know 08H.
-    pub const fn release(&mut self, unit: UnitAddress) {
-        self.quarantine.remove(unit);
+    /// When the quarantine of first contact with `unit` ends by itself; `None` where it is over, or was none.
+    pub fn first_contact_ends(&self, now: Instant, unit: UnitAddress) -> Option<Instant> {
+        self.doubts.first_contact_ends(now, unit)
+    }
+
+    /// Whether the answer of `unit` to `request`, asked at `now`, could not be mistaken for any that it may still give:
+    /// then it ends a quarantine.
+    pub fn tells_apart(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> bool {
+        self.doubts.tells_apart(now, unit, request.expected())
+    }
+
+    /// How sure the answer to `request` can be that `unit` is asked at `now`. Always certain unless answers
+    /// [may overtake](Self::answers_may_overtake) each other.
+    pub fn attribution(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Attribution {
+        self.doubts.attribution(now, unit, request.expected())
+    }
+
+    /// Says whether the line leads over a gateway that may hand on answers in another order than they were asked for.
+    ///
+    /// Then an echo does not prove that everything asked before is answered, and [`attribution`](Self::attribution)
+    /// tells what has to be repeated.
+    pub const fn answers_may_overtake(&mut self, overtake: bool) {
+        self.doubts.may_overtake(overtake);
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.
@@ -289,7 +313,7 @@ impl Master {
                 Step::Skipped { range, expected: false, .. } => self.tally.add_noise(self.framer.held(range)),
                 Step::Skipped { range, error, expected: true } => {
                     self.state = State::Idle;
-                    self.quarantine.insert(unit);
+                    self.doubts.left_open(now, unit, expected);
                     return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
@@ -299,18 +323,32 @@ impl Master {
                 }
                 Step::Frame(range) => {
                     let judged = expected.judge_frame(unit, &self.framer.frame(range.clone()));
+                    let doubted = self.in_quarantine(now, unit);
+                    let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
-                        Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => self.count_other(range, unit),
-                        // In quarantine another word than the fresh one is a late answer to an earlier echo.
-                        Err(AnswerError::Echo { .. }) if self.in_quarantine(unit) => self.tally.late += 1,
+                        Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
+                            self.count_other(range, unit, doubted);
+                        }
+                        // Another word than the fresh one, another length than the one chosen: an earlier request's.
+                        Err(_) if apart => self.tally.late += 1,
+                        // Refusals of reads look alike.
+                        Ok(Answer::Exception { .. }) if apart && expected.is_read() => self.tally.late += 1,
                         outcome => {
+                            let refused = matches!(outcome, Ok(Answer::Exception { .. }));
+                            let right = outcome.is_ok();
                             self.state = State::Idle;
                             // The answer proves that the request has left the wire, whatever was computed; but not one
                             // that may be late.
-                            if expected.is_echo() || !self.in_quarantine(unit) {
+                            if apart || !doubted {
                                 self.busy = Some(now);
                             }
-                            return Some(self.settle(unit, expected, outcome.is_ok(), range));
+                            match (right, refused, expected.is_echo()) {
+                                (false, ..) => self.doubts.left_open(now, unit, expected),
+                                (true, true, true) => self.doubts.refused_echo(now, unit),
+                                (true, false, echo) if echo || apart => self.doubts.settle(unit, echo),
+                                (true, refused, _) => self.doubts.taken(now, unit, expected, refused),
+                            }
+                            return Some(self.tell(expected, range));
                         }
                     }
                 }
@@ -320,22 +358,12 @@ impl Master {
             return None;
         }
         self.state = State::Idle;
-        self.quarantine.insert(unit);
+        self.doubts.left_open(now, unit, expected);
         Some(Event::NoAnswer { bytes: self.framer.pending() })
     }
 
-    fn settle(
-        &mut self,
-        unit: UnitAddress,
-        expected: Expected,
-        right: bool,
-        range: core::ops::Range<usize>,
-    ) -> Event<'_> {
-        match (right, expected.is_echo()) {
-            (true, true) => self.quarantine.remove(unit),
-            (true, false) => {}
-            (false, _) => self.quarantine.insert(unit),
-        }
+    /// The frame that ends the request.
+    fn tell(&self, expected: Expected, range: core::ops::Range<usize>) -> Event<'_> {
         let frame = self.framer.frame(range);
         // Judged again, because the first verdict could not be kept beside the change of state.
         match expected.judge(frame.pdu()) {
@@ -350,8 +378,8 @@ impl Master {
     }
 
     /// Counts a whole frame that is not the answer.
-    fn count_other(&mut self, range: core::ops::Range<usize>, unit: UnitAddress) {
-        if self.framer.held(range).first() == Some(&unit.get()) && self.in_quarantine(unit) {
+    fn count_other(&mut self, range: core::ops::Range<usize>, unit: UnitAddress, doubted: bool) {
+        if doubted && self.framer.held(range).first() == Some(&unit.get()) {
             self.tally.late += 1;
         } else {
             self.tally.foreign += 1;

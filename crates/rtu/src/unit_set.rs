@@ -8,6 +8,7 @@ pub(crate) struct UnitSet([u64; 4]);
 
 impl UnitSet {
     pub(crate) const EMPTY: Self = Self([0; 4]);
+    pub(crate) const ALL: Self = Self([u64::MAX; 4]);
 
     pub(crate) const fn contains(&self, unit: UnitAddress) -> bool {
         self.0[unit.get() as usize / 64] >> (unit.get() % 64) & 1 == 1

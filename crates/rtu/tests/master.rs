@@ -58,7 +58,7 @@ fn a_line_that_is_never_silent_is_given_up_with_nothing_sent() {
         assert_eq!(master.poll(at(millis * 1_000)), None);
     }
     assert_eq!(master.poll(at(102_000)), Some(Event::Busy));
-    assert!(!master.in_quarantine(unit(1)));
+    assert!(!master.in_quarantine(at(200_000), unit(1)));
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn a_refusal_is_there_at_its_last_byte() {
     let mut master = waiting(&Request::write(1, 3));
     master.receive(at(5_000), &[0x01, 0x86, 0x04, 0x43, 0xA3]);
     assert_eq!(master.poll(at(5_000)), Some(Event::Answer(Answer::exception(6, ExceptionCode::DEVICE_FAILURE))));
-    assert!(!master.in_quarantine(unit(1)));
+    assert!(!master.in_quarantine(at(200_000), unit(1)));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_whole_frame_that_cannot_be_right_is_wrong_at_once() {
         master.poll(at(5_000)),
         Some(Event::Wrong { error: AnswerError::Count { asked: 4, came: 1 }, frame: &short })
     );
-    assert!(master.in_quarantine(unit(1)));
+    assert!(master.in_quarantine(at(200_000), unit(1)));
 
     let mut master = waiting(&Request::write(0x2001, 1000));
     let other = Adu::request(unit(1).into(), &Request::write(0x2001, 999));
@@ -139,7 +139,7 @@ fn a_corrupt_answer_is_told_when_silence_shows_that_nothing_follows() {
     master.receive(at(5_000), &bytes);
     assert_eq!(master.poll(at(6_749)), None);
     assert!(matches!(master.poll(at(6_750)), Some(Event::Corrupt { error: FrameError::Crc { .. }, .. })));
-    assert!(master.in_quarantine(unit(1)));
+    assert!(master.in_quarantine(at(200_000), unit(1)));
 }
 
 #[test]
@@ -177,14 +177,16 @@ fn a_late_answer_is_never_the_answer_to_another_request() {
 
 #[test]
 fn only_the_fresh_word_ends_the_quarantine() {
-    let mut master = waiting(&Request::echo(1));
+    let mut master = waiting(&Request::read(0, 1).unwrap());
     assert!(matches!(master.poll(at(102_500)), Some(Event::NoAnswer { .. })));
-    let end = send(&mut master, 102_500, &Request::echo(2));
+    let end = send(&mut master, 102_500, &Request::echo(1)) + 100_000;
+    assert!(matches!(master.poll(at(end)), Some(Event::NoAnswer { .. })));
+    let end = send(&mut master, end, &Request::echo(2));
     for (word, over) in [(1, false), (2, true)] {
         let echo = Adu::answer(unit(1), &Answer::confirming(&Request::echo(word)).unwrap());
         master.receive(at(end + 2_000), echo.as_bytes());
         assert_eq!(master.poll(at(end + 2_000)).is_some(), over);
-        assert_eq!(master.in_quarantine(unit(1)), !over);
+        assert_eq!(master.in_quarantine(at(400_000), unit(1)), !over);
     }
 }
 
@@ -200,19 +202,18 @@ fn a_stop_goes_out_whatever_else_is_in_doubt() {
     assert_eq!(master.poll(at(105_000)), None, "the late answer to the read");
     master.receive(at(110_000), Adu::request(unit(1).into(), &stop).as_bytes());
     assert!(matches!(master.poll(at(110_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
-    assert!(master.in_quarantine(unit(1)), "it may have been the answer to an earlier stop");
+    assert!(master.in_quarantine(at(200_000), unit(1)), "it may have been the answer to an earlier stop");
 }
 
 #[test]
 fn giving_up_a_request_that_went_out_is_remembered() {
     let mut master = waiting(&Request::read(0, 1).unwrap());
-    assert!(master.abort());
-    assert!(master.in_quarantine(unit(1)));
-    assert!(!master.in_quarantine(unit(2)));
-    master.release(unit(1));
-    master.begin(at(10_000), unit(1).into(), &Request::read(0, 1).unwrap(), TIMEOUT).unwrap();
-    assert!(!master.abort(), "nothing had been sent");
-    assert!(!master.in_quarantine(unit(1)));
+    assert!(master.abort(at(10_000)));
+    assert!(master.in_quarantine(at(200_000), unit(1)));
+    assert!(!master.in_quarantine(at(200_000), unit(2)));
+    master.begin(at(10_000), unit(2).into(), &Request::read(0, 1).unwrap(), TIMEOUT).unwrap();
+    assert!(!master.abort(at(10_000)), "nothing had been sent");
+    assert!(!master.in_quarantine(at(200_000), unit(2)));
 }
 
 #[test]
@@ -269,9 +270,9 @@ fn a_glitch_does_not_hide_the_adapters_echo() {
 #[test]
 fn a_line_that_is_opened_anew_owes_what_the_old_one_did() {
     let mut master = waiting(&Request::read(0x2100, 1).unwrap());
-    master.reopened(at(20_000));
-    assert!(master.in_quarantine(unit(1)));
-    master.begin(at(20_000), unit(2).into(), &Request::read(0x2100, 1).unwrap(), TIMEOUT).unwrap();
+    master.opened(at(20_000));
+    assert!(master.in_quarantine(at(1_500_000), unit(1)));
+    master.begin(at(20_000), unit(2).into(), &Request::echo(7), TIMEOUT).unwrap();
     assert_eq!(master.poll(at(21_749)), None, "nobody knows what was on the line before");
     assert!(matches!(master.poll(at(21_750)), Some(Event::Transmit(_))));
 }
