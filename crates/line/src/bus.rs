@@ -4,17 +4,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, UnitAddress};
 
+use crate::Line;
+use crate::call::{Call, CallOptions};
 use crate::clock::{monotonic, sleep_until};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
+use crate::link::Link;
 use crate::opener::Opener;
 use crate::owner::{AdapterEcho, Owner};
 use crate::queue::{LOOK_UP, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
-use crate::{Line, PortErrorKind};
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]
@@ -38,25 +40,13 @@ impl BusOptions {
     }
 }
 
-/// What one call wants otherwise than the bus; `None` keeps what the bus has.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct CallOptions {
-    /// The longest wait for the answer.
-    pub timeout: Option<Duration>,
-    /// How often a read is asked once more.
-    pub retries: Option<u32>,
-    /// Before all who wait, and whatever is in doubt about the unit: for a stop, which must not wait for an echo to come
-    /// back. Its confirmation may then belong to the very same request, sent before.
-    pub urgent: bool,
-}
-
 /// One line and its owner.
 ///
 /// The calling thread works on the line itself when its turn comes; others wait in the order of [`Priority`]. `give_up` is
 /// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
-    queue: Queue,
+    pub(crate) queue: Queue,
     owner: Mutex<Owner>,
     /// What can be asked for while somebody waits on the line.
     stats: Arc<Mutex<Stats>>,
@@ -157,8 +147,9 @@ impl Bus {
     /// Asks `request` of `destination` and gives the answer to `take`.
     ///
     /// A read that brings nothing is asked again by policy, and `take` is called for the answer that counts. A write
-    /// and an echo are sent once. Before anything is asked of a unit that left a request open, that unit is echoed with
-    /// a fresh word, so that its late answer is never taken for the new one.
+    /// and an echo are sent once, unless [`CallOptions::read_back`] says where the words can be read. Before anything is
+    /// asked of a unit that may still answer something else, that unit is probed, so that its late answer is never taken
+    /// for the new one: it is sent a fresh word to return, or else a read of another length.
     ///
     /// # Errors
     ///
@@ -174,7 +165,7 @@ impl Bus {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let timeout = options.timeout.unwrap_or(self.options.timeout);
-        let ask = Ask { destination, request, timeout, urgent: options.urgent };
+        let ask = Ask { destination, request, timeout, in_doubt: options.in_doubt };
         if self.queue.has_this_thread() {
             let now = self.clock.now().unwrap_or_default();
             return Err(ask.failed(Failure::NotBegun(BeginError::OutOfTurn), None, now, &[]));
@@ -183,71 +174,16 @@ impl Bus {
             return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now(), &[]));
         }
         let mut give_up = || self.is_closed() || give_up();
-        let priority = match options.urgent {
-            true => Priority::Stop,
-            false if request.is_write() => Priority::Write,
-            false => Priority::Read,
-        };
-        let unit = match destination {
-            Destination::Unit(unit) => Some(unit),
-            Destination::Broadcast => None,
-        };
-        let Some(_turn) = self.queue.turn(priority, unit, &mut give_up) else {
-            return Err(ask.failed(self.given_up(), None, self.now(), &[]));
-        };
-        let mut owner = self.lock();
-        let result = self.ask(&mut owner, &ask, options, &mut give_up, take);
+        let result = Call::new(self, ask, options).run(&mut give_up, take);
         if self.is_closed() {
-            owner.close();
+            self.close();
         }
         result
     }
 
-    /// Asks until it is answered, refused or given up; the line is ours.
-    fn ask(
-        &self,
-        owner: &mut Owner,
-        ask: &Ask<'_>,
-        options: CallOptions,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        let Ask { destination, request, .. } = *ask;
-        let repeats = match request {
-            Request::ReadHolding { .. } => options.retries.unwrap_or(self.options.retries),
-            _ => 0,
-        };
-        let mut lost = None;
-        for attempt in 0..=repeats {
-            if self.is_closed() {
-                break;
-            }
-            if let Err(failure) = owner.reopen(give_up) {
-                let failure = if failure == Failure::Interrupted { self.given_up() } else { failure };
-                // How the port was lost tells more than that it is still not there.
-                return Err(lost.unwrap_or_else(|| ask.failed(failure, None, self.now_of(owner), &[])));
-            }
-            if attempt > 0
-                && let Destination::Unit(unit) = destination
-            {
-                owner.stats().count(Some(unit), |counters| counters.retries += 1);
-            }
-            let result = owner.prepare(ask, give_up).and_then(|()| owner.exchange(ask, give_up, take));
-            match result {
-                Err(error) if attempt < repeats && is_passing(&error.failure) => lost = Some(error),
-                Err(mut error) => {
-                    error.failure = match error.failure {
-                        Failure::Interrupted => self.given_up(),
-                        Failure::NoAnswer { timeout, .. } => Failure::NoAnswer { timeout, attempts: attempt + 1 },
-                        other => other,
-                    };
-                    error.request = ask.frame();
-                    return Err(error);
-                }
-                done => return done,
-            }
-        }
-        Err(ask.failed(Failure::Closed, None, self.now_of(owner), &[]))
+    /// Of the last ten exchanges with `unit`, how many brought an answer.
+    pub fn link(&self, unit: UnitAddress) -> Link {
+        self.lock().link(unit)
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
@@ -301,25 +237,16 @@ impl Bus {
     }
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.
-    fn now_of(&self, owner: &Owner) -> Instant {
+    pub(crate) fn now_of(&self, owner: &Owner) -> Instant {
         self.clock.now().unwrap_or_else(|| owner.now())
     }
 
-    fn given_up(&self) -> Failure {
+    pub(crate) fn given_up(&self) -> Failure {
         if self.is_closed() { Failure::Closed } else { Failure::Interrupted }
     }
 
     /// A thread that panicked has left the master in a state that the next `begin` refuses, not in a wrong one.
-    fn lock(&self) -> MutexGuard<'_, Owner> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Owner> {
         self.owner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Whether the same read may well succeed the next time.
-fn is_passing(failure: &Failure) -> bool {
-    match failure {
-        Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_) | Failure::Busy { .. } => true,
-        Failure::Port(error) => error.kind == PortErrorKind::Lost,
-        _ => false,
     }
 }

@@ -41,13 +41,15 @@ impl fmt::Display for CallError {
             write!(f, "; came: {}", Hex(&self.raw))?;
         }
         match (request, self.sent, &self.failure) {
-            (Some(request), Some(_), failure) if request.is_write() && !matches!(failure, Failure::Refused { .. }) => {
+            (Some(request), Some(_), failure)
+                if request.is_write() && !matches!(failure, Failure::Refused { .. } | Failure::NotTaken { .. }) =>
+            {
                 f.write_str("; it was sent once, and the unit may have taken it")
             }
             (Some(request), None, Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_))
                 if request.is_write() =>
             {
-                f.write_str(" to an echo, with which an earlier request had to be cleared up; the write was not sent")
+                f.write_str(" to an echo, with which it must show that it owes no other answer; the write was not sent")
             }
             _ => Ok(()),
         }
@@ -115,6 +117,31 @@ pub enum Failure {
         /// How often it was tried.
         attempts: u32,
     },
+    /// The unit may still answer an earlier request, and gave no sign that it does not. Nothing was sent.
+    #[error(
+        "the unit may still answer an earlier request, and neither an echo nor a read of another length settled it"
+    )]
+    Doubtful,
+    /// The unit was silent the last times, and others use the line. Nothing was sent.
+    #[error("not asked: the unit was silent before, and other units use the line; it is asked again in {} ms", left.as_millis())]
+    NotAsked {
+        /// How long until then.
+        left: Duration,
+    },
+    /// The same read brought one answer now and another then.
+    #[error("{asked} answers to the same read do not agree; either the words change, or some were late answers")]
+    Disagreeing {
+        /// How often it was asked.
+        asked: u32,
+    },
+    /// The unit shows other words than those written.
+    #[error("written {times} times without a confirmation, and the unit shows {}", Shown(shows))]
+    NotTaken {
+        /// How often it was sent.
+        times: u32,
+        /// What was read back.
+        shows: Vec<u16>,
+    },
     /// The line was never silent long enough to send. Nothing was sent.
     #[error("the line was never silent for {} ms: another master, or noise from a missing bias", timeout.as_millis())]
     Busy {
@@ -135,6 +162,19 @@ pub enum Failure {
         /// Why, in the unit's own numbering.
         code: ExceptionCode,
     },
+}
+
+/// Words as people read them.
+struct Shown<'a>(&'a [u16]);
+
+impl fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, word) in self.0.iter().enumerate() {
+            let space = if index == 0 { "" } else { " " };
+            write!(f, "{space}{word:04X}H")?;
+        }
+        Ok(())
+    }
 }
 
 fn times(attempts: u32) -> String {

@@ -16,8 +16,8 @@ pub(crate) struct Ask<'a> {
     pub(crate) destination: Destination,
     pub(crate) request: &'a Request<'a>,
     pub(crate) timeout: Duration,
-    /// Whether it goes out at once, even to a unit that left a request open.
-    pub(crate) urgent: bool,
+    /// Whether it goes out at once, even to a unit that may still answer something else.
+    pub(crate) in_doubt: bool,
 }
 
 /// When an exchange happened, on the line's clock.
@@ -62,7 +62,7 @@ pub(crate) fn exchange(
     let mut sent = None;
     let mut now = line.now();
     let mut looked_up = now;
-    let begin = if ask.urgent { Master::begin_in_doubt } else { Master::begin };
+    let begin = if ask.in_doubt { Master::begin_in_doubt } else { Master::begin };
     begin(master, now, ask.destination, ask.request, ask.patience())
         .map_err(|error| ask.failed(Failure::NotBegun(error), sent, now, &[]))?;
 
@@ -75,7 +75,7 @@ pub(crate) fn exchange(
         let mut rest = match received {
             Ok(count) => &buffer[..count],
             Err(error) => {
-                master.abort();
+                master.abort(now);
                 return Err(ask.failed(Failure::Port(error), sent, now, &[]));
             }
         };
@@ -88,7 +88,7 @@ pub(crate) fn exchange(
                     match line.send(frame) {
                         Ok(end) => master.sent(end),
                         Err(error) => {
-                            master.abort();
+                            master.abort(now);
                             return Err(ask.failed(Failure::Port(error), sent, line.now(), &[]));
                         }
                     }
@@ -101,7 +101,7 @@ pub(crate) fn exchange(
         if now.saturating_duration_since(looked_up) >= LOOK_UP {
             looked_up = now;
             if give_up() {
-                master.abort();
+                master.abort(now);
                 return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
             }
         }

@@ -5,9 +5,9 @@
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
 //! over at its last byte.
 
-#[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line asks it"))]
 mod backoff;
 mod bus;
+mod call;
 pub mod clock;
 mod error;
 mod exchange;
@@ -15,7 +15,6 @@ mod hint;
 mod hints;
 mod holder;
 mod identity;
-#[cfg_attr(not(test), expect(dead_code, reason = "the owner of the line keeps it"))]
 mod link;
 pub mod mbap;
 mod opener;
@@ -29,7 +28,8 @@ mod stats;
 pub mod tcp;
 pub mod tty;
 
-pub use bus::{Bus, BusOptions, CallOptions};
+pub use bus::{Bus, BusOptions};
+pub use call::CallOptions;
 pub use error::{CallError, Failure};
 pub use exchange::Done;
 pub use hint::Hint;

@@ -91,7 +91,7 @@ mod tests {
 
     fn failed(failure: Failure) -> Result<Done, Box<CallError>> {
         let request = Request::read(0x2100, 1).unwrap();
-        let ask = Ask { destination: unit(1).into(), request: &request, timeout: Duration::ZERO, urgent: false };
+        let ask = Ask { destination: unit(1).into(), request: &request, timeout: Duration::ZERO, in_doubt: false };
         Err(ask.failed(failure, None, Instant::ZERO, &[]))
     }
 

@@ -3,13 +3,15 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
+use drivebus_rtu::{Adu, Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
 use crate::Line;
+use crate::backoff::DeadUnits;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
+use crate::link::{Link, Links};
 use crate::opener::{LineOpener, Opener};
-use crate::resync::{FreshWords, Resync};
+use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
 
 /// What is known about the adapter sending our own bytes back.
@@ -23,6 +25,21 @@ pub enum AdapterEcho {
     Absent,
 }
 
+/// What to do next for a request.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Next {
+    /// Send it.
+    Ask(Attribution),
+    /// See whether the adapter echoes.
+    LookForEcho,
+    /// Make sure that the unit owes nothing else.
+    Probe(UnitAddress, Probe),
+    /// Let this moment come; others may use the line.
+    Wait(Instant),
+    /// The unit may still answer something else, and everything was tried.
+    GiveUp,
+}
+
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
@@ -33,6 +50,9 @@ pub(crate) struct Owner {
     /// What is known by now about the one that is plugged in.
     echo: AdapterEcho,
     resync: Resync,
+    links: Links,
+    /// Units that do not answer.
+    pub(crate) dead: DeadUnits,
     words: Arc<FreshWords>,
     stats: Arc<Mutex<Stats>>,
 }
@@ -60,6 +80,8 @@ impl Owner {
             given_echo: echo,
             echo,
             resync: Resync::default(),
+            links: Links::default(),
+            dead: DeadUnits::default(),
             words,
             stats: Arc::default(),
         };
@@ -86,6 +108,11 @@ impl Owner {
         self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
     }
 
+    /// How well `unit` could be reached lately.
+    pub(crate) fn link(&self, unit: UnitAddress) -> Link {
+        self.links.of(unit)
+    }
+
     /// The line, if it is open.
     pub(crate) fn line(&mut self) -> Option<&mut (dyn Line + 'static)> {
         self.line.as_deref_mut()
@@ -95,8 +122,6 @@ impl Owner {
     pub(crate) fn reopen(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {
             let line = self.opener.open(give_up)?;
-            // What was asked over the lost port may be answered over the new one.
-            self.master.reopened(line.now());
             self.take_line(line);
             self.stats().reconnects += 1;
         }
@@ -109,39 +134,53 @@ impl Owner {
             given => given,
         };
         self.master.strip_echo(self.echo == AdapterEcho::Present);
+        self.master.answers_may_overtake(line.may_overtake());
+        // A connection of our own whose frames are told apart carries nobody else's answers.
+        if !line.gapless() {
+            self.master.opened(line.now());
+        }
         self.line = Some(line);
     }
 
-    /// Makes sure that what comes next can only be the answer to what is asked next.
+    /// What comes before `ask`, so that what is taken for its answer can only be its answer.
     ///
     /// Nothing is sent where nothing is in doubt. Before a request whose answer may look like it, a write or the echo
-    /// sent here included, one word is read if it is not known yet whether the adapter echoes. Then a unit that left a
-    /// request open is sent a fresh word.
-    pub(crate) fn prepare(&mut self, ask: &Ask<'_>, give_up: &mut dyn FnMut() -> bool) -> Result<(), Box<CallError>> {
+    /// sent here included, one word is read if it is not known yet whether the adapter echoes. Then a unit that may still
+    /// answer something else is probed.
+    pub(crate) fn next(&mut self, ask: &Ask<'_>, tried: &Tried) -> Next {
         let Destination::Unit(unit) = ask.destination else {
-            return Ok(());
+            return Next::Ask(Attribution::Certain);
         };
-        if ask.urgent {
-            return Ok(());
+        if ask.in_doubt {
+            return Next::Ask(Attribution::Certain);
         }
-        let echoes = matches!(ask.request, Request::Echo { .. });
-        if self.echo == AdapterEcho::Auto
-            && (ask.request.expected().may_repeat_request() || self.master.in_quarantine(unit))
-        {
-            self.look_for_echo(ask, give_up)?;
+        let now = self.now();
+        let in_quarantine = self.master.in_quarantine(now, unit);
+        if self.echo == AdapterEcho::Auto && (ask.request.expected().may_repeat_request() || in_quarantine) {
+            return Next::LookForEcho;
         }
-        if self.master.in_quarantine(unit) && !echoes {
-            self.probe(unit, ask, give_up)?;
+        if in_quarantine && !matches!(ask.request, Request::Echo { .. }) {
+            if let Some(probe) = self.resync.probe(&self.master, now, unit, ask.request, tried) {
+                return Next::Probe(unit, probe);
+            }
+            return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
         }
-        Ok(())
+        match self.master.attribution(now, unit, ask.request) {
+            Attribution::Wait(until) => Next::Wait(until),
+            sure => Next::Ask(sure),
+        }
     }
 
     /// Reads one word to see whether the request comes back; what is answered does not matter.
-    fn look_for_echo(&mut self, ask: &Ask<'_>, give_up: &mut dyn FnMut() -> bool) -> Result<(), Box<CallError>> {
+    pub(crate) fn look_for_echo(
+        &mut self,
+        ask: &Ask<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
         let Ok(read) = Request::read(0, 1) else {
             return Ok(());
         };
-        match self.exchange(&Ask { request: &read, urgent: true, ..*ask }, give_up, &mut |_| ()) {
+        match self.exchange(&Ask { request: &read, in_doubt: true, ..*ask }, give_up, &mut |_| ()) {
             // It has not shown anything: the next request's echo could be taken for its answer.
             Err(mut error) if self.echo == AdapterEcho::Auto => {
                 error.sent = None;
@@ -151,24 +190,41 @@ impl Owner {
         }
     }
 
-    /// Sends a fresh word to `unit` and waits for it to come back.
-    fn probe(
+    /// Sends `probe` to `unit`; what it brought, `tried` and the master know.
+    ///
+    /// # Errors
+    ///
+    /// The port was lost, or the caller gave up: no other probe is worth trying.
+    pub(crate) fn probe(
         &mut self,
         unit: UnitAddress,
+        probe: Probe,
         ask: &Ask<'_>,
+        tried: &mut Tried,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
-        let echo = Request::echo(self.words.next());
+        let request = match probe {
+            Probe::Echo => Request::echo(self.words.next()),
+            Probe::OtherRead { address, count } => match Request::read(address, count) {
+                Ok(request) => request,
+                Err(_) => return Ok(()), // the count was checked when the probe was chosen
+            },
+        };
+        let silent_on_echo = tried.echo;
+        tried.note(probe);
         self.stats().count(Some(unit), |counters| counters.resyncs += 1);
-        match self.exchange(&Ask { request: &echo, ..*ask }, give_up, &mut |_| ()) {
-            Ok(_) => self.resync.answered(unit),
-            Err(error) if matches!(error.failure, Failure::Refused { .. }) => self.resync.answered(unit),
+        match self.exchange(&Ask { request: &request, ..*ask }, give_up, &mut |_| ()) {
+            Ok(_) if silent_on_echo => self.resync.is_mute(unit),
+            Ok(_) => {}
             Err(mut error) => {
-                if matches!(error.failure, Failure::NoAnswer { .. }) && self.resync.is_given_up(unit, error.ended) {
-                    self.master.release(unit);
-                }
                 error.sent = None;
-                return Err(error);
+                if !matches!(
+                    error.failure,
+                    Failure::NoAnswer { .. } | Failure::Corrupt(_) | Failure::Wrong(_) | Failure::Refused { .. }
+                ) {
+                    return Err(error);
+                }
+                tried.failure = Some(error);
             }
         }
         Ok(())
@@ -194,12 +250,15 @@ impl Owner {
         }
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);
-        if let (Some(unit), Err(error)) = (unit, &result)
-            && self.master.in_quarantine(unit)
-            && !matches!(ask.request, Request::Echo { .. })
-            && let Some(sent) = error.sent
-        {
-            self.resync.left_open(unit, sent);
+        if let Some(unit) = unit {
+            self.links.note(unit, &result);
+            match &result {
+                Ok(_) => self.resync.answered(unit, ask.request, false),
+                Err(error) if matches!(error.failure, Failure::Refused { .. }) => {
+                    self.resync.answered(unit, ask.request, true);
+                }
+                Err(_) => {}
+            }
         }
         let sent = match &result {
             Ok(_) => true,

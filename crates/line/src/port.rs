@@ -54,6 +54,11 @@ pub trait Line: Send + fmt::Debug {
         false
     }
 
+    /// Whether it leads over a gateway, which may hand on answers in another order than they were asked for.
+    fn may_overtake(&self) -> bool {
+        false
+    }
+
     /// What the user should know about this line, such as a setting that did not reach the wire.
     fn notes(&self) -> Vec<String> {
         Vec::new()

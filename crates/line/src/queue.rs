@@ -96,7 +96,6 @@ impl Turn<'_> {
     /// turn is lost then. Who steps aside stays ahead of all who are no stops.
     ///
     /// Whoever passes uses the line: the caller must hold nothing that is needed for that.
-    #[cfg_attr(not(test), expect(dead_code, reason = "the bus asks this before each attempt"))]
     pub(crate) fn let_pass(&mut self, give_up: &mut dyn FnMut() -> bool) -> bool {
         let mut state = self.queue.lock();
         if self.ticket.is_stop() || !state.order.has_stop() {
@@ -136,7 +135,7 @@ impl Turn<'_> {
     }
 
     /// Gives up the turn, or the place of who waits for it. Doing so again does nothing.
-    fn leave(&self) {
+    pub(crate) fn leave(&self) {
         let mut state = self.queue.lock();
         let had_the_line = state.owner.take_if(|(owner, _)| *owner == self.ticket);
         let waited = state.order.leave(self.ticket);

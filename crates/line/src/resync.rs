@@ -1,17 +1,15 @@
-//! The way back after a request was left open: which word to echo, and what to do about units that do not echo.
+//! The way back after a request was left open: which word to echo, and what to try with units that do not echo.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::atomic::{AtomicU16, Ordering};
-use std::time::Duration;
 
-use drivebus_rtu::{Instant, UnitAddress};
+use drivebus_rtu::{Instant, Master, Request, UnitAddress};
 
-/// How long a unit that never answered an echo may owe an answer. After that it is taken as never to come.
-///
-/// All drives known here document the echo (08H/0000), so this is for other devices on the line, which are silent on it.
-/// What is assumed of them: an answer comes within this time or never.
-const PATIENCE: Duration = Duration::from_secs(3);
+use crate::error::CallError;
+
+/// Most words that a read asks for only to tell its answer from others: what every drive known here allows.
+const MAX_WORDS: u16 = 16;
 
 /// Words for probes and echoes.
 #[derive(Debug)]
@@ -33,35 +31,113 @@ impl FreshWords {
     }
 }
 
-/// What is known of the units that were probed.
+/// A request whose answer ends a quarantine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Probe {
+    /// A fresh word, to be sent back.
+    Echo,
+    /// So many words from an address: a length that no open answer has.
+    OtherRead {
+        /// The first.
+        address: u16,
+        /// How many.
+        count: u16,
+    },
+}
+
+/// What was tried for one attempt of a call, and what came of it.
 #[derive(Debug, Default)]
-pub(crate) struct Resync {
-    echoed: BTreeSet<UnitAddress>,
-    /// When the latest request went out that a unit left open.
-    open: BTreeMap<UnitAddress, Instant>,
+pub(crate) struct Tried {
+    pub(crate) echo: bool,
+    other_read: bool,
+    /// How the latest probe failed.
+    pub(crate) failure: Option<Box<CallError>>,
+}
+
+impl Tried {
+    /// `probe` goes out.
+    pub(crate) fn note(&mut self, probe: Probe) {
+        match probe {
+            Probe::Echo => self.echo = true,
+            Probe::OtherRead { .. } => self.other_read = true,
+        }
+    }
+}
+
+/// What is known of the units that were asked.
+#[derive(Debug, Default)]
+pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
+
+#[derive(Debug, Default)]
+struct Known {
+    /// It has answered something.
+    alive: bool,
+    /// It has returned an echo.
+    echoes: bool,
+    /// It was silent on an echo, and then answered a read.
+    mute: bool,
+    /// A register that it answered a read of.
+    readable: Option<u16>,
+    /// Nothing is known of it, and the latest probe was an echo.
+    echo_was_last: bool,
 }
 
 impl Resync {
-    /// `unit` answered an echo, with the word or with a refusal.
-    pub(crate) fn answered(&mut self, unit: UnitAddress) {
-        self.echoed.insert(unit);
-        self.open.remove(&unit);
+    /// `unit` answered `request`, or refused it.
+    pub(crate) fn answered(&mut self, unit: UnitAddress, request: &Request<'_>, refused: bool) {
+        let known = self.0.entry(unit).or_default();
+        known.alive = true;
+        match request {
+            Request::Echo { .. } if !refused => (known.echoes, known.mute) = (true, false),
+            Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
+            _ => {}
+        }
     }
 
-    /// `unit` did not answer a request that went out at `sent`.
-    pub(crate) fn left_open(&mut self, unit: UnitAddress, sent: Instant) {
-        self.open.insert(unit, sent);
+    /// What to send to `unit`, which is in quarantine and is to be asked `request`; `None` when everything was tried.
+    pub(crate) fn probe(
+        &mut self,
+        master: &Master,
+        now: Instant,
+        unit: UnitAddress,
+        request: &Request<'_>,
+        tried: &Tried,
+    ) -> Option<Probe> {
+        let known = self.0.entry(unit).or_default();
+        let echo = (!tried.echo).then_some(Probe::Echo);
+        let address = match *request {
+            Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
+            _ => known.readable,
+        };
+        let other_read = || {
+            let address = address.filter(|_| !tried.other_read && !known.echoes)?;
+            (1..=MAX_WORDS)
+                .filter_map(|count| Some((count, Request::read(address, count).ok()?)))
+                .find(|(_, read)| master.tells_apart(now, unit, read))
+                .map(|(count, _)| Probe::OtherRead { address, count })
+        };
+        if known.alive {
+            return if known.mute { other_read().or(echo) } else { echo.or_else(other_read) };
+        }
+        // Silence is all that is known: one probe an attempt, so that it costs no more than an attempt.
+        if tried.echo || tried.other_read {
+            return None;
+        }
+        let probe = if known.echo_was_last { other_read().or(echo) } else { echo };
+        known.echo_was_last = probe == Some(Probe::Echo);
+        probe
     }
 
-    /// Whether `unit`, which is silent on an echo at `now`, is one that does not know 08H and owes nothing any more.
-    pub(crate) fn is_given_up(&self, unit: UnitAddress, now: Instant) -> bool {
-        let since = self.open.get(&unit).copied().unwrap_or(Instant::ZERO);
-        !self.echoed.contains(&unit) && now.saturating_duration_since(since) >= PATIENCE
+    /// `unit` was silent on an echo, and then answered a read of another length.
+    pub(crate) fn is_mute(&mut self, unit: UnitAddress) {
+        self.0.entry(unit).or_default().mute = true;
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
-    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, PortError, PortErrorKind,
+    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, PortError, PortErrorKind, Priority,
 };
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 use pyo3::prelude::*;
@@ -86,7 +86,8 @@ impl Bus {
         with_signals(py, |give_up| self.core.sleep(time, give_up))
     }
 
-    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None))]
+    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn read(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -94,37 +95,46 @@ impl Bus {
         count: &Bound<'_, PyAny>,
         timeout: Option<f64>,
         retries: Option<u32>,
+        urgent: bool,
+        verify: bool,
     ) -> PyResult<Vec<u16>> {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
-        Ok(self.read_words(unit, address, count, CallOptions { timeout, retries, ..CallOptions::default() })?.0)
+        let options = CallOptions { timeout, retries, verify, priority: stop_if(urgent), ..CallOptions::default() };
+        Ok(self.read_words(unit, address, count, options)?.0)
     }
 
-    #[pyo3(signature = (unit, address, count, /))]
+    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
     fn read_stamped(
         &self,
         unit: &Bound<'_, PyAny>,
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
+        urgent: bool,
+        verify: bool,
     ) -> PyResult<(Vec<u16>, f64, f64)> {
-        let (words, done) = self.read_words(unit, address, count, CallOptions::default())?;
+        let options = CallOptions { verify, priority: stop_if(urgent), ..CallOptions::default() };
+        let (words, done) = self.read_words(unit, address, count, options)?;
         let clock = self.unix_clock(unit.py());
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false))]
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None))]
     fn write(
         &self,
         unit: &Bound<'_, PyAny>,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
         urgent: bool,
+        read_back: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        self.write_to(unit_address(unit)?.into(), address, value, urgent)
+        let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
+        let options = CallOptions { in_doubt: urgent, priority: stop_if(urgent), read_back, ..CallOptions::default() };
+        self.write_to(unit_address(unit)?.into(), address, value, options)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.write_to(Destination::Broadcast, address, value, false)
+        self.write_to(Destination::Broadcast, address, value, CallOptions::default())
     }
 
     #[pyo3(signature = (unit, word = None, /, *, timeout = None))]
@@ -177,6 +187,18 @@ impl Bus {
         Ok(PyBytes::new(py, &reply))
     }
 
+    #[pyo3(signature = (unit, /))]
+    fn link(&self, py: Python<'_>, unit: &Bound<'_, PyAny>) -> PyResult<(u32, u32)> {
+        let unit = unit_address(unit)?;
+        let link = py.detach(|| self.core.link(unit));
+        Ok((link.good, link.asked))
+    }
+
+    #[getter]
+    fn reconnects(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.core.stats().reconnects)
+    }
+
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (stats, notes) = py.detach(|| (self.core.stats(), self.core.notes()));
         let all = counters(py, &stats.total)?;
@@ -220,11 +242,10 @@ impl Bus {
         to: Destination,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
-        urgent: bool,
+        options: CallOptions,
     ) -> PyResult<()> {
         let py = address.py();
         let address = one_word("address", address)?;
-        let options = CallOptions { urgent, ..CallOptions::default() };
         match words_of(value)? {
             Err(value) => self.call(py, to, &Request::write(address, value), options, &mut |_| ())?,
             Ok(words) => {
@@ -254,6 +275,11 @@ impl Bus {
         let ahead = self.virtual_ahead.unwrap_or_else(|| unix_time() - py.detach(|| to_seconds(self.core.now())));
         UnixClock { ahead }
     }
+}
+
+/// The turn of a stop.
+fn stop_if(urgent: bool) -> Option<Priority> {
+    urgent.then_some(Priority::Stop)
 }
 
 /// Runs `work` without the GIL, with a question to ask now and then: has a signal handler of Python raised?

@@ -17,11 +17,12 @@ pub(crate) enum Class {
     Crc,
     Refused,
     NotAllowed,
+    Unconfirmed,
 }
 
 impl Class {
     fn get(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 6] = [const { PyOnceLock::new() }; 6];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 7] = [const { PyOnceLock::new() }; 7];
         let (index, name) = match self {
             Self::Port => (0, "PortError"),
             Self::NoAnswer => (1, "NoAnswer"),
@@ -29,6 +30,7 @@ impl Class {
             Self::Crc => (3, "CrcError"),
             Self::Refused => (4, "Refused"),
             Self::NotAllowed => (5, "NotAllowed"),
+            Self::Unconfirmed => (6, "Unconfirmed"),
         };
         CLASSES[index].import(py, "drivebus.errors", name)
     }
@@ -114,6 +116,8 @@ pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) ->
     match error.failure {
         Failure::Port(_) | Failure::Closed => Class::Port.raise(message, details),
         Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
+        Failure::Doubtful | Failure::NotAsked { .. } => Class::NoAnswer.raise(message, details),
+        Failure::NotTaken { .. } => Class::Unconfirmed.raise(message, details),
         Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),
         Failure::Corrupt(FrameError::Crc { .. }) => Class::Crc.raise(message, details),
         Failure::Refused { code, .. } => refused(&message, code, details),

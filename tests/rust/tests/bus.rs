@@ -4,8 +4,11 @@
 
 use std::time::Duration;
 
-use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Failure, Line};
-use drivebus_rtu::{Adu, Answer, DataBits, Destination, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress};
+use drivebus_line::{AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Failure, Line, Priority};
+use drivebus_rtu::{
+    Adu, Answer, DataBits, Destination, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits,
+    UnitAddress,
+};
 use drivebus_sim::{Options, Side, Simulator};
 
 const STATE: u16 = 0x2100;
@@ -19,10 +22,18 @@ fn simulator(format: SerialFormat) -> Simulator {
     Simulator::new([(1, "gd350"), (2, "gd350")], Options::default().format(format)).unwrap()
 }
 
-fn bus(simulator: &Simulator, options: BusOptions) -> Bus {
+/// A bus on a line that was just opened: nobody knows who asked before.
+fn fresh_bus(simulator: &Simulator, options: BusOptions) -> Bus {
     let line: Box<dyn Line> = Box::new(simulator.line());
     let mut line = Some(line);
     Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap()
+}
+
+/// A bus that was open for long enough that no other program's answer can come any more, and whose adapter is known.
+fn bus(simulator: &Simulator, options: BusOptions) -> Bus {
+    let bus = fresh_bus(simulator, BusOptions { echo: AdapterEcho::Absent, ..options });
+    bus.sleep(FIRST_CONTACT, &mut || false);
+    bus
 }
 
 fn pair() -> (Simulator, Bus) {
@@ -105,7 +116,7 @@ fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
     simulator.wire().drop_answers(100); // it hears, and is not heard
     assert!(read(&bus, STATE, 1).is_err());
     let stop = Request::write(0x2000, 5);
-    let urgent = CallOptions { urgent: true, ..CallOptions::default() };
+    let urgent = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
     let error = bus.call(unit(1).into(), &stop, urgent, &mut || false, &mut |_| ()).unwrap_err();
     assert!(error.sent.is_some(), "{error}");
     let writes = simulator.drive(1).unwrap().writes();
@@ -141,8 +152,8 @@ fn a_silent_unit_costs_its_own_time_outs_only() {
     let error = ask(&bus, 9, &Request::read(STATE, 1).unwrap()).unwrap_err();
     assert_eq!(error.to_string(), "unit 9, read 2100H: no answer within 500 ms, asked 3 times",);
     assert_eq!(error.request, Adu::request(unit(9).into(), &Request::read(STATE, 1).unwrap()).as_bytes());
-    let spent = error.ended.as_nanos();
-    assert!(spent < 3 * 540_000_000, "three time-outs and the requests: {spent} ns");
+    let spent = error.ended.saturating_duration_since(Instant::ZERO + FIRST_CONTACT);
+    assert!(spent < 3 * Duration::from_millis(540), "three time-outs and the requests: {spent:?}");
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
     assert_eq!(bus.stats().units[&unit(1)].requests, 1);
     assert_eq!(simulator.wire().silence_violations(), 0);
@@ -210,7 +221,7 @@ fn giving_up_leaves_a_line_that_answers_rightly() {
     let request = Request::read(0x2103, 1).unwrap();
     let error = bus.call(unit(1).into(), &request, CallOptions::default(), &mut || true, &mut |_| ()).unwrap_err();
     assert_eq!(error.failure, Failure::Interrupted);
-    assert!(error.ended.as_nanos() < 100_000_000, "within 0.1 s");
+    assert!(error.ended < Instant::ZERO + FIRST_CONTACT + Duration::from_millis(100), "within 0.1 s");
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
 }
 
@@ -238,4 +249,46 @@ fn threads_take_turns_and_each_gets_its_own_answer() {
         }
     });
     assert_eq!(bus.stats().total.answers, 400);
+}
+
+/// The others lose one time-out when a unit dies, and then one in each period of its back-off.
+#[test]
+fn a_dead_unit_leaves_the_line_to_the_others() {
+    let (simulator, bus) = pair();
+    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let state = Request::read(STATE, 1).unwrap();
+    let asked = |unit| {
+        simulator.wire().trace().iter().filter(|sent| sent.side == Side::Master && sent.bytes[0] == unit).count()
+    };
+    read(&bus, STATE, 1).unwrap();
+    for _ in 0..2 {
+        bus.call(unit(9).into(), &state, once, &mut || false, &mut |_| ()).unwrap_err();
+    }
+    let before = asked(9);
+    let error = bus.call(unit(9).into(), &state, once, &mut || false, &mut |_| ()).unwrap_err();
+    assert!(matches!(error.failure, Failure::NotAsked { .. }) && error.sent.is_none(), "{error}");
+    assert_eq!(asked(9), before, "not asked in its back-off");
+    bus.sleep(Duration::from_secs(1), &mut || false);
+    read(&bus, STATE, 1).unwrap();
+    bus.call(unit(9).into(), &state, CallOptions::default(), &mut || false, &mut |_| ()).unwrap_err();
+    assert_eq!(asked(9), before + 1, "once, without retries");
+    assert_eq!(bus.stats().units[&unit(9)].not_asked, 1);
+    // A stop is sent whatever was heard.
+    let stop = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..once };
+    bus.call(unit(9).into(), &Request::write(0x2000, 5), stop, &mut || false, &mut |_| ()).unwrap_err();
+    assert_eq!(asked(9), before + 2);
+}
+
+/// The link tells of the last ten exchanges.
+#[test]
+fn a_link_is_as_good_as_its_last_exchanges() {
+    let (simulator, bus) = pair();
+    for _ in 0..10 {
+        read(&bus, STATE, 1).unwrap();
+    }
+    simulator.wire().drop_answers(2);
+    read(&bus, STATE, 1).unwrap();
+    let link = bus.link(unit(1));
+    // Two time-outs (of the read and of one echo), then an echo and the read.
+    assert_eq!((link.good, link.asked), (8, 10));
 }

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
+mod doubts;
 mod echoing;
 mod hints;
 mod masters_table;
 mod odd;
 mod scripted;
+mod written;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Line, PortError, PortErrorKind};
-use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{Adu, Answer, Destination, FIRST_CONTACT, Frame, Instant, Request, SerialFormat, UnitAddress};
 
 pub(crate) const FORMAT: SerialFormat = SerialFormat::DEFAULT;
 
@@ -67,6 +67,8 @@ pub(crate) struct Wire {
     /// Fails once after the next request, as an adapter does that is pulled out and put in again.
     pub(crate) vanish_after_sending: bool,
     pub(crate) opened: u32,
+    /// Whether it leads over a gateway that hands on answers as they come.
+    pub(crate) gateway: bool,
 }
 
 impl std::fmt::Debug for Wire {
@@ -146,6 +148,10 @@ impl Line for Scripted {
     fn may_echo(&self) -> bool {
         true
     }
+
+    fn may_overtake(&self) -> bool {
+        self.0.lock().unwrap().gateway
+    }
 }
 
 /// A bus on a scripted line.
@@ -163,8 +169,26 @@ impl Rig {
         Self::echoing(|_, _| Vec::new(), script)
     }
 
+    /// As [`new`](Self::new), behind a gateway.
+    pub(crate) fn gateway(script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static) -> Self {
+        let rig = Self::fresh(true, |_, _| Vec::new(), script);
+        rig.pass(FIRST_CONTACT);
+        rig
+    }
+
     /// As [`new`](Self::new), with an adapter that sends back what `echo` says.
     pub(crate) fn echoing(
+        echo: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
+        script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
+    ) -> Self {
+        let rig = Self::fresh(false, echo, script);
+        rig.pass(FIRST_CONTACT);
+        rig
+    }
+
+    /// On a line that was just opened, so that nobody knows what another program has asked.
+    pub(crate) fn fresh(
+        gateway: bool,
         echo: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
         script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
     ) -> Self {
@@ -177,6 +201,7 @@ impl Rig {
             echo: Box::new(echo),
             vanish_after_sending: false,
             opened: 0,
+            gateway,
         }));
         let line = Scripted(Arc::clone(&wire));
         let opening = Arc::default();

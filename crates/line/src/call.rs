@@ -1,0 +1,344 @@
+//! One call from its place in the queue to its end: dead units, attempts, and what may be repeated.
+//!
+//! | kind | after silence or a damaged answer |
+//! | --- | --- |
+//! | a read | asked again, as often as the bus is set to |
+//! | a write whose words can be read back | read back; written again only where the unit shows other words |
+//! | any other write, an echo, a custom request | never: the caller is told |
+
+use std::time::Duration;
+
+use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
+
+use crate::PortErrorKind;
+use crate::backoff::Verdict;
+use crate::bus::Bus;
+use crate::error::{CallError, Failure};
+use crate::exchange::{Ask, Done};
+use crate::owner::Next;
+use crate::queue::{Priority, Turn};
+use crate::resync::Tried;
+
+/// What one call wants otherwise than the bus; `None` keeps what the bus has.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CallOptions {
+    /// The longest wait for the answer.
+    pub timeout: Option<Duration>,
+    /// How often a read is asked once more.
+    pub retries: Option<u32>,
+    /// Who goes first; `None` is [`Priority::Write`] for what changes something and [`Priority::Read`] for the rest.
+    pub priority: Option<Priority>,
+    /// Whether the request goes out at once, whatever is in doubt about the unit: for a stop, which must not wait for an
+    /// echo to come back. Its confirmation may then belong to the very same request, sent before.
+    pub in_doubt: bool,
+    /// Whether a read is asked until the same words came twice in a row: against noise that happens to match its CRC
+    /// (one damaged answer in 65 536).
+    pub verify: bool,
+    /// Where the words of a write can be read. Then a confirmation that is missing is looked for there, and the write is
+    /// repeated only while the unit shows other words. For absolute values only: what a command does, nobody can read back.
+    pub read_back: Option<u16>,
+}
+
+/// A call under way.
+pub(crate) struct Call<'b, 'r> {
+    bus: &'b Bus,
+    ask: Ask<'r>,
+    unit: Option<UnitAddress>,
+    priority: Priority,
+    retries: u32,
+    verify: bool,
+    read_back: Option<u16>,
+}
+
+impl<'b, 'r> Call<'b, 'r> {
+    pub(crate) fn new(bus: &'b Bus, ask: Ask<'r>, options: CallOptions) -> Self {
+        let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
+        Self {
+            bus,
+            unit: match ask.destination {
+                Destination::Unit(unit) => Some(unit),
+                Destination::Broadcast => None,
+            },
+            priority: options.priority.unwrap_or(kind),
+            retries: options.retries.unwrap_or(bus.options().retries),
+            verify: options.verify,
+            read_back: options.read_back.filter(|_| ask.request.is_write()),
+            ask,
+        }
+    }
+
+    /// Asks until it is answered, refused or given up.
+    pub(crate) fn run(
+        mut self,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut turn = self.turn(give_up)?;
+        if let Some(unit) = self.unit
+            && self.priority != Priority::Stop
+        {
+            self.spare_the_others(&mut turn, unit, give_up)?;
+        }
+        let result = match (self.ask.request, self.read_back) {
+            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, self.retries, give_up, take),
+            (_, Some(address)) => self.write_value(&mut turn, address, give_up, take),
+            _ => self.repeat(&mut turn, 0, give_up, take),
+        };
+        if let Some(unit) = self.unit {
+            let mut owner = self.bus.lock();
+            match &result {
+                Ok(done) => owner.dead.answered(unit, done.ended),
+                Err(error) if matches!(error.failure, Failure::NoAnswer { .. }) => owner.dead.silent(unit, error.ended),
+                Err(error) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, error.ended),
+                Err(_) => {}
+            }
+        }
+        result.map_err(|mut error| {
+            if error.failure == Failure::Interrupted {
+                error.failure = self.bus.given_up();
+            }
+            error.request = self.ask.frame();
+            error
+        })
+    }
+
+    fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b>, Box<CallError>> {
+        self.bus.queue.turn(self.priority, self.unit, give_up).ok_or_else(|| self.failed(self.bus.given_up()))
+    }
+
+    /// An error of a request that was not sent.
+    fn failed(&self, failure: Failure) -> Box<CallError> {
+        self.ask.failed(failure, None, self.bus.now(), &[])
+    }
+
+    /// A unit that was silent lately waits off the line, while others use it, for as long as it would have been silent.
+    fn spare_the_others(
+        &mut self,
+        turn: &mut Turn<'b>,
+        unit: UnitAddress,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        let mut patience = None;
+        loop {
+            let mut owner = self.bus.lock();
+            let now = self.bus.now_of(&owner);
+            let until = match owner.dead.verdict(unit, now) {
+                Verdict::AskOnce => {
+                    self.retries = 0;
+                    return Ok(());
+                }
+                Verdict::Wait(until) if owner.line().is_some() => until,
+                Verdict::Ask | Verdict::Wait(_) => return Ok(()),
+            };
+            let patience =
+                *patience.get_or_insert(now + self.ask.timeout.saturating_mul(self.retries.saturating_add(1)));
+            if now >= patience {
+                owner.stats().count(Some(unit), |counters| counters.not_asked += 1);
+                let left = until.saturating_duration_since(now);
+                return Err(self.ask.failed(Failure::NotAsked { left }, None, now, &[]));
+            }
+            drop(owner);
+            self.stand_by(turn, until.min(patience), give_up)?;
+        }
+    }
+
+    /// Leaves the line to others until `until`.
+    fn stand_by(
+        &self,
+        turn: &mut Turn<'b>,
+        until: Instant,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        turn.leave();
+        let mut given_up = false;
+        self.bus.sleep(until.saturating_duration_since(self.bus.now()), &mut || {
+            given_up = give_up();
+            given_up
+        });
+        if given_up || self.bus.is_closed() {
+            return Err(self.failed(self.bus.given_up()));
+        }
+        *turn = self.turn(give_up)?;
+        Ok(())
+    }
+
+    /// Asks, and asks again up to `retries` times while nothing comes of it.
+    ///
+    /// The first attempt takes what it takes to be sure of the unit; the others begin only within the time that the
+    /// caller allowed for them.
+    fn repeat(
+        &self,
+        turn: &mut Turn<'b>,
+        retries: u32,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut lost = None;
+        let mut until = None;
+        let mut attempt = 0;
+        loop {
+            attempt += 1;
+            let error = match self.attempt(turn, give_up, take) {
+                Ok(done) => return Ok(done),
+                Err(error) => error,
+            };
+            let until = *until.get_or_insert(error.ended + self.ask.timeout.saturating_mul(retries));
+            let is_port = matches!(error.failure, Failure::Port(_));
+            if attempt > retries || !is_passing(&error.failure) || (attempt > 1 && error.ended >= until) {
+                // How the port was lost tells more than that it is still not there.
+                return Err(lost.filter(|_| is_port).unwrap_or_else(|| self.attempted(error, attempt)));
+            }
+            lost = is_port.then_some(error);
+            if let Some(unit) = self.unit {
+                self.bus.lock().stats().count(Some(unit), |counters| counters.retries += 1);
+            }
+        }
+    }
+
+    fn attempted(&self, mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
+        if let Failure::NoAnswer { timeout, .. } = error.failure {
+            error.failure = Failure::NoAnswer { timeout, attempts };
+        }
+        error
+    }
+
+    /// Writes words that can be read back at `address`.
+    ///
+    /// Where the confirmation is missing the unit is asked what it has. What it does not show by then it has not taken:
+    /// no request from before is open any more when it answers.
+    fn write_value(
+        &self,
+        turn: &mut Turn<'b>,
+        address: u16,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let written = match *self.ask.request {
+            Request::WriteSingle { value, .. } => vec![value],
+            Request::WriteMultiple { words, .. } => words.iter().collect(),
+            _ => return self.repeat(turn, 0, give_up, take),
+        };
+        let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
+        let Ok(read) = Request::read(address, count) else {
+            return self.repeat(turn, 0, give_up, take);
+        };
+        let reading = Call { ask: Ask { request: &read, ..self.ask }, read_back: None, ..*self };
+        let mut times = 0;
+        loop {
+            let error = match self.repeat(turn, 0, give_up, take) {
+                Ok(done) => return Ok(done),
+                Err(error) => error,
+            };
+            let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else { return Err(error) };
+            times += 1;
+            let mut shows = Vec::new();
+            let shown = reading.repeat(turn, self.retries, give_up, &mut |answer| {
+                if let Answer::Read { words, .. } = answer {
+                    shows = words.iter().collect();
+                }
+            });
+            match shown {
+                Ok(done) if shows == written => return Ok(Done { sent, ended: done.ended }),
+                Ok(done) if times > self.retries => {
+                    return Err(self.ask.failed(Failure::NotTaken { times, shows }, Some(sent), done.ended, &[]));
+                }
+                Ok(_) => {}
+                // It is still not known whether the write was taken.
+                Err(_) => return Err(error),
+            }
+        }
+    }
+
+    /// Asks once, beyond doubt: with what has to come before, and as often as it takes to be sure.
+    fn attempt(
+        &self,
+        turn: &mut Turn<'b>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut tried = Tried::default();
+        let mut agreement: Option<Agreement> = None;
+        let mut asked = 0;
+        loop {
+            if !turn.let_pass(give_up) {
+                return Err(self.failed(self.bus.given_up()));
+            }
+            let mut owner = self.bus.lock();
+            if self.bus.is_closed() {
+                owner.close();
+                return Err(self.ask.failed(Failure::Closed, None, self.bus.now_of(&owner), &[]));
+            }
+            if let Err(failure) = owner.reopen(give_up) {
+                return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
+            }
+            let sure = match owner.next(&self.ask, &tried) {
+                Next::Ask(sure) => sure,
+                Next::LookForEcho => {
+                    owner.look_for_echo(&self.ask, give_up)?;
+                    continue;
+                }
+                Next::Probe(unit, probe) => {
+                    owner.probe(unit, probe, &self.ask, &mut tried, give_up)?;
+                    continue;
+                }
+                Next::Wait(until) => {
+                    drop(owner);
+                    self.stand_by(turn, until, give_up)?;
+                    continue;
+                }
+                Next::GiveUp => {
+                    let now = self.bus.now_of(&owner);
+                    return Err(match tried.failure {
+                        Some(error) if !matches!(error.failure, Failure::Refused { .. }) => error,
+                        _ => self.ask.failed(Failure::Doubtful, None, now, &[]),
+                    });
+                }
+            };
+            let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(self.verify)));
+            let Some(unit) = self.unit.filter(|_| !agreement.is_immediate()) else {
+                return owner.exchange(&self.ask, give_up, take);
+            };
+            if asked == 1 {
+                owner.stats().count(Some(unit), |counters| counters.verified += 1);
+            }
+            asked += 1;
+            let mut agreed = false;
+            let result = owner.exchange(&self.ask, give_up, &mut |answer| {
+                agreed = agreement.hear(unit, &answer);
+                if agreed {
+                    take(answer);
+                }
+            });
+            match result {
+                Ok(done) if agreed => return Ok(done),
+                Ok(done) if asked >= u32::from(agreement.longest()) => {
+                    return Err(self.ask.failed(Failure::Disagreeing { asked }, Some(done.sent), done.ended, &[]));
+                }
+                Ok(_) => {}
+                Err(error) => match error.failure {
+                    Failure::Refused { function, code } => {
+                        let enough = agreement.hear(unit, &Answer::exception(function, code));
+                        if enough || asked >= u32::from(agreement.longest()) {
+                            return Err(error);
+                        }
+                    }
+                    _ => return Err(error),
+                },
+            }
+        }
+    }
+}
+
+/// Whether the same read may well succeed the next time.
+fn is_passing(failure: &Failure) -> bool {
+    match failure {
+        Failure::Busy { .. } | Failure::Doubtful | Failure::Disagreeing { .. } => true,
+        Failure::Port(error) => error.kind == PortErrorKind::Lost,
+        other => is_unanswered(other),
+    }
+}
+
+/// Whether the request went out, and no right answer came.
+fn is_unanswered(failure: &Failure) -> bool {
+    matches!(failure, Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_))
+}

@@ -1,0 +1,146 @@
+//! Answers that may belong to another question: another program's, a unit's that knows no echo, a gateway's.
+
+use std::time::Duration;
+
+use drivebus_line::{CallOptions, Failure};
+use drivebus_rtu::{FIRST_CONTACT, Request};
+
+use crate::scripted::{Pieces, Rig, after, at_once, millis, right, unit};
+
+/// The answer to what another program asked last, register 100, and then the right one to whatever is asked.
+fn owing(delay: Duration) -> impl FnMut(usize, &[u8]) -> Pieces + Send + 'static {
+    move |number, request| match number {
+        0 => {
+            let owed = right(&[1, 3, 0, 100, 0, 1, 0xC5, 0xD5]);
+            [after(delay, &owed), after(delay + millis(10), &right(request))].concat()
+        }
+        _ => at_once(&right(request)),
+    }
+}
+
+#[test]
+fn an_answer_to_another_programs_question_is_never_ours() {
+    for delay in [0, 5, 100, 480] {
+        let rig = Rig::fresh(false, |_, _| Vec::new(), owing(millis(delay)));
+        assert_eq!(rig.read(200, 1).unwrap(), [200], "{delay} ms");
+        let stats = rig.bus.stats();
+        assert_eq!(stats.total.resyncs, 1, "{stats:?}");
+        // Once is enough.
+        assert_eq!(rig.read(300, 1).unwrap(), [300]);
+        assert_eq!(rig.bus.stats().total.resyncs, 1);
+    }
+}
+
+#[test]
+fn nobody_is_probed_on_a_line_that_was_listened_to() {
+    let rig = Rig::new(|_, request| at_once(&right(request)));
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    assert_eq!(rig.wire.lock().unwrap().sent.len(), 1);
+}
+
+fn mute(lost: usize) -> impl FnMut(usize, &[u8]) -> Pieces + Send + 'static {
+    let mut reads = 0;
+    move |_, request| {
+        if request[1] == 8 {
+            return Vec::new();
+        }
+        reads += 1;
+        if reads == lost { after(millis(503), &right(request)) } else { at_once(&right(request)) }
+    }
+}
+
+#[test]
+fn a_unit_that_knows_no_echo_is_asked_when_first_contact_is_over() {
+    let rig = Rig::fresh(false, |_, _| Vec::new(), mute(0));
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    assert!(rig.wire.lock().unwrap().now.as_nanos() < 1_100_000_000, "within a tenth of a second more");
+}
+
+#[test]
+fn a_unit_that_knows_no_echo_is_settled_by_a_read_of_another_length() {
+    let rig = Rig::new(mute(2));
+    assert_eq!(rig.read(7, 1).unwrap(), [7]);
+    rig.read(100, 1).unwrap_err();
+    assert_eq!(rig.read(200, 1).unwrap(), [200], "in one call, though nothing is repeated on this bus");
+    assert_eq!(rig.sent(&Request::read(7, 2).unwrap()), 1, "the register that is known to be readable");
+    let stats = rig.bus.stats();
+    assert_eq!((stats.total.late, stats.total.resyncs), (1, 2), "{stats:?}");
+}
+
+/// Behind a gateway the echo comes back before the answer that is late.
+#[test]
+fn behind_a_gateway_the_same_words_have_to_come_twice() {
+    let late = |number: usize, request: &[u8]| match number {
+        0 => after(millis(540), &right(request)),
+        // The gateway has it in hand, and hands on the other one.
+        2 => after(millis(60), &right(request)),
+        _ => at_once(&right(request)),
+    };
+    let rig = Rig::gateway(late);
+    rig.read(100, 1).unwrap_err();
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    assert!(rig.sent(&Request::read(200, 1).unwrap()) >= 2);
+    assert_eq!(rig.bus.stats().total.verified, 1);
+    // An hour later nothing is late any more.
+    rig.pass(Duration::from_secs(3_600));
+    let before = rig.wire.lock().unwrap().sent.len();
+    assert_eq!(rig.read(300, 1).unwrap(), [300]);
+    assert_eq!(rig.wire.lock().unwrap().sent.len(), before + 1);
+}
+
+/// A write could be confirmed by the answer to the same one before: nothing but time tells.
+#[test]
+fn behind_a_gateway_a_write_waits_until_no_earlier_one_can_confirm_it() {
+    let rig = Rig::gateway(|number, request| match number {
+        // The adapter is looked at by a read, then comes the write.
+        1 => after(millis(700), &right(request)),
+        3 => Vec::new(), // lost on its way, never written
+        _ => at_once(&right(request)),
+    });
+    let write = Request::write(100, 5);
+    rig.ask(&write).unwrap_err();
+    let error = rig.ask(&write).unwrap_err();
+    assert!(matches!(error.failure, Failure::NoAnswer { .. }), "the late confirmation is not this one's: {error}");
+    assert_eq!(rig.sent(&write), 2);
+}
+
+#[test]
+fn a_read_can_be_verified() {
+    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    let read = Request::read(100, 1).unwrap();
+    let answer = |word: u16| {
+        let mut answer = right(&[1, 3, 0, 0, 0, 1, 0x84, 0x0A]);
+        answer[3..5].copy_from_slice(&word.to_be_bytes());
+        let crc = drivebus_rtu::crc16(&answer[..5]).to_le_bytes();
+        answer[5..].copy_from_slice(&crc);
+        answer
+    };
+    let rig = Rig::new(move |number, _| at_once(&answer(if number == 0 { 0xBAD } else { 100 })));
+    let mut words = Vec::new();
+    let mut take = |given: drivebus_rtu::Answer<'_>| {
+        if let drivebus_rtu::Answer::Read { words: given, .. } = given {
+            words.extend(given.iter());
+        }
+    };
+    rig.call(unit(1).into(), &read, verify, &mut || false, &mut take).unwrap();
+    assert_eq!((words, rig.sent(&read)), (vec![100], 3));
+
+    let rig = Rig::new(move |number, _| at_once(&answer(u16::try_from(number).unwrap())));
+    let error = rig.call(unit(1).into(), &read, verify, &mut || false, &mut |_| ()).unwrap_err();
+    assert!(matches!(error.failure, Failure::Disagreeing { asked: 4 }), "{error}");
+}
+
+/// A unit that refuses the echo, at a line that was just opened: its refusal could be that of another program's echo.
+#[test]
+fn a_refusal_of_the_echo_is_no_proof_at_first_contact() {
+    let rig = Rig::fresh(
+        false,
+        |_, _| Vec::new(),
+        |_, request| {
+            let refusal = [1, 0x88, 0x01, 0x87, 0xC0];
+            at_once(if request[1] == 8 { &refusal } else { return at_once(&right(request)) })
+        },
+    );
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+    assert!(rig.wire.lock().unwrap().now >= drivebus_rtu::Instant::ZERO + FIRST_CONTACT);
+}
