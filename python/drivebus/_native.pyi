@@ -131,13 +131,45 @@ class Bus:
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock; a signal ends it at once."""
     def read(
-        self, unit: int, address: int, count: int, /, *, timeout: float | None = None, retries: int | None = None
+        self,
+        unit: int,
+        address: int,
+        count: int,
+        /,
+        *,
+        timeout: float | None = None,
+        retries: int | None = None,
+        urgent: bool = False,
+        verify: bool = False,
     ) -> list[int]:
-        """03H: *count* words (1..=125) of *unit* (1..=247) from *address*."""
-    def read_stamped(self, unit: int, address: int, count: int, /) -> tuple[list[int], float, float]:
+        """03H: *count* words (1..=125) of *unit* (1..=247) from *address*.
+
+        *urgent*: before all who wait. *verify*: until the same words came twice in a row.
+        """
+    def read_stamped(
+        self, unit: int, address: int, count: int, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and the answer was complete."""
-    def write(self, unit: int, address: int, value: int | Sequence[int], /, *, urgent: bool = False) -> None:
-        """06H (an int) or 10H (a sequence). Sent once; *urgent* before all who wait, whatever is in doubt."""
+    def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+    ) -> None:
+        """06H (an int) or 10H (a sequence). Sent once; *urgent* before all who wait, whatever is in doubt.
+
+        With *read_back*, the address where the words can be read, a missing confirmation is looked for there, and the
+        write is repeated only while the unit shows other words.
+        """
+    def link(self, unit: int, /) -> tuple[int, int]:
+        """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost."""
     def broadcast(self, address: int, value: int | Sequence[int], /) -> None:
         """06H or 10H to every unit; returns after the turnaround delay."""
     def echo(self, unit: int, word: int | None = None, /, *, timeout: float | None = None) -> float:

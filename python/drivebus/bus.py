@@ -16,7 +16,7 @@ from drivebus.drive import Drive
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
 from drivebus.profile import Profile, identify, profiles
 from drivebus.sim import Simulator
-from drivebus.values import Found, Stats
+from drivebus.values import Found, Link, Stats
 
 __all__ = ["Bus"]
 
@@ -132,24 +132,37 @@ class Bus:
         """Waits on the line's clock. Ctrl-C ends it at once."""
         self._native.sleep(checks.number("seconds", seconds, 0.0))
 
-    def read(self, unit: int, address: int, count: int = 1) -> list[int]:
+    def read(self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
         """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.
 
         Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
 
+        An *urgent* read overtakes all who wait: for confirming a stop. With *verify* it is asked until the same words
+        came twice in a row: against noise that happens to match its CRC, as one damaged answer in 65 536 does.
+
         Raises:
-            NoAnswer, BadAnswer: After the bus's retries.
+            NoAnswer, BadAnswer: After the bus's retries; with *verify*, also where the words change all the time.
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
-        return self._native.read(checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125))
+        unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+        return self._native.read(unit, address, count, urgent=urgent, verify=verify)
 
-    def read_stamped(self, unit: int, address: int, count: int = 1) -> tuple[list[int], float, float]:
+    def read_stamped(
+        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and at which the answer was complete."""
-        return self._native.read_stamped(
-            checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
-        )
+        unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+        return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify)
 
-    def write(self, unit: int, address: int, value: int | Sequence[int], *, urgent: bool = False) -> None:
+    def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+    ) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
 
         Nothing here asks what stands at *address*: a word in a command register moves the motor.
@@ -158,13 +171,31 @@ class Bus:
         sent. An *urgent* write does without it and overtakes all who wait: that is for a stop, which a drive may hear
         although nothing is heard of it. Its confirmation may belong to the very same write, sent before.
 
+        With *read_back*, the address at which the same words can be read, a confirmation that is missing is looked for
+        there, and the write is repeated (the bus's retries) only while the unit shows other words. That is for absolute
+        values such as a setpoint; what a command did, nobody can read back.
+
         Raises:
             NotAllowed: An argument is out of range, or the bus is read-only. Nothing was sent.
             NoAnswer, BadAnswer, PortError: The unit may have taken it all the same, unless the error's `started` is
                 None: then it was not sent.
             Refused: The unit did not take it.
+            Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
         """
-        self._native.write(checks.unit(unit), checks.address(address), checks.payload(value), urgent=urgent)
+        if read_back is not None:
+            read_back = checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
+        self._native.write(
+            checks.unit(unit), checks.address(address), checks.payload(value), urgent=urgent, read_back=read_back
+        )
+
+    def link(self, unit: int) -> Link:
+        """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
+        return Link(*self._native.link(checks.unit(unit)))
+
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost. Another drive may answer behind it."""
+        return self._native.reconnects
 
     def broadcast(self, address: int, value: int | Sequence[int]) -> None:
         """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once."""

@@ -245,6 +245,7 @@ class TestProfileFolders:
 def test_a_family_without_a_profile_is_not_taken_for_another(
     virtual: Simulator, virtual_bus: Bus, code: int, says: str
 ) -> None:
+    virtual_bus.read(1, 0x2100)  # first contact is over
     body = bytes([1, 3, 2, *code.to_bytes(2, "big")])
     virtual.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
     with pytest.raises(NotAllowed, match=says):

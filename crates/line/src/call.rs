@@ -150,12 +150,12 @@ impl<'b, 'r> Call<'b, 'r> {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
         turn.leave();
-        let mut given_up = false;
+        let mut ended = false;
         self.bus.sleep(until.saturating_duration_since(self.bus.now()), &mut || {
-            given_up = give_up();
-            given_up
+            ended = give_up();
+            ended
         });
-        if given_up || self.bus.is_closed() {
+        if ended || self.bus.is_closed() {
             return Err(self.failed(self.bus.given_up()));
         }
         *turn = self.turn(give_up)?;
@@ -186,20 +186,13 @@ impl<'b, 'r> Call<'b, 'r> {
             let is_port = matches!(error.failure, Failure::Port(_));
             if attempt > retries || !is_passing(&error.failure) || (attempt > 1 && error.ended >= until) {
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.filter(|_| is_port).unwrap_or_else(|| self.attempted(error, attempt)));
+                return Err(lost.filter(|_| is_port).unwrap_or_else(|| attempted(error, attempt)));
             }
             lost = is_port.then_some(error);
             if let Some(unit) = self.unit {
                 self.bus.lock().stats().count(Some(unit), |counters| counters.retries += 1);
             }
         }
-    }
-
-    fn attempted(&self, mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
-        if let Failure::NoAnswer { timeout, .. } = error.failure {
-            error.failure = Failure::NoAnswer { timeout, attempts };
-        }
-        error
     }
 
     /// Writes words that can be read back at `address`.
@@ -232,12 +225,12 @@ impl<'b, 'r> Call<'b, 'r> {
             let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else { return Err(error) };
             times += 1;
             let mut shows = Vec::new();
-            let shown = reading.repeat(turn, self.retries, give_up, &mut |answer| {
+            let read = reading.repeat(turn, self.retries, give_up, &mut |answer| {
                 if let Answer::Read { words, .. } = answer {
                     shows = words.iter().collect();
                 }
             });
-            match shown {
+            match read {
                 Ok(done) if shows == written => return Ok(Done { sent, ended: done.ended }),
                 Ok(done) if times > self.retries => {
                     return Err(self.ask.failed(Failure::NotTaken { times, shows }, Some(sent), done.ended, &[]));
@@ -327,6 +320,14 @@ impl<'b, 'r> Call<'b, 'r> {
             }
         }
     }
+}
+
+/// `error`, which was the last of so many attempts.
+fn attempted(mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
+    if let Failure::NoAnswer { timeout, .. } = error.failure {
+        error.failure = Failure::NoAnswer { timeout, attempts };
+    }
+    error
 }
 
 /// Whether the same read may well succeed the next time.

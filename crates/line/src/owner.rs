@@ -177,7 +177,11 @@ impl Owner {
         ask: &Ask<'_>,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
-        let Ok(read) = Request::read(0, 1) else {
+        let address = match *ask.request {
+            Request::ReadHolding { address, .. } => address,
+            _ => 0,
+        };
+        let Ok(read) = Request::read(address, 1) else {
             return Ok(());
         };
         match self.exchange(&Ask { request: &read, in_doubt: true, ..*ask }, give_up, &mut |_| ()) {

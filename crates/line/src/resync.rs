@@ -72,14 +72,23 @@ pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
 struct Known {
     /// It has answered something.
     alive: bool,
-    /// It has returned an echo.
-    echoes: bool,
-    /// It was silent on an echo, and then answered a read.
-    mute: bool,
+    on_echo: OnEcho,
     /// A register that it answered a read of.
     readable: Option<u16>,
     /// Nothing is known of it, and the latest probe was an echo.
     echo_was_last: bool,
+}
+
+/// What a unit makes of an echo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum OnEcho {
+    /// Nobody knows yet.
+    #[default]
+    Unknown,
+    /// It has returned one.
+    Returns,
+    /// It was silent on one, and then answered a read.
+    Silent,
 }
 
 impl Resync {
@@ -88,7 +97,7 @@ impl Resync {
         let known = self.0.entry(unit).or_default();
         known.alive = true;
         match request {
-            Request::Echo { .. } if !refused => (known.echoes, known.mute) = (true, false),
+            Request::Echo { .. } if !refused => known.on_echo = OnEcho::Returns,
             Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
             _ => {}
         }
@@ -110,14 +119,14 @@ impl Resync {
             _ => known.readable,
         };
         let other_read = || {
-            let address = address.filter(|_| !tried.other_read && !known.echoes)?;
+            let address = address.filter(|_| !tried.other_read && known.on_echo != OnEcho::Returns)?;
             (1..=MAX_WORDS)
                 .filter_map(|count| Some((count, Request::read(address, count).ok()?)))
                 .find(|(_, read)| master.tells_apart(now, unit, read))
                 .map(|(count, _)| Probe::OtherRead { address, count })
         };
         if known.alive {
-            return if known.mute { other_read().or(echo) } else { echo.or_else(other_read) };
+            return if known.on_echo == OnEcho::Silent { other_read().or(echo) } else { echo.or_else(other_read) };
         }
         // Silence is all that is known: one probe an attempt, so that it costs no more than an attempt.
         if tried.echo || tried.other_read {
@@ -130,7 +139,7 @@ impl Resync {
 
     /// `unit` was silent on an echo, and then answered a read of another length.
     pub(crate) fn is_mute(&mut self, unit: UnitAddress) {
-        self.0.entry(unit).or_default().mute = true;
+        self.0.entry(unit).or_default().on_echo = OnEcho::Silent;
     }
 }
 
