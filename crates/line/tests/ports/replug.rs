@@ -171,17 +171,19 @@ fn is_somebody_elses(path: &str) -> bool {
 
 #[test]
 fn a_server_that_closes_is_connected_to_again() {
+    /// Requests on one connection: a look at the adapter and an echo, and four reads.
+    const SERVED: usize = 6;
     let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     let (opener, tries) =
         counted(Box::new(move || Ok(Box::new(RtuOverTcp::connect("127.0.0.1", port, &format(Parity::None), LONG)?))));
     let serving = thread::spawn(move || {
         for _ in 0..2 {
-            slave(listener.accept().unwrap().0, 4).join().unwrap();
+            slave(listener.accept().unwrap().0, SERVED).join().unwrap();
         }
         let (last, _) = listener.accept().unwrap();
         drop(listener); // nobody may be let in any more when this one ends
-        slave(last, 4).join().unwrap();
+        slave(last, SERVED).join().unwrap();
     });
     let bus = open(opener);
     // A read that was lost with the connection is asked again over the next one: nobody notices.
