@@ -1,14 +1,14 @@
 //! Invariant: whatever bytes come at whatever moments, the master tells an answer only if the bytes that came since it
-//! sent hold a valid one, ends every request within its time, and takes a unit out of quarantine only for the echo of
-//! the word that it was sent.
+//! sent hold a valid one, ends every request within its time, and takes a unit out of quarantine only for an answer that
+//! could not be mistaken, or when its time is over.
 //!
-//! The model beside it knows what was sent, what came since, who is in quarantine, and when each request must end.
+//! The model beside it knows what was sent, what came since, what each unit left open, and when each request must end.
 
 use std::time::Duration;
 
 use drivebus_rtu::{
-    Answer, AnswerError, AnswerLength, BeginError, Destination, Event, Instant, Master, Request, TURNAROUND, Tally,
-    UnitAddress,
+    Answer, AnswerError, AnswerLength, BeginError, Destination, Event, FIRST_CONTACT, Instant, Master, PATIENCE,
+    Request, TURNAROUND, Tally, UnitAddress,
 };
 
 use crate::oracle::{self, Asked, Length, Verdict};
@@ -28,7 +28,7 @@ pub fn master(data: &[u8]) {
         strips_echo: how & 1 == 1,
         now: Instant::ZERO,
         quiet_from: Instant::ZERO,
-        open: [false; UNITS as usize + 1],
+        units: Default::default(),
         sent: Vec::new(),
         fed: 0,
         lumps: Lumps::default(),
@@ -58,6 +58,43 @@ struct Progress {
     heard: Vec<u8>,
 }
 
+/// What the model knows of one unit.
+#[derive(Debug, Default)]
+struct Known {
+    /// PDUs of requests that it left open, and when each was given up.
+    open: Vec<(Vec<u8>, Instant)>,
+    /// It has returned an echo, ever.
+    echoed: bool,
+    /// Until when another program's question may be answered.
+    strange_until: Option<Instant>,
+}
+
+impl Known {
+    fn is_strange(&self, now: Instant) -> bool {
+        self.strange_until.is_some_and(|until| now < until)
+    }
+
+    /// Whether nobody who knows all this would ask it as if nothing were open.
+    fn is_doubtful(&self, now: Instant) -> bool {
+        let owed = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && (self.echoed || now < *given_up + PATIENCE);
+        self.is_strange(now) || self.open.iter().any(owed)
+    }
+
+    fn settle(&mut self) {
+        self.open.clear();
+        self.strange_until = None;
+    }
+
+    /// Whether a read like `pdu` is open, so that its answer looks the same.
+    fn has_read_like(&self, pdu: &[u8]) -> bool {
+        self.open.iter().any(|(open, _)| open[0] == 3 && open[3..5] == pdu[3..5])
+    }
+
+    fn has_open_echo(&self, now: Instant) -> bool {
+        self.open.iter().any(|(open, given_up)| open[0] == 8 && now < *given_up + PATIENCE)
+    }
+}
+
 struct Run {
     master: Master,
     silence: Duration,
@@ -65,8 +102,8 @@ struct Run {
     now: Instant,
     /// Since when nothing was on the line, as far as the master can know.
     quiet_from: Instant,
-    /// Who is in quarantine; number 0 is nobody.
-    open: [bool; UNITS as usize + 1],
+    /// Number 0 is nobody.
+    units: [Known; UNITS as usize + 1],
     sent: Vec<Vec<u8>>,
     fed: usize,
     lumps: Lumps,
@@ -78,13 +115,13 @@ impl Run {
         let number = 1 + (what >> 4) % UNITS;
         let Ok(unit) = UnitAddress::new(number) else { return };
         match what & 0x0F {
-            0 => {
-                self.master.release(unit);
-                self.open[usize::from(number)] = false;
-            }
+            0 => self.now = self.now + PATIENCE / 2,
             1 => {
-                self.master.reopened(self.now);
+                self.master.opened(self.now);
                 self.quiet_from = self.quiet_from.max(self.now);
+                for known in &mut self.units {
+                    known.strange_until = Some(self.now + FIRST_CONTACT);
+                }
             }
             // Something comes although nothing was asked.
             2 | 3 => {
@@ -142,16 +179,21 @@ impl Run {
         } else {
             self.master.begin(self.now, destination, &request, timeout)
         };
-        let open = self.open[usize::from(destination.to_wire())];
+        let known = &self.units[usize::from(destination.to_wire())];
+        let doubtful = known.is_doubtful(self.now);
         let is_echo = matches!(request, Request::Echo { .. });
         match (begun, destination) {
             (Err(BeginError::BroadcastRead), Destination::Broadcast) => return assert!(!request.is_write()),
             (Err(BeginError::Quarantine { unit }), Destination::Unit(asked)) => {
-                return assert!(open && !is_echo && !in_doubt && unit == asked);
+                let may_owe = !known.open.is_empty() || known.is_strange(self.now);
+                return assert!(may_owe && !is_echo && !in_doubt && unit == asked);
             }
             (begun, _) => assert_eq!(begun, Ok(())),
         }
-        assert!(!open || is_echo || in_doubt, "a unit in quarantine was asked {request:?}");
+        let other_read = matches!(request, Request::ReadHolding { .. })
+            && !known.is_strange(self.now)
+            && !known.has_read_like(&pdu_of(&request));
+        assert!(!doubtful || is_echo || in_doubt || other_read, "a unit in quarantine was asked {request:?}");
         let length = match kind & 7 {
             6 => Length::Any,
             7 => Length::Given(len),
@@ -218,7 +260,7 @@ impl Run {
     }
 
     fn give_up(&mut self, job: &Job, progress: &Progress) {
-        let was_sent = self.master.abort();
+        let was_sent = self.master.abort(self.now);
         assert_eq!(was_sent, progress.transmitted);
         self.leave_open(job, was_sent);
     }
@@ -256,7 +298,9 @@ impl Run {
             }
         };
         let is_echo = job.asked.pdu[0] == 8;
-        let open = self.open[usize::from(unit)];
+        let now = self.now;
+        let known = &mut self.units[usize::from(unit)];
+        let is_apart = job.asked.pdu[0] == 3 && !known.is_strange(now) && !known.has_read_like(&job.asked.pdu);
         match said {
             Said::Answer { pdu, exception } => {
                 let verdict = job.asked.judge(&pdu);
@@ -266,12 +310,30 @@ impl Run {
                 let copies = 1 + usize::from(self.strips_echo && wire == job.frame);
                 let came = heard.windows(wire.len()).filter(|part| *part == wire).count();
                 assert!(came >= copies, "{wire:02X?} told, {heard:02X?} came");
-                if is_echo {
-                    self.open[usize::from(unit)] = false;
+                match (is_echo, exception) {
+                    (true, false) => {
+                        known.settle();
+                        known.echoed = true;
+                    }
+                    // The refusal of an earlier echo looks the same.
+                    (true, true) if known.is_strange(now) || known.has_open_echo(now) => {
+                        known.open.push((job.asked.pdu.clone(), now));
+                    }
+                    (true, true) => {
+                        // With so much open that not all is remembered, the master waits for an echo.
+                        if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {
+                            known.settle();
+                        } else {
+                            known.open.push((job.asked.pdu.clone(), now));
+                        }
+                    }
+                    (false, true) => assert!(!known.is_doubtful(now) || !is_apart, "a refusal that may be late"),
+                    (false, false) if is_apart && known.is_doubtful(now) => {
+                        known.settle();
+                    }
+                    (false, false) => {}
                 }
-                if is_echo || !open {
-                    self.quiet_from = self.now;
-                }
+                self.quiet_from = self.now;
             }
             Said::Wrong { frame, error } => {
                 let Some((address, pdu)) = oracle::frame(&frame) else {
@@ -279,12 +341,11 @@ impl Run {
                 };
                 assert!(address == unit && pdu[0] & 0x7F == job.asked.pdu[0], "{frame:02X?} is foreign");
                 assert_eq!(job.asked.judge(pdu), Verdict::Wrong);
-                assert!(!(open && is_echo && matches!(error, AnswerError::Echo { .. })), "a late echo is no answer");
+                let owes = !known.open.is_empty();
+                assert!(!(owes && is_echo && matches!(error, AnswerError::Echo { .. })), "a late echo is no answer");
                 assert!(heard.windows(frame.len()).any(|part| part == frame));
-                if is_echo || !open {
-                    self.quiet_from = self.now;
-                }
-                self.open[usize::from(unit)] = true;
+                self.quiet_from = self.now;
+                self.leave_open(job, true);
             }
             Said::Corrupt(bytes) => {
                 assert!(!bytes.is_empty() && heard.windows(bytes.len()).any(|part| part == bytes));
@@ -302,7 +363,7 @@ impl Run {
 
     fn leave_open(&mut self, job: &Job, sent: bool) {
         if let (Destination::Unit(unit), true) = (job.destination, sent) {
-            self.open[usize::from(unit.get())] = true;
+            self.units[usize::from(unit.get())].open.push((job.asked.pdu.clone(), self.now));
         }
     }
 
@@ -312,7 +373,10 @@ impl Run {
         assert!(self.master.deadline().is_none_or(|deadline| deadline > self.now), "a deadline in the past for ever");
         for number in 1..=UNITS {
             let unit = UnitAddress::new(number).unwrap_or(UnitAddress::MIN);
-            assert_eq!(self.master.in_quarantine(unit), self.open[usize::from(number)], "unit {number}");
+            let (known, in_quarantine) = (&self.units[usize::from(number)], self.master.in_quarantine(self.now, unit));
+            assert!(in_quarantine || !known.is_doubtful(self.now), "unit {number} is free, {known:?}");
+            let may_owe = !known.open.is_empty() || known.is_strange(self.now);
+            assert!(!in_quarantine || may_owe, "unit {number} owes nothing");
         }
         let Tally { late, foreign, noise, own_echo, .. } = self.master.take_tally();
         let frames = usize::try_from(late + foreign + own_echo).unwrap_or(usize::MAX);
