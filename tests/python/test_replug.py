@@ -70,8 +70,13 @@ class Poll(threading.Thread):
             assert self.moved.wait_for(lambda: getattr(self, name) >= enough, PATIENCE), f"no more {name}"
 
 
+def open_files() -> int:
+    return sum(1 for _ in Path("/proc/self/fd").iterdir())
+
+
 def test_twenty_times_under_another_name(simulator: Simulator) -> None:
     with Bus(simulator.port) as bus:
+        open_before = open_files()
         poll = Poll(bus)
         poll.start()
         names = [simulator.port]
@@ -85,6 +90,7 @@ def test_twenty_times_under_another_name(simulator: Simulator) -> None:
             assert bus.stats()["reconnects"] == round_number
         poll.ending = True
         poll.join(PATIENCE)
+        assert open_files() == open_before, "each lost port was closed"
     assert poll.wrong == []
     assert all(before != after for before, after in itertools.pairwise(names))
 

@@ -47,7 +47,8 @@ impl Adapter {
             Some(known) => self.whereabouts(known)?,
             None => self.name.clone(),
         };
-        let tty = Tty::open(&name, &self.format, &self.options).map_err(|error| self.still_missing(error))?;
+        let tty = Tty::open(&name, &self.format, &self.options)
+            .map_err(|error| if self.known.is_some() { just_back(error) } else { error })?;
         // Asked of what is open, whose number is given to nothing else meanwhile; the name may lead elsewhere by now.
         let found = tty.device_number().and_then(|number| self.places.identify(number));
         self.known = match (self.known.take(), found) {
@@ -83,19 +84,6 @@ impl Adapter {
         }
     }
 
-    /// `error` of an opening, with what is known of the adapter.
-    fn still_missing(&self, error: PortError) -> PortError {
-        match (&self.known, error.kind) {
-            (Some(known), PortErrorKind::NotFound) => self.missing(known, None),
-            // It was opened before, so the user is not to blame.
-            (Some(_), PortErrorKind::Denied) => {
-                let message = format!("{}; right after plugging in, the rights may not be set yet", error.message);
-                PortError { message, ..error }
-            }
-            _ => error,
-        }
-    }
-
     /// `known` cannot be found; `there_now` has its name.
     fn missing(&self, known: &Identity, there_now: Option<&Identity>) -> PortError {
         let message = match there_now {
@@ -106,5 +94,29 @@ impl Adapter {
             None => format!("its adapter is not plugged in: {known}; plug it in again; {}", present_ports()),
         };
         PortError::new(PortErrorKind::NotFound, &self.name, message)
+    }
+}
+
+/// `error` of opening a port again: its user could open it before, so it is not the user who lacks a right.
+fn just_back(error: PortError) -> PortError {
+    match error.kind {
+        PortErrorKind::Denied => {
+            let message =
+                format!("{}; right after plugging in, the rights may not be set yet: ask again", error.message);
+            PortError { message, ..error }
+        }
+        _ => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rights_that_are_not_set_yet_are_nobodys_fault() {
+        let message_of = |kind| just_back(PortError::new(kind, "/dev/ttyUSB0", "it fails")).to_string();
+        assert_eq!(message_of(PortErrorKind::Busy), "/dev/ttyUSB0: it fails");
+        assert!(message_of(PortErrorKind::Denied).starts_with("/dev/ttyUSB0: it fails; right after plugging in"));
     }
 }
