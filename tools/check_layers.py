@@ -41,7 +41,7 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
 }
 
 # Modules of ours that each Python module may import. `drivebus` is the public package itself; `__init__` makes it.
-# What speaks to a drive (`registers`, `motion`, `drive`) knows a bus by its protocol only.
+# What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
 PYTHON: dict[str, set[str]] = {
     "errors": set(),
     "values": set(),
@@ -49,9 +49,12 @@ PYTHON: dict[str, set[str]] = {
     "protocols": {"values"},
     "rtu": {"_native", "errors"},
     "profile": {"_native", "checks", "errors", "values"},
-    "registers": {"checks", "errors", "protocols", "values"},
+    "identity": {"errors", "protocols"},
+    "registers": {"checks", "errors", "identity", "protocols", "values"},
     "motion": {"checks", "errors", "protocols", "registers", "values"},
-    "drive": {"checks", "errors", "motion", "protocols", "values"},
+    "watchdog": {"checks", "errors", "motion", "values"},
+    "safeguard": set(),
+    "drive": {"checks", "errors", "motion", "protocols", "safeguard", "values", "watchdog"},
     "sim": {"_native", "checks", "errors", "profile"},
     "ports": {"_native", "checks", "errors", "profile", "sim"},
     "bus": {"_native", "checks", "drive", "errors", "ports", "profile", "sim", "values"},

@@ -265,10 +265,12 @@ class Bus:
             NoAnswer, BadAnswer, Refused: The drive did not tell; only if *profile* is None.
         """
         unit = checks.unit(unit)
-        return Drive(self, unit, self._ask_profile(unit) if profile is None else Profile.find(profile))
-
-    def _ask_profile(self, unit: int) -> Profile:
+        if profile is not None:
+            return Drive(self, unit, Profile.find(profile))
         [code] = self.read(unit, _identification_address())
+        return Drive(self, unit, self._profile_of(unit, code), code)
+
+    def _profile_of(self, unit: int, code: int) -> Profile:
         family = identify(code)
         if family not in profiles():
             known = "no list names" if family is None else f"is a {family}, a family without a profile yet"

@@ -12,21 +12,25 @@ from contextlib import contextmanager
 from drivebus import checks
 from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.motion import POLL_INTERVAL, Motion, Seen
+from drivebus.safeguard import Guard
 from drivebus.values import Control, ControlItem, Fault, Snapshot, State, Status
+from drivebus.watchdog import Watchdog
 
 __all__ = ["Drive"]
 
 _STANDSTILL = 0.05
 """Output frequency in Hz below which a drive that has stopped counts as stopped."""
 
-_STOP_ATTEMPTS = 3
+_END_ATTEMPTS = 3
+"""How often a stop is sent that is not confirmed, before the drive is told to coast."""
 
 
 class Drive(Motion):
     """A drive, as `drivebus.Bus.drive` gives it.
 
-    Nothing is kept between calls but what was written to RAM and how often EEPROM was written: every property asks the
-    drive. Safe from any thread; a command and its confirmation are several requests, between which others may come.
+    Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,
+    and, for errors, its last state: every property asks the drive. Safe from any thread; a command and its confirmation
+    are several requests, between which others may come.
     """
 
     def __repr__(self) -> str:
@@ -164,38 +168,91 @@ class Drive(Motion):
         return control
 
     @contextmanager
-    def running(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0) -> Iterator[Drive]:
+    def running(
+        self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False
+    ) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
         A stop that is not confirmed is sent again, and in the end the drive is told to coast. An error from inside the
         block is raised as it is; if the drive could not be stopped either, its note says so.
 
+        The end of the program stops it too: what is still inside such a block when the interpreter ends, and, while the
+        main thread is inside one, SIGTERM and SIGHUP (unless the program listens to them itself), which raise
+        SystemExit there. What no program sees, such as kill -9, is for `watchdog`.
+
         Raises:
             NotAllowed, Refused, NoAnswer, BadAnswer, PortError: From `run`, which was not sent or not taken: the
                 motor is left as it was. Or from stopping, when the block itself went well.
-            Unconfirmed: From `run`, after which it is stopped; or from stopping.
+            Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn.
         """
+        with self._moving(lambda: self.run(hz, reverse, confirm=confirm, force=force), self.stop):
+            yield self
+
+    @contextmanager
+    def jogging(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> Iterator[Drive]:
+        """Jogs the motor inside a `with` block and ends the jog whatever happens there. Otherwise as `running`."""
+        with self._moving(lambda: self.jog(reverse, confirm=confirm, force=force), self.jog_stop):
+            yield self
+
+    def watchdog(self, timeout: float, action: str = "coast") -> Watchdog:
+        """Makes the drive act by itself when it hears nothing for *timeout* seconds, and keeps it from that until then.
+
+            with drive.watchdog(1.0), drive.running(hz=10.0):
+                ...
+
+        For what no program can look after: kill -9, a computer that hangs, a cable that is cut. The drive's own
+        time-out and its action (P14.04 and P14.05 of a GD350) are set in RAM and read back, and a thread asks the
+        drive for its state four times within *timeout*. When the block ends, a motor that slows down is waited for,
+        and the drive gets back the settings it had; where the motor goes on turning, or cannot be asked, they stay, and
+        the drive acts. A drive that was switched off meanwhile has forgotten them.
+
+        The thread keeps real time: on a line in virtual time it does not keep up.
+
+        Args:
+            timeout: Seconds, in the range and steps of the drive's parameter (GD350: 0.1 to 60.0, in tenths). Longer
+                than the bus's own time-out, or one lost answer is enough.
+            action: `"coast"` takes the voltage off the motor and trips a fault (GD350: CE), whoever is in control;
+                `"stop"` stops it as the drive is set to, without a fault.
+
+        Raises:
+            NotAllowed: The family has no such thing, or *timeout* or *action* is not among what it takes. Nothing was
+                sent.
+            Refused: The drive kept what it had.
+            NoAnswer, BadAnswer, PortError: The line failed. The drive may have taken the settings: then it acts when
+                *timeout* is over.
+            Unconfirmed: The drive took the settings and shows others; it was given back those it had.
+        """
+        return Watchdog(self, timeout, action)
+
+    @contextmanager
+    def _moving(self, start: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:
+        """Starts, and ends by all means."""
+        guard = Guard(lambda: self._end_by_all_means(end))
         started = False
         try:
-            self.run(hz, reverse=reverse, confirm=confirm)
+            guard.arm()
+            start()
             started = True
-            yield self
+            guard.check()
+            yield
         except BaseException as reason:
-            # Of this package's errors, only Unconfirmed comes from `run` once its command was sent.
+            # Of this package's errors, only Unconfirmed comes from a start once its command was sent.
             if started or isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError):
-                failure = self._stop_by_all_means()
+                failure = guard.end()
                 if failure is not None and hasattr(reason, "add_note"):
                     reason.add_note(f"and unit {self.unit} could not be stopped: {failure}")
+            guard.disarm()
             raise
-        failure = self._stop_by_all_means()
+        failure = guard.end()
+        guard.disarm()
         if failure is not None:
             raise failure
 
-    def _stop_by_all_means(self) -> BaseException | None:
-        """Stops, or coasts where stopping fails. Returns what is left to raise: a failure, or a Ctrl-C that came."""
+    def _end_by_all_means(self, end: Callable[[], None]) -> BaseException | None:
+        """Calls *end*, or coasts where that fails. Returns what is left to raise: a failure, or a Ctrl-C that came."""
         interrupted: KeyboardInterrupt | None = None
         failure: BaseException | None = None
-        for attempt in [self.stop] * _STOP_ATTEMPTS + [self.coast]:
+        for attempt in [end] * _END_ATTEMPTS + [self.coast]:
             try:
                 attempt()
             except DrivebusError as error:

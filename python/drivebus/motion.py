@@ -21,6 +21,25 @@ POLL_INTERVAL = 0.02
 
 _LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
 
+_FAILURES_ALLOWED = 1
+"""Of the last ten exchanges with a unit. One answer in ten may be lost on a line that works, to a burst of noise. Where
+two are, the next may be the one that stops the motor."""
+
+_LOOKS_TO_PROVE = 10
+"""Looks at the state that prove a link in doubt: as many as `Link` counts, so that the old ones count no more."""
+
+_MAY = {
+    "run_forward": "the motor may turn",
+    "run_reverse": "the motor may turn",
+    "jog_forward": "the motor may turn",
+    "jog_reverse": "the motor may turn",
+    "stop": "the motor may still turn",
+    "coast": "the motor may still be fed",
+    "jog_stop": "the motor may still turn",
+    "reset_fault": "the fault may be reset, and a drive that is still told to run may start",
+}
+"""What may have happened when a command was sent and nothing is known of it."""
+
 _HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
@@ -46,7 +65,7 @@ class Seen(NamedTuple):
 class Motion(Registers):
     """Starts, stops and resets one drive. Times are seconds of the line's clock, real or simulated."""
 
-    def run(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0) -> None:
+    def run(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
         """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
 
         Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`.
@@ -55,26 +74,31 @@ class Motion(Registers):
             hz: Setpoint in Hz, 0 to the drive's own maximum; None keeps the one it has.
             reverse: Turn the other way.
             confirm: Seconds until the state word must show it; 0 does not look.
+            force: Start although the link is bad. Then it may be impossible to stop the motor over the bus.
+
+        Where two or more of the last ten exchanges failed, the link is proved first, by ten looks at the state.
 
         Raises:
-            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum. Nothing was sent
-                that moves it.
+            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum; the link is bad; or
+                another drive answers at this address since the port was opened again. Nothing was sent that moves it.
             Refused: The drive did not start.
             NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
             Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        self._prove_link(force)
         raw = None if hz is None else self._setpoint_word(hz)
         before = self._ready_to_start()
         self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
 
-    def jog(self, reverse: bool = False, *, confirm: float = 1.0) -> None:
+    def jog(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
         """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
 
         A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
         not end it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+        self._prove_link(force)
         before = self._ready_to_start()
         if before.state.running:
             raise NotAllowed(
@@ -89,12 +113,13 @@ class Motion(Registers):
 
         Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end.
 
-        It overtakes whatever else waits for the line, and goes out to a drive that seems deaf too.
+        It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
+        seems deaf too. Sent once.
 
         Raises:
             Refused: The drive did not take it; it still runs if it ran.
-            PortError: It could not be sent.
-            Unconfirmed: It was sent, and the drive does not show it.
+            PortError: It could not be sent; the drive goes on as it was.
+            Unconfirmed: It was sent, and the drive does not show it: the motor may still turn.
         """
         self._halt("stop", confirm)
 
@@ -110,8 +135,11 @@ class Motion(Registers):
         """Resets a fault whose cause is gone. Sends nothing where there is none.
 
         Raises:
+            NotAllowed: Another drive answers at this address since the port was opened again. Nothing was sent.
             Refused: The drive did not take it.
-            Unconfirmed: It was sent, and the fault is still there: its cause is, most likely.
+            NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
+            Unconfirmed: It was sent, once, and the fault is still there: its cause is, most likely. Or nothing is
+                known of it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
         if self.look().state is not State.FAULT:
@@ -124,29 +152,60 @@ class Motion(Registers):
         """The setpoint last given over the bus, in Hz. Setting it changes the speed of a motor that runs.
 
         Raises, when set:
-            NotAllowed: Above the drive's own maximum or out of range; nothing was sent.
-            NoAnswer, BadAnswer, PortError: The drive may have taken it all the same.
+            NotAllowed: Above the drive's own maximum or out of range, or another drive answers at this address since
+                the port was opened again; nothing was sent.
+            NoAnswer, BadAnswer, PortError: The drive may have taken it all the same, unless the error's `started` is
+                None. A confirmation that was lost was cleared up by reading, as `write` does, and that failed too.
+            Unconfirmed: The drive shows another setpoint, however often it was written.
             Refused: The drive kept the old one.
         """
         return float(self.read("set_frequency"))
 
     @setpoint.setter
     def setpoint(self, hz: float) -> None:
-        self._write(self.profile.address("set_frequency"), self._setpoint_word(hz))
+        self._write_setpoint(self._setpoint_word(hz))
 
-    def look(self) -> Seen:
+    def _write_setpoint(self, word: int) -> None:
+        self._write(self.profile.address("set_frequency"), word, read_back=self.profile.read_back("set_frequency"))
+
+    def look(self, *, urgent: bool = False) -> Seen:
         """The status words, in one read."""
         names = ("status_word_1", "status_word_2", "fault_code")
         first, *_ = places = [self.profile.address(name) for name in names]
         with self._explained():
-            words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1)
+            words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1, urgent=urgent)
         state, fields, fault = (words[place - first] for place in places)
-        return Seen(
+        seen = Seen(
             self._state_of(state),
             self.profile.fields("status_word_2", fields),
             self.profile.fault(fault) if fault else None,
             time,
         )
+        self._remember(str(seen))
+        return seen
+
+    def _prove_link(self, force: bool) -> None:
+        """No motor starts on a link that may not carry its stop. Sends nothing where the last exchanges went well."""
+        link = self.bus.link(self.unit)
+        if force or link.failed <= _FAILURES_ALLOWED:
+            return
+        lost = looks = 0
+        while looks < _LOOKS_TO_PROVE and lost <= _FAILURES_ALLOWED:
+            looks += 1
+            try:
+                self.state()
+            except Refused:
+                pass
+            except (NoAnswer, BadAnswer):
+                lost += 1
+        link = self.bus.link(self.unit)
+        if lost > _FAILURES_ALLOWED or link.failed > _FAILURES_ALLOWED:
+            raise NotAllowed(
+                f"the link to unit {self.unit} is bad: {link}, and {lost} of {looks} looks at its state failed; "
+                "nothing that moves it was sent, for its stop might be lost as well. Mend the line (bus.stats() may "
+                "say how), or start all the same with force=True (`--force`)",
+                unit=self.unit,
+            )
 
     def _setpoint_word(self, hz: float) -> int:
         hz = checks.number("setpoint", hz, 0.0)
@@ -204,16 +263,20 @@ class Motion(Registers):
                 return False
             if not seen.state.running:
                 return True
-            first.append(self._running_frequency())
+            first.append(self._running_frequency(urgent=True))
             return first[-1] < first[0]
 
         self._confirm(command, shows, confirm)
 
-    def _running_frequency(self) -> float:
-        return float(self.read("running_frequency"))
+    def _running_frequency(self, *, urgent: bool = False) -> float:
+        [word] = self.read_words(self.profile.address("running_frequency"), urgent=urgent)
+        return float(self.value("running_frequency", word))
 
     def _command(self, name: str, setpoint: int | None = None) -> None:
         """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
+        urgent = name in _HALTS
+        if not urgent:
+            self._identity.check()
         address, code = self.profile.command(name)
         words: int | list[int] = code
         if setpoint is not None:
@@ -221,15 +284,15 @@ class Motion(Registers):
             if place == address + 1:
                 words = [code, setpoint]
             else:
-                self._write(place, setpoint)
+                self._write_setpoint(setpoint)
         try:
-            self._write(address, words, urgent=name in _HALTS)
+            self._send(address, words, urgent=urgent)
         except _LINE_ERRORS as error:
             if error.started is None:
                 raise
             raise Unconfirmed(
-                f"{name} was sent to unit {self.unit} and not confirmed ({error}); it may have acted. "
-                f"{self._seen_last()}. It was not repeated",
+                f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
+                f"{self._state_afterwards(urgent)}. It was not repeated",
                 unit=self.unit,
                 request=error.request,
                 raw=error.raw,
@@ -237,20 +300,19 @@ class Motion(Registers):
                 ended=error.ended,
             ) from error
 
-    def _seen_last(self) -> str:
+    def _state_afterwards(self, urgent: bool) -> str:
         try:
-            return f"State seen afterwards: {self.look()}"
+            return f"State seen afterwards: {self.look(urgent=urgent)}"
         except (*_LINE_ERRORS, Refused) as error:
-            return f"Its state could not be read afterwards either ({type(error).__name__})"
+            return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
 
     def _confirm(self, command: str, shows: Callable[[Seen], bool], within: float) -> None:
         if within == 0:
             return
         deadline = self.bus.now() + within
-        last = "no state could be read"
         while True:
             try:
-                seen = self.look()
+                seen = self.look(urgent=command in _HALTS)
                 if shows(seen):
                     return
                 last = f"state seen last: {seen}"
@@ -261,16 +323,18 @@ class Motion(Registers):
                     break
             except (NoAnswer, BadAnswer, Refused) as error:
                 # A refusal here is one of a read: it says nothing about the command.
-                last = f"its last answer: {error}"
+                last = f"its last answer: {error}; {self._seen_last()}"
             except PortError as error:
                 raise Unconfirmed(
-                    f"{command} was sent to unit {self.unit}; the port was lost before its state showed it ({error})",
+                    f"{command} was sent to unit {self.unit}; the port was lost before its state showed it ({error}): "
+                    f"{_MAY[command]}; {self._seen_last()}. It was not repeated",
                     unit=self.unit,
                 ) from error
             if self.bus.now() >= deadline:
                 break
             self.bus.sleep(POLL_INTERVAL)
         raise Unconfirmed(
-            f"{command} was sent to unit {self.unit}, and its state does not show it; {last}. It was not repeated",
+            f"{command} was sent to unit {self.unit}, and its state does not show it: {_MAY[command]}; {last}. "
+            "It was not repeated",
             unit=self.unit,
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from drivebus.values import Description, Fault
+from drivebus.values import Description, Fault, Link, WatchdogSettings
 
 __all__ = ["BusProtocol", "ProfileProtocol"]
 
@@ -22,14 +22,42 @@ class BusProtocol(Protocol):
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock."""
 
-    def read(self, unit: int, address: int, count: int = 1, /) -> list[int]:
-        """Reads words; repeated by the bus's own policy."""
+    def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """Reads words; repeated by the bus's own policy. *urgent* before all who wait; *verify* asks twice."""
 
-    def read_stamped(self, unit: int, address: int, count: int = 1, /) -> tuple[list[int], float, float]:
+    def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
         """Reads words, with the Unix times of request and answer."""
 
-    def write(self, unit: int, address: int, value: int | Sequence[int], /, *, urgent: bool = False) -> None:
-        """Writes one word or several. Sent once; *urgent* before all who wait, whatever is in doubt."""
+    def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+    ) -> None:
+        """Writes one word or several; *urgent* before all who wait, whatever is in doubt.
+
+        Sent once. With *read_back*, the address where it can be read, a lost confirmation is cleared up by reading, and
+        only where the unit shows another value is the write repeated.
+        """
+
+    def link(self, unit: int, /) -> Link:
+        """How many of the last exchanges with *unit*, ten at most, brought an answer."""
+
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether the line was closed for good."""
 
 
 class ProfileProtocol(Protocol):
@@ -57,6 +85,9 @@ class ProfileProtocol(Protocol):
 
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """Where *name* is read, or written to RAM (*store* False) or EEPROM (*store* True)."""
+
+    def read_back(self, name: str, /) -> int | None:
+        """Where what was written to *name* can be read; None where that would not tell whether the drive took it."""
 
     def decode(self, name: str, raw: int, /) -> int | float:
         """A word in engineering units."""
@@ -90,6 +121,14 @@ class ProfileProtocol(Protocol):
 
     def faults(self) -> list[Fault]:
         """Every fault that is known, by number."""
+
+    @property
+    def identification_address(self) -> int:
+        """Where the drive says what it is."""
+
+    @property
+    def watchdog(self) -> WatchdogSettings | None:
+        """What makes the drive act by itself when its bus falls silent, if it has such a thing."""
 
     @property
     def maximum_frequency(self) -> str | None:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import NamedTuple, overload
 
 from drivebus.errors import DrivebusError, NotAllowed, Refused, StoreWarning
+from drivebus.identity import Identity
 from drivebus.protocols import BusProtocol, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value
 
@@ -34,12 +35,18 @@ class Registers:
         bus: The line it hangs on.
         unit: Its address, 1..247.
         profile: What its words mean.
+
+    *identification* is what it said when it was asked what it is; None if it was not.
     """
 
-    def __init__(self, bus: BusProtocol, unit: int, profile: ProfileProtocol) -> None:
+    def __init__(
+        self, bus: BusProtocol, unit: int, profile: ProfileProtocol, identification: int | None = None
+    ) -> None:
         self.bus = bus
         self.unit = unit
         self.profile = profile
+        self._identity = Identity(bus, unit, profile.identification_address, identification)
+        self._seen: tuple[str, float] | None = None
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
 
@@ -52,42 +59,45 @@ class Registers:
         return self.profile.describe(name)
 
     @overload
-    def read(self, name: str, /) -> Value: ...
+    def read(self, name: str, /, *, verify: bool = False) -> Value: ...
     @overload
-    def read(self, first: str, second: str, /, *more: str) -> dict[str, Value]: ...
-    def read(self, *names: str) -> Value | dict[str, Value]:
+    def read(self, first: str, second: str, /, *more: str, verify: bool = False) -> dict[str, Value]: ...
+    def read(self, *names: str, verify: bool = False) -> Value | dict[str, Value]:
         """Reads registers or parameters in the fewest requests.
 
         One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
         where the drive counts, and `Choice` where the profile has a name for what came.
 
+        With *verify* each request is repeated until the same words came twice in a row: for values on which much
+        depends, where even a damaged answer whose CRC is right by chance (one in 65 536) must not pass.
+
         Raises:
             NotAllowed: No name, or an unknown one; nothing was sent.
-            NoAnswer, BadAnswer, Refused: See each.
+            NoAnswer, BadAnswer, Refused: See each. With *verify* also where the words change all the time.
         """
         if not names:
             raise NotAllowed("read() needs at least one name, such as 'output_current' or 'P00.11'")
-        values = self.snapshot(*names)
+        values = self.snapshot(*names, verify=verify)
         return values[names[0]] if len(names) == 1 else dict(values)
 
-    def snapshot(self, *names: str) -> Snapshot:
-        """Reads *names* in the fewest requests, under one time stamp."""
+    def snapshot(self, *names: str, verify: bool = False) -> Snapshot:
+        """Reads *names* in the fewest requests, under one time stamp. With *verify* as `read` does."""
         places = {name: self.profile.address(name) for name in names}
         words: dict[int, int] = {}
         started = ended = 0.0
         for index, (address, count) in enumerate(self.profile.plan(names)):
             with self._explained():
-                answer, sent, ended = self.bus.read_stamped(self.unit, address, count)
+                answer, sent, ended = self.bus.read_stamped(self.unit, address, count, verify=verify)
             started = started if index else sent
             words.update(enumerate(answer, address))
         values = {name: self.value(name, words[place]) for name, place in places.items()}
         units = {name: self.profile.describe(name).unit for name in names}
         return Snapshot(values, units, started, ended - started)
 
-    def read_words(self, address: int, count: int = 1) -> list[int]:
+    def read_words(self, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
         """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""
         with self._explained():
-            return self.bus.read(self.unit, address, count)
+            return self.bus.read(self.unit, address, count, urgent=urgent, verify=verify)
 
     def value(self, name: str, raw: int) -> Value:
         """The word *raw* of *name* in engineering units."""
@@ -102,7 +112,11 @@ class Registers:
     @overload
     def write(self, name: Mapping[str, object], *, store: bool = False) -> None: ...
     def write(self, name: str | Mapping[str, object], value: object = None, store: bool = False) -> None:
-        """Writes one value, or several from a mapping, each by its own request, sent once.
+        """Writes one value, or several from a mapping, each by its own request.
+
+        A confirmation that was lost is cleared up by reading the value. Only where the drive shows another one is the
+        write repeated, as often as the bus repeats a read. What does something when it is written (P00.15 tunes the
+        motor) tells nothing by being read: it is sent once.
 
         Parameters go to RAM: they are lost when the drive is switched off. With *store* they go to EEPROM, whose
         write life is limited; one that already has its value is not written again. A drive tells the value in force,
@@ -117,9 +131,11 @@ class Registers:
 
         Raises:
             NotAllowed: Unknown name, out of range, read-only, a command, or writable only while stopped and the drive
-                runs. Nothing was sent.
-            NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same.
+                runs; or another drive answers at this address since the port was opened again. Nothing was sent.
+            NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same, unless the error's
+                `started` is None: then it was not sent.
             Refused: The drive kept what it had.
+            Unconfirmed: The drive shows another value, however often it was written.
 
         Where one of several fails, those before it were written; the error's note names them.
         """
@@ -163,18 +179,20 @@ class Registers:
             )
 
     def _write_one(self, item: _Planned, store: bool) -> None:
+        read_back = self.profile.read_back(item.name)
         is_parameter = self.profile.describe(item.name).kind == "parameter"
         if not is_parameter or not store:
             if is_parameter:
                 # Before it is sent: the drive may take it although its answer is lost.
                 self._in_ram.add(item.name)
-            self._write(item.address, item.raw)
+            self._write(item.address, item.raw, read_back=read_back)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
         in_force = self.read_words(self.profile.address(item.name))[0]
         if in_force == item.raw and item.name not in self._in_ram:
             return
-        self._write(item.address, item.raw)
+        # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
+        self._write(item.address, item.raw, read_back=None if in_force == item.raw else read_back)
         self._in_ram.discard(item.name)
         self._count_store(item.name)
 
@@ -207,19 +225,46 @@ class Registers:
                 ended=error.ended,
             ) from None
 
-    def _write(self, address: int, value: int | Sequence[int], *, urgent: bool = False) -> None:
+    def _write(self, address: int, value: int | Sequence[int], *, read_back: int | None = None) -> None:
+        """Writes to the unit, if it still is the one it was."""
+        self._identity.check()
+        self._send(address, value, read_back=read_back)
+
+    def _send(
+        self,
+        address: int,
+        value: int | Sequence[int],
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+    ) -> None:
         with self._explained():
-            self.bus.write(self.unit, address, value, urgent=urgent)
+            self.bus.write(self.unit, address, value, urgent=urgent, read_back=read_back)
 
     def state(self) -> State:
         """What the drive is doing: one read of its first status word."""
-        return self._state_of(self.read_words(self.profile.address("status_word_1"))[0])
+        state = self._state_of(self.read_words(self.profile.address("status_word_1"))[0])
+        self._remember(str(state))
+        return state
 
     def _state_of(self, word: int) -> State:
         try:
             return State(self.profile.state(word))
         except ValueError:
             return State.UNKNOWN
+
+    def _remember(self, state: str) -> None:
+        """Keeps the last state that was seen, for errors after which none can be read."""
+        self._seen = state, self.bus.now()
+
+    def _seen_last(self) -> str:
+        """The last state that was seen, and how long ago on the line's clock."""
+        if self._seen is None:
+            return "no state was ever seen"
+        state, at = self._seen
+        # A line that is lost may have no clock.
+        age = max(self.bus.now() - at, 0.0)
+        return f"state seen last, {age:.1f} s ago: {state}"
 
 
 def _asked(request: bytes) -> str:

@@ -304,9 +304,10 @@ class TestParameters:
         assert drive.read("P00.11") == 3.0
 
     def test_what_ram_may_have_taken_is_stored_all_the_same(self, simulator: Simulator, drive: Drive) -> None:
-        simulator.line.drop_answers(1)
+        simulator.line.drop_answers(1000)
         with pytest.raises(NoAnswer):
             drive.write("P00.11", 3.0)
+        simulator.line.clear()
         drive.write("P00.11", 3.0, store=True)
         simulator.drive(1).power_cycle()
         assert drive.read("P00.11") == 3.0

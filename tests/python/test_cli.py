@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,14 @@ class TestLooking:
     def test_read_takes_parameter_codes(self, name: str) -> None:
         [row] = rows(run("--json", "read", name))
         assert (row["name"], row["value"]) == ("P00.03", 50.0)
+
+    def test_read_can_ask_twice(self, pty: drivebus.Simulator) -> None:
+        asked = []
+        for words in (["read", "P00.03", "3002H"], ["read", "--verify", "P00.03", "3002H"]):
+            before = pty.line.requests
+            assert [row["name"] for row in rows(run("--json", *words, port=pty.port))] == ["P00.03", "bus_voltage"]
+            asked.append(pty.line.requests - before)
+        assert asked[1] - asked[0] == 2
 
     def test_an_unknown_name_shows_the_closest(self) -> None:
         result = run("read", "output_curent")
@@ -208,7 +217,31 @@ class TestMoving:
 
         monkeypatch.setattr(drivebus.Drive, "jog_stop", deaf)
         assert run("jog", "--seconds", "0", "--yes", port=pty.port).exit_code == 7
-        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8, 6]
+        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8, 8, 8, 6]
+
+    @pytest.mark.skipif(os.name == "nt", reason="no signal but kill")
+    def test_a_terminal_that_is_closed_ends_a_jog(self, pty: drivebus.Simulator) -> None:
+        run("prepare", port=pty.port)
+        words = [sys.executable, "-m", "drivebus", "--port", pty.port, "jog", "--seconds", "60", "--yes"]
+        with subprocess.Popen(words, stderr=subprocess.PIPE) as child:
+            pause = threading.Event()
+            while pty.drive(1).state != "forward":  # the limit is the test's own
+                pause.wait(0.01)
+            child.send_signal(signal.SIGHUP)
+            child.communicate(timeout=60)
+        assert child.returncode == 129
+        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8]
+
+    @pytest.mark.parametrize("words", [["run", "5"], ["jog", "--seconds", "0"]])
+    def test_a_bad_link_starts_only_by_force(
+        self, monkeypatch: pytest.MonkeyPatch, pty: drivebus.Simulator, words: list[str]
+    ) -> None:
+        run("prepare", port=pty.port)
+        monkeypatch.setattr(drivebus.Bus, "link", lambda *_: drivebus.Link(6, 10))
+        refused = run(*words, "--yes", port=pty.port)
+        assert (refused.exit_code, "6 of the last 10" in refused.stderr) == (2, True)
+        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == []
+        assert run(*words, "--yes", "--force", port=pty.port).exit_code == 0
 
     def test_what_changes_a_motor_that_turns_asks_first(self, pty: drivebus.Simulator) -> None:
         assert run("write", "set_frequency=5", port=pty.port).exit_code == 0

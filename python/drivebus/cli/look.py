@@ -151,8 +151,9 @@ def _show_sample(out: Output, live: Live | None, snapshot: drivebus.Snapshot) ->
 
 @click.command()
 @click.argument("wanted", metavar="NAME...", nargs=-1, required=True, shell_complete=names.complete_name)
+@click.option("--verify", is_flag=True, help="Ask twice; both answers must agree.")
 @pass_session
-def read(session: Session, wanted: tuple[str, ...]) -> None:
+def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
     """Read registers or parameters: by name, code (P00.11) or address (3004H, 0x3004)."""
     with session.drive() as drive:
         profile = drive.profile
@@ -160,11 +161,11 @@ def read(session: Session, wanted: tuple[str, ...]) -> None:
         for text in wanted:
             place = names.resolve(profile, text)
             if isinstance(place, int):
-                [word] = drive.read_words(place)
+                [word] = drive.read_words(place, verify=verify)
                 rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}"])
             else:
                 known = drive.describe(place)
-                rows.append([known.name, drive.read(place), known.unit, known.label])
+                rows.append([known.name, drive.read(place, verify=verify), known.unit, known.label])
         session.out.rows(["name", "value", "unit", "label"], rows)
 
 

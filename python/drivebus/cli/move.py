@@ -8,7 +8,7 @@ import click
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.session import Session, force_option, pass_session, yes_option
 
 __all__ = ["COMMANDS"]
 
@@ -17,15 +17,16 @@ __all__ = ["COMMANDS"]
 @click.argument("hz", type=float, required=False)
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
 @click.option("--wait", type=names.Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
+@force_option
 @yes_option
 @pass_session
-def run(session: Session, hz: float | None, reverse: bool, wait: float | None, yes: bool) -> None:
+def run(session: Session, hz: float | None, reverse: bool, wait: float | None, force: bool, yes: bool) -> None:
     """Start the motor, at HZ if given. It keeps running when this command has ended."""
     way = "in reverse" if reverse else "forward"
     speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
     with session.drive() as drive:
         session.ask(f"This starts the motor {way} {speed}", yes)
-        drive.run(hz, reverse=reverse)
+        drive.run(hz, reverse=reverse, force=force)
         if wait is not None:
             drive.wait_for_speed(timeout=wait)
         _done(session, drive, "run")
@@ -55,35 +56,17 @@ def coast(session: Session) -> None:
 @click.command()
 @click.option("--seconds", type=names.Seconds(0, 60), default=1.0, show_default=True, help="How long.")
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
+@force_option
 @yes_option
 @pass_session
-def jog(session: Session, seconds: float, reverse: bool, yes: bool) -> None:
-    """Jog the motor at the drive's jog frequency, and end the jog, Ctrl-C included."""
+def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool) -> None:
+    """Jog the motor at the drive's jog frequency, and end the jog whatever happens: Ctrl-C, a closed terminal."""
     way = "in reverse" if reverse else "forward"
     with session.drive() as drive:
         session.ask(f"This jogs the motor {way} for {seconds:g} s", yes)
-        jogs = False
-        try:
-            drive.jog(reverse=reverse)
-            jogs = True
+        with drive.jogging(reverse, force=force):
             drive.bus.sleep(seconds)
-        except BaseException as reason:
-            # Of this package's errors, only Unconfirmed comes from `jog` once it was sent.
-            if jogs or isinstance(reason, drivebus.Unconfirmed) or not isinstance(reason, drivebus.DrivebusError):
-                _end_jog(drive)
-            raise
-        _end_jog(drive)
         _done(session, drive, "jog")
-
-
-def _end_jog(drive: drivebus.Drive) -> None:
-    """Ends the jog, or coasts where that fails or is interrupted: nobody else would end it."""
-    try:
-        drive.jog_stop()
-    except BaseException:
-        click.echo("The end of the jog is not confirmed; the motor is told to coast.", err=True)
-        drive.coast()
-        raise
 
 
 @click.command()

@@ -14,7 +14,7 @@ import click
 import drivebus
 from drivebus.cli.output import Output
 
-__all__ = ["EXIT_CODES", "Session", "exit_code", "parse_format", "pass_session", "yes_option"]
+__all__ = ["EXIT_CODES", "Session", "exit_code", "force_option", "parse_format", "pass_session", "yes_option"]
 
 EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
     (drivebus.NotAllowed, 2),
@@ -109,6 +109,12 @@ pass_session = click.make_pass_decorator(Session)
 def yes_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """The option that answers the question before it is asked."""
     return click.option("--yes", "-y", is_flag=True, help="Do not ask first.")(command)
+
+
+def force_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The option that starts a motor over a line that may not carry its stop."""
+    text = "Start although the link is bad; a stop may not get through."
+    return click.option("--force", is_flag=True, help=text)(command)
 
 
 def parse_format(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, str, str]:

@@ -1,0 +1,310 @@
+"""The end of the program, whatever it is, stops the motor: asked of the simulated drive, by a process of its own.
+
+The simulator runs in this process, the program that drives the motor in another, over a pseudo-terminal. What the drive
+was told is in the drive's own log.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+import drivebus
+from drivebus import Simulator
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminal, and no signal but kill")
+
+CONTROL, FORWARD, STOP, JOG, JOG_STOP = 0x2000, 1, 5, 3, 8
+CE = 18  # GD350 manual, list of faults: communication fault
+KILLED_BY = {signal.SIGTERM: 143, signal.SIGHUP: 129} if os.name != "nt" else {}
+RAMP = 0.5  # seconds to 50 Hz
+
+PROGRAM = """
+import signal, sys, threading, time, drivebus
+
+def running():
+    print("running", flush=True)
+
+with drivebus.Bus(sys.argv[1]) as bus:
+    drive = bus.drive(1)
+    {body}
+"""
+NOT_CLOSED = PROGRAM.replace("with drivebus.Bus(sys.argv[1]) as bus:", "bus = drivebus.Bus(sys.argv[1])\nif bus:")
+
+HANG = """
+    with drive.running(10.0):
+        running()
+        bus.sleep(100)
+"""
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350", 2: "gd350"}) as simulator:
+        with drivebus.Bus(simulator) as bus:
+            for unit in (1, 2):
+                drive = bus.drive(unit)
+                drive.prepare_control()
+                drive.write({"P00.11": RAMP, "P00.12": RAMP})
+        yield simulator
+
+
+def commands(simulator: Simulator, unit: int = 1) -> list[int]:
+    return [value for _, address, value in simulator.drive(unit).writes() if address == CONTROL]
+
+
+def start(simulator: Simulator, body: str, program: str = PROGRAM) -> subprocess.Popen[str]:
+    """Starts a program, and returns when it says that the motor runs."""
+    text = program.format(body=body.strip())
+    child = subprocess.Popen(
+        [sys.executable, "-c", text, simulator.port], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert child.stdout is not None
+    line = child.stdout.readline()
+    assert line == "running\n", (line, child.communicate(timeout=20))
+    return child
+
+
+def end(child: subprocess.Popen[str]) -> tuple[int, str]:
+    """Waits for the end of the program; its exit code, and what it said on standard error."""
+    _, said = child.communicate(timeout=60)
+    return child.returncode, said
+
+
+@pytest.mark.parametrize("number", KILLED_BY)
+def test_a_signal_inside_a_block_stops_the_motor(simulator: Simulator, number: signal.Signals) -> None:
+    child = start(simulator, HANG)
+    child.send_signal(number)
+    assert end(child) == (KILLED_BY[number], "")
+    assert commands(simulator) == [FORWARD, STOP]
+    assert simulator.drive(1).state in ("forward", "stopped")
+
+
+def test_a_signal_ends_a_jog(simulator: Simulator) -> None:
+    child = start(simulator, HANG.replace("running(10.0)", "jogging()"))
+    child.send_signal(signal.SIGTERM)
+    assert end(child) == (143, "")
+    assert commands(simulator) == [JOG, JOG_STOP]
+
+
+def test_a_signal_between_two_bytecodes_stops_the_motor(simulator: Simulator) -> None:
+    child = start(simulator, HANG.replace("bus.sleep(100)", "while True: pass"))
+    child.send_signal(signal.SIGTERM)
+    assert end(child) == (143, "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_signals_that_come_while_it_stops_wait_until_it_has(simulator: Simulator) -> None:
+    body = """
+    stop, calls = drive.stop, []
+    def stop_late():
+        for _ in range(10):
+            signal.raise_signal(signal.SIGTERM)
+        calls.append(stop())
+    drive.stop = stop_late
+    with drive.running(10.0):
+        running()
+        try:
+            with drive.running(12.0):
+                signal.raise_signal(signal.SIGTERM)
+        except SystemExit as error:
+            print(error.code, len(calls), flush=True)
+    """
+    child = start(simulator, body)
+    out, said = child.communicate(timeout=60)
+    assert (child.returncode, out, said) == (143, "143 1\n", "")
+    assert commands(simulator) == [FORWARD, FORWARD, STOP, STOP]
+
+
+@pytest.mark.parametrize(
+    ("ending", "code"),
+    [
+        pytest.param("sys.exit(9)", 9, id="sys.exit"),
+        pytest.param("raise RuntimeError('inside')", 1, id="exception"),
+        pytest.param("raise KeyboardInterrupt", -signal.SIGINT, id="Ctrl-C"),
+    ],
+)
+def test_leaving_a_block_by_any_way_stops_the_motor(simulator: Simulator, ending: str, code: int) -> None:
+    assert end(start(simulator, HANG.replace("bus.sleep(100)", ending)))[0] == code
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_a_daemon_thread_at_the_end_of_the_program(simulator: Simulator) -> None:
+    body = """
+    begun = threading.Event()
+    def work():
+        with drive.running(10.0):
+            begun.set()
+            bus.sleep(100)
+    threading.Thread(target=work, daemon=True).start()
+    begun.wait()
+    running()
+    """
+    child = start(simulator, body, NOT_CLOSED)
+    assert end(child) == (0, "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_a_block_that_nobody_left(simulator: Simulator) -> None:
+    body = """
+    block = drive.running(10.0)
+    block.__enter__()
+    running()
+    """
+    child = start(simulator, body, NOT_CLOSED)
+    assert end(child) == (0, "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_a_signal_stops_what_other_threads_run(simulator: Simulator) -> None:
+    body = """
+    other, begun = bus.drive(2), threading.Event()
+    def work():
+        with other.running(10.0):
+            begun.set()
+            # The block goes on although the program is asked to end: only its motor is stopped.
+            other.wait_until_stopped(60)
+    thread = threading.Thread(target=work)
+    with drive.running(10.0):
+        thread.start()
+        begun.wait()
+        try:
+            running()
+            bus.sleep(100)
+        finally:
+            thread.join()
+    """
+    child = start(simulator, body)
+    child.send_signal(signal.SIGTERM)
+    assert end(child) == (143, "")
+    assert commands(simulator, 1) == [FORWARD, STOP]
+    # By the signal; at the end of its block once more, if that came first.
+    assert commands(simulator, 2) in ([FORWARD, STOP], [FORWARD, STOP, STOP])
+
+
+def test_a_handler_of_the_programs_own_stays(simulator: Simulator) -> None:
+    body = """
+    heard = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: heard.set())
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with drive.running(10.0):
+        running()
+        while not heard.is_set():
+            bus.sleep(0.01)
+    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    """
+    child = start(simulator, body)
+    child.send_signal(signal.SIGHUP)
+    child.send_signal(signal.SIGTERM)
+    assert end(child) == (0, "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_outside_of_blocks_signals_are_as_they_were(simulator: Simulator) -> None:
+    body = """
+    before = signal.getsignal(signal.SIGTERM)
+    with drive.running(10.0), drive.running(12.0):
+        inside = signal.getsignal(signal.SIGTERM)
+    print(before == signal.getsignal(signal.SIGTERM) == signal.SIG_DFL != inside)
+    """
+    out, said = start(simulator, "running()\n" + body).communicate(timeout=60)
+    assert (out, said) == ("True\n", "")
+
+
+def test_a_forked_child_stops_nothing(simulator: Simulator) -> None:
+    body = """
+    import os
+    with drive.running(10.0):
+        child = os.fork()
+        if not child:
+            import atexit
+            atexit._run_exitfuncs()
+            os._exit(0)
+        os.waitpid(child, 0)
+        running()
+        print(sys.stdin.readline())
+    """
+    text = PROGRAM.format(body=body.strip())
+    child = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", text, simulator.port],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "running\n"
+    assert commands(simulator) == [FORWARD]
+    child.communicate("\n", timeout=60)
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+def test_what_other_threads_run_is_stopped_before_the_line_is_closed(simulator: Simulator) -> None:
+    body = """
+    other, begun, ended = bus.drive(2), threading.Event(), threading.Event()
+    stop = other.stop
+    def stop_late():
+        # As late as it can be: the main thread has stopped its own motor, and would close the bus next.
+        while drive.state().running:
+            pass
+        stop()
+    other.stop = stop_late
+    def work():
+        with other.running(10.0):
+            begun.set()
+            ended.wait()
+    threading.Thread(target=work, daemon=True).start()
+    begun.wait()
+    with drive.running(10.0):
+        running()
+        bus.sleep(100)
+    """
+    child = start(simulator, body)
+    child.send_signal(signal.SIGTERM)
+    assert end(child) == (143, "")
+    assert commands(simulator, 2) == [FORWARD, STOP]
+
+
+@pytest.mark.parametrize("action", ["coast", "stop"])
+def test_a_killed_program_leaves_the_drive_to_its_watchdog(simulator: Simulator, action: str) -> None:
+    body = f"""
+    with drive.watchdog(1.0, "{action}"), drive.running(10.0):
+        running()
+        bus.sleep(100)
+    """
+    child = start(simulator, body)
+    drive = simulator.drive(1)
+    # It keeps the drive from acting for longer than the time-out: the drive is asked four times in it.
+    told, asked = simulator.now(), simulator.line.requests
+    pause = threading.Event()
+    while simulator.now() < told + 2.0:
+        pause.wait(0.05)
+    assert simulator.line.requests >= asked + 6
+    assert (drive.state, drive.fault) == ("forward", 0)
+    child.kill()
+    child.wait(timeout=20)
+    assert drive.state == "forward"
+    while drive.state == "forward":  # the limit is this test's own
+        pause.wait(0.05)
+    assert (drive.state, drive.fault) == (("fault", CE) if action == "coast" else ("stopped", 0))
+    assert commands(simulator) == [FORWARD], "nobody told it to stop"
+    child.communicate()
+
+
+def test_a_watchdog_that_nobody_closed_is_left_to_the_drive(simulator: Simulator) -> None:
+    body = """
+    watchdog = drive.watchdog(1.0)
+    drive.run(10.0)
+    running()
+    """
+    assert end(start(simulator, body, NOT_CLOSED)) == (0, "")
+    pause = threading.Event()
+    while simulator.drive(1).state == "forward":  # the limit is this test's own
+        pause.wait(0.05)
+    assert simulator.drive(1).fault == CE
+    assert commands(simulator) == [FORWARD], "run() outlives the program, as it says"
