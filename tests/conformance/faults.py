@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import statistics
 import tempfile
+import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -21,15 +22,16 @@ from drivebus.sim import FAULT_KINDS, Simulator
 
 from .child import Child
 from .slave import UNIT
-from .verdict import HUNG, PAUSE, RIGHT, WRONG, judged
+from .verdict import HUNG, RIGHT, WRONG, judged, pace
 
 RATE = 0.02  # of all answers, each kind
 SEED = 20
 READS, READS_OF_ALL = 300, 1000
 GIVEN_UP = 25  # reads in a row that were not right: the library is not asked further
 BAUD = 115_200
-ALL = "all"  # at once, but not unplugging
-KINDS = (*FAULT_KINDS, ALL)
+ALL, UNPLUG = "all", "unplug"
+# Chance pulls out only what is in this process: here the port is unplugged by hand, before every 50th read.
+KINDS = (*(kind for kind in FAULT_KINDS if kind != UNPLUG), UNPLUG, ALL)
 LATE = 0.25  # seconds at least, twice that at most: the time-out is 0.2
 AWAY = 0.25  # seconds without the port
 PARAMETERS = range(0x2000)  # below commands and states: they stay as they are
@@ -88,17 +90,35 @@ def spoilt(library: str, kind: str, reads: int | None = None) -> Tally:
             tally.errors[f"open: {opened.error}"] += 1
             return tally
         child.read(pairs[0][0], 2)
-        simulator.line.set_times(late=LATE, replug=AWAY)
-        simulator.line.set_faults(**{kind: RATE})
-        _reads(child, pairs, reads, tally)
-        tally.hits = sum(simulator.line.fault_counts().values())
+        if kind == UNPLUG:
+            _reads(child, pairs, reads, tally, lambda number: _unplug(simulator, number, tally))
+        else:
+            simulator.line.set_times(late=LATE)
+            simulator.line.set_faults(**{kind: RATE})
+            _reads(child, pairs, reads, tally)
+            tally.hits = sum(simulator.line.fault_counts().values())
     return tally
 
 
-def _reads(child: Child, pairs: Sequence[tuple[int, list[int]]], reads: int, tally: Tally) -> None:
+def _unplug(simulator: Simulator, number: int, tally: Tally) -> None:
+    """Pulls the adapter out before every 50th read, and has it put back after a while."""
+    if number and number % round(1 / RATE) == 0:
+        simulator.line.unplug()
+        tally.hits += 1
+        threading.Timer(AWAY, simulator.line.replug).start()
+
+
+def _reads(
+    child: Child,
+    pairs: Sequence[tuple[int, list[int]]],
+    reads: int,
+    tally: Tally,
+    before: Callable[[int], None] = lambda _: None,
+) -> None:
     failed_at: float | None = None
     in_a_row = 0
     for number in range(reads):
+        before(number)
         asked = time.monotonic()
         address, values = pairs[number % len(pairs)]
         verdict = judged(child.read(address, 2), values)
@@ -115,7 +135,7 @@ def _reads(child: Child, pairs: Sequence[tuple[int, list[int]]], reads: int, tal
         in_a_row += 1
         if verdict.kind == HUNG or in_a_row == GIVEN_UP:
             break
-        time.sleep(max(0.0, PAUSE - (now - asked)))
+        pace(asked, in_a_row)
     tally.recovered = failed_at is None
 
 
@@ -128,21 +148,21 @@ class Pace:
     error: str = ""
 
 
-def pace(library: str, baudrate: int) -> Pace:
+def idle(library: str, baudrate: int) -> Pace:
     """Ten registers, again and again, from one loop in the library's own process."""
     with line(baudrate) as (simulator, port), Child(library) as child:
         opened = child.open(port, baudrate=baudrate, timeout=0.5)
         if not opened.returned:
             return Pace(None, 0, opened.error or HUNG)
         child.order("repeat", [MONITOR, WORDS, 5])
-        before = simulator.line.silence_violations, len(simulator.line.trace())
+        before = len(simulator.line.trace())
         done = child.order("repeat", [MONITOR, WORDS, TIMES], bound=60)
         if not done.returned:
             return Pace(None, 0, done.error or HUNG)
-        trace = simulator.line.trace()[before[1] :]
+        trace = simulator.line.trace()[before:]
         gaps = [
             began - (answered + len(answer) * simulator.format.char_time)
             for (answered, who, answer), (began, next_, _) in pairwise(trace)
             if (who, next_) == ("unit", "master")
         ]
-        return Pace(statistics.median(gaps), simulator.line.silence_violations - before[0])
+        return Pace(statistics.median(gaps), sum(gap < simulator.format.t35 for gap in gaps))

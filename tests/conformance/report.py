@@ -96,7 +96,7 @@ def page(columns: Sequence[Column]) -> str:
         [
             f"`{kind}`",
             *(
-                milliseconds(tally.slowest) if tally.recovered else "not within the row"
+                ("not within the row" if not tally.recovered else milliseconds(tally.slowest) if tally.slowest else "-")
                 for tally in (column.tallies[kind] for column in on_line)
             ),
         ]
@@ -112,12 +112,13 @@ def page(columns: Sequence[Column]) -> str:
                 SINGLE,
                 table(["what happens", "true end", *titles], single),
                 table(["rows that ended", *titles], totals(here)),
+                OPTIONS,
                 "## Time to recover",
                 BACK,
                 table(["after", *titles], back),
                 FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, seed=faults.SEED, streak=faults.GIVEN_UP),
                 table(["fault, 2 %", *names], spoilt),
-                "The longest time from the end of a read that was not right to the end of the next right one:",
+                SLOWEST,
                 table(["fault, 2 %", *names], slow),
                 errors_seen(on_line, kinds),
                 PACE.format(words=faults.WORDS, times=faults.TIMES),
@@ -161,9 +162,10 @@ INTRODUCTION = """\
 drivebus and other Modbus RTU masters for Python on the same lines. `make conformance` runs everything and writes this
 page; `make conformance CONFORMANCE_PYTHON=python3.13` names an interpreter (tmodbus needs Python 3.12 or newer).
 
-Measured {date} on {machine}. A Linux pseudo-terminal at 19200 bit/s, 8N1; no real RS-485, so only what the libraries
-do is measured. Time-out 200 ms for all; retries off, except in the rows that say otherwise; everything else is the
-library's default."""
+Measured {date} on {machine}.
+
+A Linux pseudo-terminal at 19200 bit/s, 8N1; no real RS-485, so only what the libraries do is measured. Time-out 200 ms
+for all; retries off, except in the rows that say otherwise; everything else is the library's default."""
 
 SINGLE = """\
 ## One exchange, or a few
@@ -183,9 +185,14 @@ contact.
 times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with one
 that is silent on it."""
 
+OPTIONS = """\
+pymodbus, minimalmodbus and modbus-tk can be told that an adapter hands back what it sends (`handle_local_echo`); that
+is off by default. pymodbus needs to be told that a broadcast has no answer. tmodbus is measured from a thread beside
+its event loop; uModbus leaves locking to its caller."""
+
 BACK = """\
 From the end of the judged call (or from the return of the port) until the first right read of a register that was not
-asked for before. At least ten reads over at least 3 s; a failed one counts as 50 ms or more."""
+asked for before: at least ten reads over at least 3 s, the first ten without a pause."""
 
 FAULTS = """\
 ## The simulator's faults
@@ -193,10 +200,12 @@ FAULTS = """\
 A simulated GD350 at 115200 bit/s, 8N1; 2 % of answers are hit by the fault named, in the row `all` by each of them
 but `unplug`. Seed {seed}. {reads} reads of two registers in each row, {all} in the last; defaults of each library,
 retries included. [The simulator's page](simulator.md) says what each fault does; a `late` answer comes 250 to 500 ms
-after it was due, an unplugged port is away for 250 ms.
+after it was due, the port is unplugged before every 50th read, for 250 ms.
 
 Cells are right / wrong / error / hung. "Stopped": {streak} reads in a row were not right, or one hung, and no more
 were asked."""
+
+SLOWEST = "The longest time from the end of a read that was not right to the end of the next right one (a dash: none):"
 
 PACE = """\
 ## Time between frames

@@ -62,7 +62,7 @@ def main() -> int:
             say(column, kind, f"{counts(tally)}; {tally.hits} hits", tally.ends["wrong"] + tally.ends["hung"] > 0)
     for baud in faults.SPEEDS:
         for column in (each for each in here if not each.mute):
-            pace = column.paces[baud] = faults.pace(column.library, baud)
+            pace = column.paces[baud] = faults.idle(column.library, baud)
             say(column, str(baud), str(pace), pace.idle is None or pace.too_early > 0)
     out.write_text(page(all_columns), encoding="utf-8")
     print(f"wrote {out}; drivebus, to be looked at: {', '.join(wrong) or 'nothing'}")

@@ -15,7 +15,7 @@ from .play import play
 from .rows import ROWS, Row
 
 # Longer than for the published table: on a busy machine a right answer shall not come too late.
-TIMEOUT = 0.5
+TIMEOUT = 0.25
 
 SILENT = pytest.mark.parametrize("silent_on_08", [False, True], ids=["08H", "no 08H"])
 

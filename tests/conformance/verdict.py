@@ -12,7 +12,7 @@ RIGHT, WRONG, ERROR, HUNG = "right", "wrong", "error", "hung"
 
 TRIES = 10  # reads at least, and
 PATIENCE = 3.0  # seconds at least, before a library counts as not recovered
-PAUSE = 0.050  # a failed try takes at least that long: an error that comes at once is not asked a thousand times
+PAUSE = 0.050  # after some failed tries each takes at least that long: what fails at once is not asked a thousand times
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,12 @@ def of_write(outcome: Outcome, address: int, value: int, times: int) -> Verdict:
     return Verdict(RIGHT, "", outcome.seconds)
 
 
+def pace(asked: float, failed: int) -> None:
+    """Waits before the next try where many have failed. *asked*: when the last one began."""
+    if failed >= TRIES:
+        time.sleep(max(0.0, PAUSE - (time.monotonic() - asked)))
+
+
 def recovery(child: Child) -> Recovery:
     """Reads registers that nobody asked for yet until one is right."""
     began = time.monotonic()
@@ -89,5 +95,5 @@ def recovery(child: Child) -> Recovery:
             break
         wrong += verdict.kind == WRONG
         errors += verdict.kind == ERROR
-        time.sleep(max(0.0, PAUSE - (time.monotonic() - asked)))
+        pace(asked, tries)
     return Recovery(None, wrong, errors)
