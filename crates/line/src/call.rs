@@ -289,7 +289,8 @@ impl<'b, 'r> Call<'b, 'r> {
             };
             let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(self.verify)));
             let Some(unit) = self.unit.filter(|_| !agreement.is_immediate()) else {
-                return owner.exchange(&self.ask, give_up, take);
+                let result = owner.exchange(&self.ask, give_up, take);
+                return owner.unless_echoed(&self.ask, result, give_up);
             };
             if asked == 1 {
                 owner.stats().count(Some(unit), |counters| counters.verified += 1);

@@ -194,6 +194,36 @@ impl Owner {
         }
     }
 
+    /// `result` of a request that did not wait until it was known whether the adapter echoes: if it does, it may have been
+    /// its echo that came. Only the confirmation waits for that, not the stop.
+    ///
+    /// # Errors
+    ///
+    /// The request went out, and it is not known whether the unit took it.
+    pub(crate) fn unless_echoed(
+        &mut self,
+        ask: &Ask<'_>,
+        result: Result<Done, Box<CallError>>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Done, Box<CallError>> {
+        let done = result?;
+        if self.echo != AdapterEcho::Auto
+            || ask.destination == Destination::Broadcast
+            || !ask.request.expected().may_repeat_request()
+        {
+            return Ok(done);
+        }
+        // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.
+        let _ = self.look_for_echo(ask, give_up);
+        if self.echo == AdapterEcho::Absent {
+            return Ok(done);
+        }
+        // The answer may still come, and is owed without the master knowing it.
+        self.master.opened(done.ended);
+        let failure = Failure::NoAnswer { timeout: ask.timeout, attempts: 1 };
+        Err(ask.failed(failure, Some(done.sent), done.ended, &[]))
+    }
+
     /// Sends `probe` to `unit`; what it brought, `tried` and the master know.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use drivebus_rtu::{
     Adu, Answer, DataBits, Destination, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits,
     UnitAddress,
 };
-use drivebus_sim::{Options, Side, Simulator};
+use drivebus_sim::{FaultKind, Options, Side, Simulator};
 
 const STATE: u16 = 0x2100;
 const RESPONSE_DELAY: u16 = 0x0E03; // P14.03
@@ -124,6 +124,30 @@ fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
     // Anything else is not sent before the unit has returned an echo.
     let error = ask(&bus, 1, &Request::write(0x2001, 5)).unwrap_err();
     assert_eq!(error.sent, None, "{error}");
+}
+
+/// A stop does not wait until it is known whether the adapter echoes; its confirmation does.
+#[test]
+fn the_echo_of_an_adapter_confirms_no_stop() {
+    let urgent = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
+    let stop = Request::write(0x2000, 5);
+    for (echo, deaf) in [(false, false), (true, false), (true, true)] {
+        let simulator = simulator(SerialFormat::DEFAULT);
+        simulator.wire().set_echo(echo);
+        simulator.wire().set_rate(FaultKind::Deaf, f64::from(u8::from(deaf))).unwrap();
+        let bus = fresh_bus(&simulator, BusOptions::new(SerialFormat::DEFAULT));
+        let first = bus.call(unit(1).into(), &stop, urgent, &mut || false, &mut |_| ());
+        assert_eq!(first.is_ok(), !echo, "{first:?}");
+        if let Err(error) = first {
+            assert!(error.sent.is_some() && error.to_string().contains("may have taken it"), "{error}");
+        }
+        assert_eq!(simulator.drive(1).unwrap().words_written(), u64::from(!deaf));
+
+        simulator.wire().clear();
+        assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
+        bus.call(unit(1).into(), &stop, urgent, &mut || false, &mut |_| ()).unwrap();
+        assert_eq!(simulator.drive(1).unwrap().words_written(), 1 + u64::from(!deaf));
+    }
 }
 
 /// The first time-out on a bus, of a drive that stalls for longer than two time-outs: it may store to EEPROM.
