@@ -18,7 +18,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual wheel clean \
         machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -28,6 +28,7 @@ help: ## what can be made
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
+	@echo "make soak    a day of traffic on a hostile line, in virtual time"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -156,6 +157,15 @@ fuzz-corpus: $(CARGO_FUZZ) ## adds what reaches code that nothing in fuzz/corpus
 	    mkdir -p $(FUZZ_FOUND)/$$target; \
 	    $(FUZZ) $$target fuzz/corpus/$$target $(FUZZ_FOUND)/$$target -- -merge=1 -use_counters=0; \
 	done
+
+# Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
+SEED  ?= $(shell date +%s)
+HOURS ?= 24
+
+soak: soak-virtual ## a day of traffic on a hostile line
+
+soak-virtual:
+	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-soak -- --hours $(HOURS) --seed $(SEED)
 
 clean: ## removes what was built and set up here
 	rm -rf $(VENV) $(PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
