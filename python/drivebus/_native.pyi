@@ -159,11 +159,13 @@ class Bus:
         *,
         urgent: bool = False,
         read_back: int | None = None,
+        connection: int | None = None,
     ) -> None:
         """06H (an int) or 10H (a sequence). Sent once; *urgent* before all who wait, whatever is in doubt.
 
         With *read_back*, the address where the words can be read, a missing confirmation is looked for there, and the
-        write is repeated only while the unit shows other words.
+        write is repeated only while the unit shows other words. With *connection*, the `reconnects` that the caller
+        knows, nothing is sent where the port was opened again since: PortError.
         """
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""

@@ -162,6 +162,7 @@ class Bus:
         *,
         urgent: bool = False,
         read_back: int | None = None,
+        connection: int | None = None,
     ) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
 
@@ -175,6 +176,9 @@ class Bus:
         there, and the write is repeated (the bus's retries) only while the unit shows other words. That is for absolute
         values such as a setpoint; what a command did, nobody can read back.
 
+        With *connection*, the `reconnects` at which you saw who answers, nothing is sent where the port was opened
+        again since, for another unit may have the address now: `PortError`, whose `started` is None.
+
         Raises:
             NotAllowed: An argument is out of range, or the bus is read-only. Nothing was sent.
             NoAnswer, BadAnswer, PortError: The unit may have taken it all the same, unless the error's `started` is
@@ -184,9 +188,10 @@ class Bus:
         """
         if read_back is not None:
             read_back = checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
-        self._native.write(
-            checks.unit(unit), checks.address(address), checks.payload(value), urgent=urgent, read_back=read_back
-        )
+        if connection is not None:
+            connection = checks.whole("connection", connection, 0, 2**63)
+        unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
+        self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""

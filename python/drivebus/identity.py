@@ -30,10 +30,13 @@ class Identity:
         self._known = None if code is None else _named(code)
         self._opened = bus.reconnects
 
-    def check(self) -> None:
+    def check(self) -> int:
         """Asks the unit what it is, if the port was opened again or nobody has asked yet; at other times does nothing.
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time.
+
+        Returns:
+            The connection for which that holds: what is sent on it goes to the unit that was asked.
 
         Raises:
             NotAllowed: Another unit answers at this address now.
@@ -41,12 +44,12 @@ class Identity:
         """
         opened = self._bus.reconnects
         if self._known is not None and opened == self._opened:
-            return
+            return opened
         try:
             told = self._ask()
         except (NoAnswer, BadAnswer, PortError) as error:
             if self._known is None:
-                return
+                return opened
             # `started` stays None: of what was to follow, nothing left.
             raise type(error)(
                 f"the port was opened again, and unit {self._unit} did not say what it is before anything is written "
@@ -64,6 +67,7 @@ class Identity:
                 unit=self._unit,
             )
         self._opened = opened
+        return opened
 
     def _ask(self) -> str:
         try:

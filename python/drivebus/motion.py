@@ -275,8 +275,6 @@ class Motion(Registers):
     def _command(self, name: str, setpoint: int | None = None) -> None:
         """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
         urgent = name in _HALTS
-        if not urgent:
-            self._identity.check()
         address, code = self.profile.command(name)
         words: int | list[int] = code
         if setpoint is not None:
@@ -286,7 +284,10 @@ class Motion(Registers):
             else:
                 self._write_setpoint(setpoint)
         try:
-            self._send(address, words, urgent=urgent)
+            if urgent:
+                self._send(address, words, urgent=True)
+            else:
+                self._write(address, words)
         except _LINE_ERRORS as error:
             if error.started is None:
                 raise

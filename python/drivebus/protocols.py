@@ -41,11 +41,13 @@ class BusProtocol(Protocol):
         *,
         urgent: bool = False,
         read_back: int | None = None,
+        connection: int | None = None,
     ) -> None:
         """Writes one word or several; *urgent* before all who wait, whatever is in doubt.
 
         Sent once. With *read_back*, the address where it can be read, a lost confirmation is cleared up by reading, and
-        only where the unit shows another value is the write repeated.
+        only where the unit shows another value is the write repeated. With *connection*, nothing is sent where
+        `reconnects` is another number by then: PortError.
         """
 
     def link(self, unit: int, /) -> Link:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, overload
 
-from drivebus.errors import DrivebusError, NotAllowed, Refused, StoreWarning
+from drivebus.errors import DrivebusError, NotAllowed, PortError, Refused, StoreWarning
 from drivebus.identity import Identity
 from drivebus.protocols import BusProtocol, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value
@@ -227,8 +227,14 @@ class Registers:
 
     def _write(self, address: int, value: int | Sequence[int], *, read_back: int | None = None) -> None:
         """Writes to the unit, if it still is the one it was."""
-        self._identity.check()
-        self._send(address, value, read_back=read_back)
+        connection = self._identity.check()
+        try:
+            self._send(address, value, read_back=read_back, connection=connection)
+        except PortError as error:
+            if error.started is not None or self.bus.reconnects == connection:
+                raise
+            # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
+            self._send(address, value, read_back=read_back, connection=self._identity.check())
 
     def _send(
         self,
@@ -237,9 +243,10 @@ class Registers:
         *,
         urgent: bool = False,
         read_back: int | None = None,
+        connection: int | None = None,
     ) -> None:
         with self._explained():
-            self.bus.write(self.unit, address, value, urgent=urgent, read_back=read_back)
+            self.bus.write(self.unit, address, value, urgent=urgent, read_back=read_back, connection=connection)
 
     def state(self) -> State:
         """What the drive is doing: one read of its first status word."""

@@ -70,7 +70,10 @@ class StandIn:
         *,
         urgent: bool = False,
         read_back: int | None = None,
+        connection: int | None = None,
     ) -> None:
+        if connection is not None and connection != self.reconnects:
+            raise drivebus.PortError("opened again; nothing was sent")
         self._take("write", address, value=value, urgent=urgent, read_back=read_back)
         words = [value] if isinstance(value, int) else value
         self.words.update(enumerate(words, address & ~RAM))
@@ -128,6 +131,65 @@ class TestWhatMayBeRepeated:
             (ACCELERATION, None),
             (ACCELERATION, ACCELERATION),
         ]
+
+
+class TestAPortThatIsOpenedByTheWriteItself:
+    """Lost, and not opened again yet: what is sent next opens it, and reaches whoever is behind it now."""
+
+    @pytest.fixture
+    def line(self, virtual: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive) -> drivebus.Simulator:
+        virtual.drive(1).take_writes()
+        virtual.line.unplug()
+        with pytest.raises(drivebus.PortError):
+            virtual_drive.state()
+        virtual.line.replug()
+        assert virtual_bus.reconnects == 0
+        return virtual
+
+    def test_the_same_drive_is_written_to(
+        self, line: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive
+    ) -> None:
+        virtual_drive.write("P00.11", 2.0)
+        assert [address for _, address, _ in line.drive(1).writes()] == [RAM | ACCELERATION]
+        assert virtual_bus.reconnects == 1
+
+    def test_another_drive_is_not(
+        self,
+        line: drivebus.Simulator,
+        virtual_bus: drivebus.Bus,
+        virtual_drive: Drive,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        read = virtual_bus.read
+        other = {IDENTIFICATION: [0x010A]}
+        monkeypatch.setattr(virtual_bus, "read", lambda unit, address: other.get(address) or read(unit, address))
+        with pytest.raises(drivebus.NotAllowed, match="another drive"):
+            virtual_drive.write("P00.11", 2.0)
+        assert line.drive(1).writes() == []
+
+    @pytest.mark.parametrize(
+        "write",
+        [
+            pytest.param(lambda drive: drive.write("P00.11", 2.0), id="drive"),
+            pytest.param(lambda drive: drive.bus.write(1, RAM | ACCELERATION, 20, read_back=ACCELERATION), id="bus"),
+        ],
+    )
+    def test_what_another_drive_shows_confirms_nothing(
+        self, virtual: drivebus.Simulator, virtual_drive: Drive, write: Callable[[Drive], None]
+    ) -> None:
+        virtual_drive.state()
+        # The confirmation is lost, and with the next answer the adapter falls out and is back at once.
+        virtual.line.set_times(replug=0.0)
+        virtual.line.script([(1, "silence"), (2, "unplug")])
+        with pytest.raises(drivebus.NoAnswer) as unknown:
+            write(virtual_drive)
+        assert unknown.value.started is not None
+        assert virtual.drive(1).register(ACCELERATION) == 20
+        assert virtual.line.fault_counts()["unplug"] == 1
+
+    def test_a_stop_goes_out_at_once(self, line: drivebus.Simulator, virtual_drive: Drive) -> None:
+        virtual_drive.stop()
+        assert [value for _, address, value in line.drive(1).writes() if address == CONTROL] == [STOP]
 
 
 class TestWhatGoesFirst:

@@ -37,6 +37,9 @@ pub struct CallOptions {
     /// Where the words of a write can be read. Then a confirmation that is missing is looked for there, and the write is
     /// repeated only while the unit shows other words. For absolute values only: what a command does, nobody can read back.
     pub read_back: Option<u16>,
+    /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
+    /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
+    pub connection: Option<u64>,
 }
 
 /// A call under way.
@@ -48,6 +51,7 @@ pub(crate) struct Call<'b, 'r> {
     retries: u32,
     verify: bool,
     read_back: Option<u16>,
+    connection: Option<u64>,
 }
 
 impl<'b, 'r> Call<'b, 'r> {
@@ -63,6 +67,7 @@ impl<'b, 'r> Call<'b, 'r> {
             retries: options.retries.unwrap_or(bus.options().retries),
             verify: options.verify,
             read_back: options.read_back.filter(|_| ask.request.is_write()),
+            connection: options.connection,
             ask,
         }
     }
@@ -198,7 +203,8 @@ impl<'b, 'r> Call<'b, 'r> {
     /// Writes words that can be read back at `address`.
     ///
     /// Where the confirmation is missing the unit is asked what it has. What it does not show by then it has not taken:
-    /// no request from before is open any more when it answers.
+    /// no request from before is open any more when it answers. All of it happens over the connection that the write went
+    /// out over: behind another one, another unit may answer.
     fn write_value(
         &self,
         turn: &mut Turn<'b>,
@@ -215,22 +221,24 @@ impl<'b, 'r> Call<'b, 'r> {
         let Ok(read) = Request::read(address, count) else {
             return self.repeat(turn, 0, give_up, take);
         };
-        let reading = Call { ask: Ask { request: &read, ..self.ask }, read_back: None, ..*self };
+        let mut writing = Call { ..*self };
         let mut times = 0;
         loop {
-            let error = match self.repeat(turn, 0, give_up, take) {
+            let error = match writing.repeat(turn, 0, give_up, take) {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
             let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else { return Err(error) };
             times += 1;
+            writing.connection = Some(self.bus.lock().stats().reconnects);
+            let reading = Call { ask: Ask { request: &read, ..self.ask }, read_back: None, ..writing };
             let mut shows = Vec::new();
-            let read = reading.repeat(turn, self.retries, give_up, &mut |answer| {
+            let outcome = reading.repeat(turn, self.retries, give_up, &mut |answer| {
                 if let Answer::Read { words, .. } = answer {
                     shows = words.iter().collect();
                 }
             });
-            match read {
+            match outcome {
                 Ok(done) if shows == written => return Ok(Done { sent, ended: done.ended }),
                 Ok(done) if times > self.retries => {
                     return Err(self.ask.failed(Failure::NotTaken { times, shows }, Some(sent), done.ended, &[]));
@@ -263,6 +271,9 @@ impl<'b, 'r> Call<'b, 'r> {
             }
             if let Err(failure) = owner.reopen(give_up) {
                 return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
+            }
+            if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
+                return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
             let sure = match owner.next(&self.ask, &tried) {
                 Next::Ask(sure) => sure,

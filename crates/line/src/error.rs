@@ -94,6 +94,9 @@ pub enum Failure {
     /// The port cannot be used.
     #[error("{0}")]
     Port(PortError),
+    /// The port was opened again since the caller saw who answers. Nothing was sent.
+    #[error("the port was opened again meanwhile, and another unit may answer; nothing was sent")]
+    Reopened,
     /// The bus was closed.
     #[error("the bus is closed")]
     Closed,

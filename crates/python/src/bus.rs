@@ -118,7 +118,7 @@ impl Bus {
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None))]
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None))]
     fn write(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -126,9 +126,11 @@ impl Bus {
         value: &Bound<'_, PyAny>,
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
+        connection: Option<u64>,
     ) -> PyResult<()> {
         let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-        let options = CallOptions { in_doubt: urgent, priority: stop_if(urgent), read_back, ..CallOptions::default() };
+        let priority = stop_if(urgent);
+        let options = CallOptions { in_doubt: urgent, priority, read_back, connection, ..CallOptions::default() };
         self.write_to(unit_address(unit)?.into(), address, value, options)
     }
 
