@@ -5,6 +5,8 @@ The last resorts are here too, because they take long where a second is a second
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 
 import drivebus
@@ -142,3 +144,20 @@ def test_a_refused_look_does_not_make_a_command_refused(virtual: Simulator, virt
     virtual_drive.stop()
     assert [data for _, who, data in virtual.line.trace() if who == "unit"].count(refusal) == 1
     assert commands(virtual) == [FORWARD, STOP]
+
+
+def test_no_motor_starts_over_a_line_that_loses_answers(
+    virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive
+) -> None:
+    virtual.line.set_faults(silence=0.5)
+    for _ in range(5):
+        with contextlib.suppress(drivebus.DrivebusError):
+            virtual_drive.status()
+    assert virtual_bus.link(1).failed > 1
+    with pytest.raises(drivebus.NotAllowed, match="the link to unit 1 is bad"):
+        virtual_drive.run(hz=5.0)
+    assert commands(virtual) == []
+    virtual.line.clear()
+    virtual_drive.run(hz=5.0)
+    assert commands(virtual) == [FORWARD], "ten looks have proved it"
+    assert virtual_bus.link(1) == drivebus.Link(10, 10)

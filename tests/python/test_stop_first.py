@@ -1,0 +1,49 @@
+"""A stop goes before all who wait for the line, and so do the reads that confirm it. From the wire's own record."""
+
+from __future__ import annotations
+
+import threading
+
+import drivebus
+from drivebus import Bus, Simulator
+
+WAITING = 200
+STOP = bytes.fromhex("01 06 20 00 00 05 42 09")
+STATE = bytes.fromhex("01 03 21 00")
+
+
+def requests(simulator: Simulator) -> list[bytes]:
+    return [data for _, who, data in simulator.line.trace() if who == "master"]
+
+
+def test_a_stop_and_its_confirmation_overtake_200_reads_that_wait() -> None:
+    with (
+        Simulator({1: "gd350", 2: "gd350"}, transport="process") as simulator,
+        Bus(simulator) as bus,
+    ):
+        drive = bus.drive(1)
+        drive.prepare_control()
+        drive.run(hz=5.0)
+        other = bus.read(2, 0x2103)
+        answers: list[list[int]] = []
+        readers = [threading.Thread(target=lambda: answers.append(bus.read(2, 0x2103))) for _ in range(WAITING)]
+        begun = simulator.line.requests
+        for reader in readers:
+            reader.start()
+        while simulator.line.requests < begun + 3:
+            threading.Event().wait(0.001)
+        sent = len(requests(simulator))
+        drive.stop()
+        waiting = WAITING - len(answers)
+        for reader in readers:
+            reader.join()
+        seen = requests(simulator)
+
+        assert waiting > WAITING / 2, "the reads were still waiting when the stop was confirmed"
+        # The one in flight, and the one that may have begun between the look at the record and the stop.
+        stop = seen.index(STOP)
+        assert stop <= sent + 2
+        # The line is free for a moment between the two: one may begin.
+        assert any(request.startswith(STATE) for request in seen[stop + 1 : stop + 3])
+        assert answers == [other] * WAITING
+        assert drive.wait_until_stopped(30).state is drivebus.State.STOPPED
