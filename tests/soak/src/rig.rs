@@ -23,6 +23,8 @@ const DELAY: Duration = Duration::from_millis(10);
 /// Of late answers, at least: beyond the time-out.
 const LATE: Duration = Duration::from_millis(35);
 const OUT: Duration = Duration::from_millis(100);
+/// Calls until everybody asks another unit.
+const FOCUS: u64 = 50;
 /// P14.03: how long a unit takes to answer.
 const RESPONSE_DELAY: u16 = 0x0E03;
 /// What makes a drive obey the bus: P00.01, P00.02 and P00.06; and P00.03 and P00.04, so that every setpoint is allowed.
@@ -114,6 +116,12 @@ impl Rig {
     /// Whether there is more to do.
     pub(crate) fn goes_on(&self) -> bool {
         self.calls.load(Ordering::Relaxed) < self.most_calls && self.simulator.now() < self.end
+    }
+
+    /// The unit that everybody asks now: a reply is most easily taken for another one's while its unit is asked again.
+    pub(crate) fn focus(&self) -> u8 {
+        let turn = self.calls.load(Ordering::Relaxed) / FOCUS;
+        usize::try_from(turn).ok().and_then(|turn| UNITS.get(turn % UNITS.len())).copied().unwrap_or(1)
     }
 
     /// One call of the bus.

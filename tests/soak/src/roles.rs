@@ -45,26 +45,44 @@ impl Reader {
 
 impl Role for Reader {
     fn act(&mut self, rig: &Rig, verdict: &mut Verdict) {
-        let (Some(unit), Some((first, length))) = (self.0.one_of(&UNITS), self.0.one_of(&BLOCKS)) else { return };
-        let count = 1 + self.0.below(length);
+        let (Some(unit), Some((first, length))) = (some_unit(rig, &mut self.0, &UNITS), self.0.one_of(&BLOCKS)) else {
+            return;
+        };
+        // Many of the same length, which only the address tells apart, and nothing in the answer does.
+        let count = if self.0.below(2) == 0 { 2 } else { 1 + self.0.below(length) };
         let address = first + self.0.below(length - count + 1);
         let expected: Vec<u16> = (address..address + count).map(|address| known(unit, address)).collect();
-        read(rig, unit, address, &expected, verdict);
+        // Half of them are not repeated: the next one then comes while the answer may still be on its way.
+        let retries = (self.0.below(2) == 0).then_some(0);
+        read(rig, unit, address, &expected, retries, verdict);
     }
 }
 
+/// Most of the time the unit that everybody asks, if it is one of `units`.
+fn some_unit(rig: &Rig, chance: &mut Chance, units: &[u8]) -> Option<u8> {
+    let focus = rig.focus();
+    if chance.below(4) > 0 && units.contains(&focus) { Some(focus) } else { chance.one_of(units) }
+}
+
 /// Reads as many words as are `expected`, or says what came instead.
-fn read(rig: &Rig, unit: u8, address: u16, expected: &[u16], verdict: &mut Verdict) {
-    if let Some(came) = words(rig, unit, address, expected.len(), verdict) {
+fn read(rig: &Rig, unit: u8, address: u16, expected: &[u16], retries: Option<u32>, verdict: &mut Verdict) {
+    if let Some(came) = words(rig, unit, address, expected.len(), retries, verdict) {
         judge(rig, unit, address, &[expected], &came, verdict);
     }
 }
 
 /// What is read, if anything is.
-fn words(rig: &Rig, unit: u8, address: u16, count: usize, verdict: &mut Verdict) -> Option<Vec<u16>> {
+fn words(
+    rig: &Rig,
+    unit: u8,
+    address: u16,
+    count: usize,
+    retries: Option<u32>,
+    verdict: &mut Verdict,
+) -> Option<Vec<u16>> {
     let request = Request::read(address, u16::try_from(count).ok()?).ok()?;
     let mut came = Vec::with_capacity(count);
-    let result = rig.ask(unit, &request, CallOptions::default(), &mut |answer| {
+    let result = rig.ask(unit, &request, CallOptions { retries, ..CallOptions::default() }, &mut |answer| {
         came.clear();
         if let Answer::Read { words, .. } = answer {
             came.extend(words.iter());
@@ -202,7 +220,7 @@ impl Writer {
     fn read_back(&mut self, rig: &Rig, unit: u8, address: u16, verdict: &mut Verdict) {
         let Some(account) = self.accounts.get_mut(&(unit, address)) else { return };
         let before = account.current.map(|value| as_written(address, value)).unwrap_or_default();
-        let Some(came) = words(rig, unit, address, before.len(), verdict) else { return };
+        let Some(came) = words(rig, unit, address, before.len(), None, verdict) else { return };
         account.check(&rig.journal.taken(unit, address), verdict);
         let after = account.current.map(|value| as_written(address, value)).unwrap_or_default();
         judge(rig, unit, address, &[&before, &after], &came, verdict);
@@ -258,7 +276,7 @@ fn conclude(
 
 impl Role for Writer {
     fn act(&mut self, rig: &Rig, verdict: &mut Verdict) {
-        let Some(unit) = self.chance.one_of(&self.units) else { return };
+        let Some(unit) = some_unit(rig, &mut self.chance, &self.units) else { return };
         let place = usize::from(self.chance.below(7));
         let address = SINGLE.get(place).copied().unwrap_or(PAIR);
         let written = self.accounts.get(&(unit, address)).is_some_and(|account| account.current.is_some());
@@ -365,7 +383,7 @@ fn at_once() -> CallOptions {
 
 impl Role for Commander {
     fn act(&mut self, rig: &Rig, verdict: &mut Verdict) {
-        let Some(unit) = self.chance.one_of(&UNITS) else { return };
+        let Some(unit) = some_unit(rig, &mut self.chance, &UNITS) else { return };
         if self.chance.below(4) == 0 {
             self.stop(rig, unit, verdict);
         } else {

@@ -10,7 +10,7 @@ fn plan(seed: u64, threads: usize) -> Plan {
         calls: 20_000,
         seed,
         threads,
-        rate: 0.005,
+        rate: 0.01,
         unplug_rate: 0.001,
         pull_every: Duration::from_secs(5),
         ..Plan::default()

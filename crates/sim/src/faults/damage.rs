@@ -256,3 +256,41 @@ fn sealed(mut body: Vec<u8>) -> Vec<u8> {
     body.extend(crc.to_le_bytes());
     body
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(body: &[u8]) -> Vec<u8> {
+        sealed(body.to_vec())
+    }
+
+    #[test]
+    fn a_frame_that_could_pass_for_the_answer_is_noticed_wherever_it_stands() {
+        let answer = frame(&[1, 0x03, 2, 0x12, 0x34]);
+        let other_words = frame(&[1, 0x03, 2, 0x12, 0x35]);
+        let refusal = frame(&[1, 0x83, 0x02]);
+        for passes in [other_words, refusal] {
+            for noise in [&[][..], &[0x00], &[1, 0x03], &[1, 0x83]] {
+                let arrives = [noise, &passes, &[0xFF]].concat();
+                assert!(is_forged(&answer, &arrives), "{arrives:02X?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_answer_and_frames_that_everybody_can_tell_from_it_pass() {
+        let answer = frame(&[1, 0x03, 2, 0x12, 0x34]);
+        let others = [
+            answer.clone(),
+            frame(&[2, 0x03, 2, 0x12, 0x35]),
+            frame(&[1, 0x04, 2, 0x12, 0x35]),
+            frame(&[1, 0x03, 0]),
+            frame(&[1, 0x03, 4, 0x12, 0x34, 0x12, 0x34]),
+            vec![1, 0x03, 2, 0x12, 0x35, 0x00, 0x00],
+        ];
+        for arrives in others {
+            assert!(!is_forged(&answer, &arrives), "{arrives:02X?}");
+        }
+    }
+}
