@@ -44,6 +44,9 @@ HANG = """
 """
 
 
+children: list[subprocess.Popen[str]] = []
+
+
 @pytest.fixture
 def simulator() -> Iterator[Simulator]:
     with Simulator({1: "gd350", 2: "gd350"}) as simulator:
@@ -53,6 +56,11 @@ def simulator() -> Iterator[Simulator]:
                 drive.prepare_control()
                 drive.write({"P00.11": RAMP, "P00.12": RAMP})
         yield simulator
+        # What a failed test left behind.
+        while children:
+            child = children.pop()
+            child.kill()
+            child.communicate()
 
 
 def commands(simulator: Simulator, unit: int = 1) -> list[int]:
@@ -65,6 +73,7 @@ def start(simulator: Simulator, body: str, program: str = PROGRAM) -> subprocess
     child = subprocess.Popen(
         [sys.executable, "-c", text, simulator.port], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
+    children.append(child)
     assert child.stdout is not None
     line = child.stdout.readline()
     assert line == "running\n", (line, child.communicate(timeout=20))
@@ -237,6 +246,7 @@ def test_a_forked_child_stops_nothing(simulator: Simulator) -> None:
         stdout=subprocess.PIPE,
         text=True,
     )
+    children.append(child)
     assert child.stdout is not None
     assert child.stdout.readline() == "running\n"
     assert commands(simulator) == [FORWARD]
