@@ -38,7 +38,8 @@ class Bus:
         bytesize: 7 or 8.
         silence: `"spec"`, `"characters"` or seconds; see `drivebus.SerialFormat`.
         timeout: Seconds to wait for an answer after the request has left.
-        retries: How often a *read* is repeated after silence or a bad answer. Writes are never repeated.
+        retries: How often a *read* is repeated after silence; a damaged answer, which took no time-out, counts half.
+            Writes are never repeated, unless they can be read back: see `write`.
         read_only: Refuse every write before it is sent.
         rs485: Kernel RS-485 settings, for ports whose driver switches direction.
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.

@@ -25,7 +25,7 @@ pub struct BusOptions {
     pub format: SerialFormat,
     /// The longest wait from the end of a request to the end of its answer.
     pub timeout: Duration,
-    /// How often a read is asked once more. A write is never.
+    /// How often a read is asked once more. A damaged answer, which took no time-out, counts half. A write is never.
     pub retries: u32,
     /// Whether every request that may change something in a unit is refused before it is sent.
     pub read_only: bool,

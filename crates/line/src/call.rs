@@ -2,7 +2,7 @@
 //!
 //! | kind | after silence or a damaged answer |
 //! | --- | --- |
-//! | a read | asked again, as often as the bus is set to |
+//! | a read | asked again, as often as the bus is set to; a damaged answer, which took no time-out, counts half |
 //! | a write whose words can be read back | read back; written again only where the unit shows other words |
 //! | any other write, an echo, a custom request | never: the caller is told |
 
@@ -15,16 +15,19 @@ use crate::backoff::Verdict;
 use crate::bus::Bus;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::owner::Next;
+use crate::owner::{Next, Owner};
 use crate::queue::{Priority, Turn};
 use crate::resync::Tried;
+
+/// How many more attempts than questions there may be: those that end with a probe.
+const PROBED_IN_VAIN: u32 = 4;
 
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CallOptions {
     /// The longest wait for the answer.
     pub timeout: Option<Duration>,
-    /// How often a read is asked once more.
+    /// How often a read is asked once more; after a damaged answer, which took no time-out, twice as often.
     pub retries: Option<u32>,
     /// Who goes first; `None` is [`Priority::Write`] for what changes something and [`Priority::Read`] for the rest.
     pub priority: Option<Priority>,
@@ -40,6 +43,42 @@ pub struct CallOptions {
     /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
     /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
     pub connection: Option<u64>,
+}
+
+/// What the attempts of one call leave to the next.
+struct Course {
+    /// How long the caller allowed them to take.
+    allowed: Duration,
+    /// When that is over: from the beginning, and then from the first question on.
+    until: Instant,
+    /// How often it was asked.
+    asked: u32,
+    /// The number of requests to the unit, if the last of them was a read of this call, which it left open.
+    left_open: Option<u64>,
+}
+
+impl Course {
+    /// Asks, and remembers whether the same may be asked again.
+    fn ask(
+        &mut self,
+        owner: &mut Owner,
+        ask: &Ask<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        if self.asked == 0 {
+            self.until = owner.now() + self.allowed;
+        }
+        self.asked += 1;
+        let result = owner.exchange(ask, give_up, take);
+        self.left_open = match (&result, ask.destination, ask.request) {
+            (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
+                Some(owner.asked(unit))
+            }
+            _ => None,
+        };
+        result
+    }
 }
 
 /// A call under way.
@@ -169,8 +208,8 @@ impl<'b, 'r> Call<'b, 'r> {
 
     /// Asks, and asks again up to `retries` times while nothing comes of it.
     ///
-    /// The first attempt takes what it takes to be sure of the unit; the others begin only within the time that the
-    /// caller allowed for them.
+    /// The time that the caller allowed, the time-out for each of these times, is allowed once for making sure of the
+    /// unit and once, from the first question on, for asking.
     fn repeat(
         &self,
         turn: &mut Turn<'b>,
@@ -179,19 +218,26 @@ impl<'b, 'r> Call<'b, 'r> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut lost = None;
-        let mut until = None;
-        let mut attempt = 0;
+        let allowed = self.ask.timeout.saturating_mul(retries.saturating_add(1));
+        let now = self.bus.now_of(&self.bus.lock());
+        let mut course = Course { allowed, until: now + allowed, asked: 0, left_open: None };
+        let (mut attempts, mut halves) = (0, 0);
         loop {
-            attempt += 1;
-            let error = match self.attempt(turn, give_up, take) {
+            attempts += 1;
+            let asked = course.asked;
+            let error = match self.attempt(turn, &mut course, give_up, take) {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
-            let until = *until.get_or_insert(error.ended + self.ask.timeout.saturating_mul(retries));
             let is_port = matches!(error.failure, Failure::Port(_));
-            if attempt > retries || !is_passing(&error.failure) || (attempt > 1 && error.ended >= until) {
+            if course.asked > asked {
+                halves += if is_damaged(&error.failure) { 1 } else { 2 };
+            }
+            let most = if retries == 0 { 1 } else { retries.saturating_add(1).saturating_mul(2) };
+            let is_over = halves >= most || attempts > most.saturating_add(PROBED_IN_VAIN);
+            if is_over || !is_passing(&error.failure) || error.ended >= course.until {
                 // How the port was lost tells more than that it is still not there.
-                return Err(lost.filter(|_| is_port).unwrap_or_else(|| attempted(error, attempt)));
+                return Err(lost.filter(|_| is_port).unwrap_or_else(|| attempted(error, course.asked)));
             }
             lost = is_port.then_some(error);
             if let Some(unit) = self.unit {
@@ -251,9 +297,13 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     /// Asks once, beyond doubt: with what has to come before, and as often as it takes to be sure.
+    ///
+    /// A read that only this call left open is asked again as it is: whichever of the two is answered, it is this
+    /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
     fn attempt(
         &self,
         turn: &mut Turn<'b>,
+        course: &mut Course,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
@@ -275,7 +325,13 @@ impl<'b, 'r> Call<'b, 'r> {
             if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
-            let sure = match owner.next(&self.ask, &tried) {
+            let in_time = self.bus.now_of(&owner) < course.until;
+            let again = self.unit.is_some_and(|unit| course.left_open.take() == Some(owner.asked(unit)));
+            if again {
+                let ask = Ask { in_doubt: true, ..self.ask };
+                return course.ask(&mut owner, &ask, give_up, take);
+            }
+            let sure = match owner.next(&self.ask, &tried, in_time) {
                 Next::Ask(sure) => sure,
                 Next::LookForEcho => {
                     owner.look_for_echo(&self.ask, give_up)?;
@@ -300,7 +356,7 @@ impl<'b, 'r> Call<'b, 'r> {
             };
             let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(self.verify)));
             let Some(unit) = self.unit.filter(|_| !agreement.is_immediate()) else {
-                let result = owner.exchange(&self.ask, give_up, take);
+                let result = course.ask(&mut owner, &self.ask, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);
             };
             if asked == 1 {
@@ -334,10 +390,10 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 }
 
-/// `error`, which was the last of so many attempts.
+/// `error`, which came when it was asked for the last of so many times.
 fn attempted(mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
     if let Failure::NoAnswer { timeout, .. } = error.failure {
-        error.failure = Failure::NoAnswer { timeout, attempts };
+        error.failure = Failure::NoAnswer { timeout, attempts: attempts.max(1) };
     }
     error
 }
@@ -353,5 +409,10 @@ fn is_passing(failure: &Failure) -> bool {
 
 /// Whether the request went out, and no right answer came.
 fn is_unanswered(failure: &Failure) -> bool {
-    matches!(failure, Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_))
+    matches!(failure, Failure::NoAnswer { .. }) || is_damaged(failure)
+}
+
+/// Whether an answer came that was none.
+fn is_damaged(failure: &Failure) -> bool {
+    matches!(failure, Failure::Wrong(_) | Failure::Corrupt(_))
 }

@@ -108,6 +108,11 @@ impl Owner {
         self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
     }
 
+    /// How many requests went to `unit` so far.
+    pub(crate) fn asked(&self, unit: UnitAddress) -> u64 {
+        self.stats().units.get(&unit).map_or(0, |counters| counters.requests)
+    }
+
     /// How well `unit` could be reached lately.
     pub(crate) fn link(&self, unit: UnitAddress) -> Link {
         self.links.of(unit)
@@ -147,7 +152,7 @@ impl Owner {
     /// Nothing is sent where nothing is in doubt. Before a request whose answer may look like it, a write or the echo
     /// sent here included, one word is read if it is not known yet whether the adapter echoes. Then a unit that may still
     /// answer something else is probed.
-    pub(crate) fn next(&mut self, ask: &Ask<'_>, tried: &Tried) -> Next {
+    pub(crate) fn next(&mut self, ask: &Ask<'_>, tried: &Tried, in_time: bool) -> Next {
         let Destination::Unit(unit) = ask.destination else {
             return Next::Ask(Attribution::Certain);
         };
@@ -160,7 +165,7 @@ impl Owner {
             return Next::LookForEcho;
         }
         if in_quarantine && !matches!(ask.request, Request::Echo { .. }) {
-            if let Some(probe) = self.resync.probe(&self.master, now, unit, ask.request, tried) {
+            if let Some(probe) = self.resync.probe(&self.master, now, unit, ask.request, tried, in_time) {
                 return Next::Probe(unit, probe);
             }
             return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
@@ -244,7 +249,7 @@ impl Owner {
                 Err(_) => return Ok(()), // the count was checked when the probe was chosen
             },
         };
-        let silent_on_echo = tried.echo;
+        let silent_on_echo = tried.has_echoed();
         tried.note(probe);
         self.stats().count(Some(unit), |counters| counters.resyncs += 1);
         match self.exchange(&Ask { request: &request, ..*ask }, give_up, &mut |_| ()) {

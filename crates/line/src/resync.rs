@@ -8,6 +8,9 @@ use drivebus_rtu::{Instant, Master, Request, UnitAddress};
 
 use crate::error::CallError;
 
+/// How often one attempt echoes a unit that is known to return echoes.
+const ECHOES: u32 = 2;
+
 /// Most words that a read asks for only to tell its answer from others: what every drive known here allows.
 const MAX_WORDS: u16 = 16;
 
@@ -48,17 +51,22 @@ pub(crate) enum Probe {
 /// What was tried for one attempt of a call, and what came of it.
 #[derive(Debug, Default)]
 pub(crate) struct Tried {
-    pub(crate) echo: bool,
+    echoes: u32,
     other_read: bool,
     /// How the latest probe failed.
     pub(crate) failure: Option<Box<CallError>>,
 }
 
 impl Tried {
+    /// Whether an echo went out, or was to.
+    pub(crate) fn has_echoed(&self) -> bool {
+        self.echoes > 0
+    }
+
     /// `probe` goes out.
     pub(crate) fn note(&mut self, probe: Probe) {
         match probe {
-            Probe::Echo => self.echo = true,
+            Probe::Echo => self.echoes += 1,
             Probe::OtherRead { .. } => self.other_read = true,
         }
     }
@@ -104,6 +112,7 @@ impl Resync {
     }
 
     /// What to send to `unit`, which is in quarantine and is to be asked `request`; `None` when everything was tried.
+    /// Not `in_time`, nothing is tried twice.
     pub(crate) fn probe(
         &mut self,
         master: &Master,
@@ -111,9 +120,11 @@ impl Resync {
         unit: UnitAddress,
         request: &Request<'_>,
         tried: &Tried,
+        in_time: bool,
     ) -> Option<Probe> {
         let known = self.0.entry(unit).or_default();
-        let echo = (!tried.echo).then_some(Probe::Echo);
+        let echoes = if in_time && known.on_echo == OnEcho::Returns { ECHOES } else { 1 };
+        let echo = (tried.echoes < echoes).then_some(Probe::Echo);
         let address = match *request {
             Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
             _ => known.readable,
@@ -129,7 +140,7 @@ impl Resync {
             return if known.on_echo == OnEcho::Silent { other_read().or(echo) } else { echo.or_else(other_read) };
         }
         // Silence is all that is known: one probe an attempt, so that it costs no more than an attempt.
-        if tried.echo || tried.other_read {
+        if tried.has_echoed() || tried.other_read {
             return None;
         }
         let probe = if known.echo_was_last { other_read().or(echo) } else { echo };

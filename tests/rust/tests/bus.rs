@@ -87,6 +87,7 @@ fn a_read_is_repeated_and_a_write_is_not() {
     simulator.wire().drop_answers(2);
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
     assert_eq!(bus.stats().total.timeouts, 2);
+    assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
 
     let accel = 0x800B; // P00.11, RAM
     simulator.wire().drop_answers(1);
@@ -313,6 +314,5 @@ fn a_link_is_as_good_as_its_last_exchanges() {
     simulator.wire().drop_answers(2);
     read(&bus, STATE, 1).unwrap();
     let link = bus.link(unit(1));
-    // Two time-outs (of the read and of one echo), then an echo and the read.
     assert_eq!((link.good, link.asked), (8, 10));
 }
