@@ -119,7 +119,7 @@ impl Run {
             1 => {
                 self.master.opened(self.now);
                 self.quiet_from = self.quiet_from.max(self.now);
-                for known in &mut self.units {
+                for known in self.units.iter_mut().skip(1) {
                     known.strange_until = Some(self.now + FIRST_CONTACT);
                 }
             }
@@ -328,9 +328,8 @@ impl Run {
                         }
                     }
                     (false, true) => assert!(!known.is_doubtful(now) || !is_apart, "a refusal that may be late"),
-                    (false, false) if is_apart && known.is_doubtful(now) => {
-                        known.settle();
-                    }
+                    // It answers in the order it was asked: what was open before will not come any more.
+                    (false, false) if is_apart => known.open.clear(),
                     (false, false) => {}
                 }
                 self.quiet_from = self.now;
