@@ -268,13 +268,18 @@ impl<'b, 'r> Call<'b, 'r> {
             return self.repeat(turn, 0, give_up, take);
         };
         let mut writing = Call { ..*self };
-        let mut times = 0;
+        let (mut times, mut before) = (0, None);
         loop {
-            let error = match writing.repeat(turn, 0, give_up, take) {
+            let mut error = match writing.repeat(turn, 0, give_up, take) {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
-            let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else { return Err(error) };
+            let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else {
+                // It may not have gone out this time, but it has before.
+                error.sent = error.sent.or(before);
+                return Err(error);
+            };
+            before = Some(sent);
             times += 1;
             writing.connection = Some(self.bus.lock().stats().reconnects);
             let reading = Call { ask: Ask { request: &read, ..self.ask }, read_back: None, ..writing };
