@@ -149,11 +149,22 @@ def buses() -> dict[str, bytes]:
     """For `bus`: how many calls (and whether the adapter may echo), the calls, what comes after each transmission."""
     read, write, echo, custom = (bytes([kind, 0, 0x10, 5, 0, 1]) for kind in (0, 3, 5, 6))
     answer, late, own = bytes([ANSWER | SILENT, 0, 0, 7]), bytes([ANSWER | LATE, 0, 0, 7]), bytes([OWN, 0])
+    # The same call with a second look: a read that is verified, a write that is read back.
+    sure_read, sure_write = bytes([8]) + read[1:], bytes([11]) + write[1:]
+    taken = bytes([ANSWER | SILENT, 0, 0, 1])
+    babble = bytes([LUMPS | SILENT, 5 << 4 | 1, RUN, 1, 255])
     one, two, none, lost = b"\1", b"\2", b"\0", b"\xff"
     return {
         "read": b"\0" + read + (one + answer) * 4,
         "write": b"\0" + write + (one + answer) * 4,
         "calls": b"\3" + read + write + echo + custom + (one + answer) * 12,
+        "verified": b"\0" + sure_read + (one + answer) * 6,
+        "verified-differently": b"\0" + sure_read + (one + answer + one + taken) * 6,
+        "read-back-taken": b"\0" + sure_write + one + answer + none + (one + answer + one + taken) * 2,
+        "read-back-other": b"\0" + sure_write + (one + answer + none) * 9,
+        "babble-after-reading-back": b"\0" + sure_write + one + answer + none + one + answer + b"\3" + answer + babble,
+        "gateway": b"\x11" + read + write + (one + answer) * 8,
+        "gateway-overtaken": b"\x12" + read + read + read + one + late + (one + answer) * 12,
         "late": b"\1" + read + read + one + late + (one + answer) * 8,
         "late-and-repeated": b"\1" + read + read + two + late + late + (two + late + answer) * 8,
         "mute": b"\1" + read + write + none * 12 + (one + answer) * 6,
