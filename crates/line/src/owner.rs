@@ -170,6 +170,7 @@ impl Owner {
             }
             return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
         }
+        self.resync.is_sure(unit);
         match self.master.attribution(now, unit, ask.request) {
             Attribution::Wait(until) => Next::Wait(until),
             sure => Next::Ask(sure),

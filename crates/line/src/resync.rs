@@ -11,6 +11,10 @@ use crate::error::CallError;
 /// How often one attempt echoes a unit that is known to return echoes.
 const ECHOES: u32 = 2;
 
+/// How many reads of another length one doubt is worth. Each that stays open is one more answer to wait for, and only time
+/// helps with a unit that answers none of them.
+const OTHER_READS: u32 = 2;
+
 /// Most words that a read asks for only to tell its answer from others: what every drive known here allows.
 const MAX_WORDS: u16 = 16;
 
@@ -85,6 +89,8 @@ struct Known {
     readable: Option<u16>,
     /// Nothing is known of it, and the latest probe was an echo.
     echo_was_last: bool,
+    /// Reads of another length since it was last sure.
+    other_reads: u32,
 }
 
 /// What a unit makes of an echo.
@@ -130,22 +136,32 @@ impl Resync {
             _ => known.readable,
         };
         let other_read = || {
-            let address = address.filter(|_| !tried.other_read && known.on_echo != OnEcho::Returns)?;
+            let is_worth_it = !tried.other_read && known.on_echo != OnEcho::Returns && known.other_reads < OTHER_READS;
+            let address = address.filter(|_| is_worth_it)?;
             (1..=MAX_WORDS)
                 .filter_map(|count| Some((count, Request::read(address, count).ok()?)))
                 .find(|(_, read)| master.tells_apart(now, unit, read))
                 .map(|(count, _)| Probe::OtherRead { address, count })
         };
-        if known.alive {
-            return if known.on_echo == OnEcho::Silent { other_read().or(echo) } else { echo.or_else(other_read) };
-        }
-        // Silence is all that is known: one probe an attempt, so that it costs no more than an attempt.
-        if tried.has_echoed() || tried.other_read {
-            return None;
-        }
-        let probe = if known.echo_was_last { other_read().or(echo) } else { echo };
+        let probe = if known.alive {
+            if known.on_echo == OnEcho::Silent { other_read().or(echo) } else { echo.or_else(other_read) }
+        } else if tried.has_echoed() || tried.other_read {
+            None // silence is all that is known: one probe an attempt, so that it costs no more than an attempt
+        } else if known.echo_was_last {
+            other_read().or(echo)
+        } else {
+            echo
+        };
         known.echo_was_last = probe == Some(Probe::Echo);
+        known.other_reads += u32::from(matches!(probe, Some(Probe::OtherRead { .. })));
         probe
+    }
+
+    /// `unit` owes nothing.
+    pub(crate) fn is_sure(&mut self, unit: UnitAddress) {
+        if let Some(known) = self.0.get_mut(&unit) {
+            known.other_reads = 0;
+        }
     }
 
     /// `unit` was silent on an echo, and then answered a read of another length.

@@ -67,6 +67,31 @@ fn a_unit_that_knows_no_echo_is_settled_by_a_read_of_another_length() {
     assert_eq!((stats.total.late, stats.total.resyncs), (1, 2), "{stats:?}");
 }
 
+/// A unit that answers each new question only when the next one has come: one behind, for as long as it is asked new ones.
+#[test]
+fn a_unit_that_no_probe_settles_is_trusted_again_when_it_was_left_alone() {
+    let mut held: Vec<u8> = Vec::new();
+    let rig = Rig::new(move |number, request| {
+        if request[1] == 8 {
+            return Vec::new();
+        }
+        let behind = (1..8).contains(&number);
+        let answer = if behind { std::mem::replace(&mut held, right(request)) } else { right(request) };
+        if answer.is_empty() { Vec::new() } else { at_once(&answer) }
+    });
+    assert_eq!(rig.read(7, 1).unwrap(), [7]);
+    let mut seconds = 0;
+    let words = loop {
+        if let Ok(words) = rig.read(200, 1) {
+            break words;
+        }
+        rig.pass(millis(1_000));
+        seconds += 1;
+        assert!(seconds < 10, "{:?}", rig.bus.stats());
+    };
+    assert_eq!(words, [200]);
+}
+
 /// Behind a gateway the echo comes back before the answer that is late.
 #[test]
 fn behind_a_gateway_the_same_words_have_to_come_twice() {
