@@ -236,8 +236,10 @@ impl<'b, 'r> Call<'b, 'r> {
             let most = if retries == 0 { 1 } else { retries.saturating_add(1).saturating_mul(2) };
             let is_over = halves >= most || attempts > most.saturating_add(PROBED_IN_VAIN);
             if is_over || !is_passing(&error.failure) || error.ended >= course.until {
-                // How the port was lost tells more than that it is still not there.
-                return Err(lost.filter(|_| is_port).unwrap_or_else(|| attempted(error, course.asked)));
+                // How the port was lost tells more than that it is still not there. But where the request went out only
+                // the second time, that has to be said.
+                let lost = lost.filter(|_| is_port && error.sent.is_none());
+                return Err(lost.unwrap_or_else(|| attempted(error, course.asked)));
             }
             lost = is_port.then_some(error);
             if let Some(unit) = self.unit {
