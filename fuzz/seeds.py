@@ -153,7 +153,7 @@ def buses() -> dict[str, bytes]:
     sure_read, sure_write = bytes([8]) + read[1:], bytes([11]) + write[1:]
     taken = bytes([ANSWER | SILENT, 0, 0, 1])
     babble = bytes([LUMPS | SILENT, 5 << 4 | 1, RUN, 1, 255])
-    one, two, none, lost = b"\1", b"\2", b"\0", b"\xff"
+    one, two, none, lost = b"\1", b"\2", b"\0", b"\xfc"
     return {
         "read": b"\0" + read + (one + answer) * 4,
         "write": b"\0" + write + (one + answer) * 4,
@@ -170,7 +170,8 @@ def buses() -> dict[str, bytes]:
         "mute": b"\1" + read + write + none * 12 + (one + answer) * 6,
         "echoing-adapter": b"\x0a" + read + write + read + (two + own + answer) * 9,
         "only-the-adapter": b"\x0a" + read + write + read + (one + own) * 9,
-        "unplugged": b"\1" + read + read + lost + answer + (one + answer) * 6,
+        "unplugged": b"\1" + read + read + lost + (one + answer) * 6,
+        "unplugged-twice": b"\0" + write + lost + one + answer + lost + (one + answer) * 4,
         "broadcast": b"\1" + bytes([0xF3]) + write[1:] + read + none + (one + answer) * 6,
         "noise": b"\1" + read + write + (two + bytes([RUN | SILENT, 1, 30]) + answer) * 8,
         "damaged": b"\1" + read + write + (one + bytes([DAMAGED | SILENT, 0, 0, 7, 3, 4])) * 4 + (one + answer) * 8,

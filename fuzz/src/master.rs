@@ -27,7 +27,8 @@ pub fn master(data: &[u8]) {
         silence,
         strips_echo: how & 1 == 1,
         now: Instant::ZERO,
-        quiet_from: Instant::ZERO,
+        last_byte: Instant::ZERO,
+        request_left: Instant::ZERO,
         units: Default::default(),
         sent: Vec::new(),
         fed: 0,
@@ -100,8 +101,10 @@ struct Run {
     silence: Duration,
     strips_echo: bool,
     now: Instant,
-    /// Since when nothing was on the line, as far as the master can know.
-    quiet_from: Instant,
+    /// When something was on the line that the master did not send.
+    last_byte: Instant,
+    /// When the latest request has left, as far as the master can know.
+    request_left: Instant,
     /// Number 0 is nobody.
     units: [Known; UNITS as usize + 1],
     sent: Vec<Vec<u8>>,
@@ -118,7 +121,7 @@ impl Run {
             0 => self.now = self.now + PATIENCE / 2,
             1 => {
                 self.master.opened(self.now);
-                self.quiet_from = self.quiet_from.max(self.now);
+                self.last_byte = self.last_byte.max(self.now);
                 for known in self.units.iter_mut().skip(1) {
                     known.strange_until = Some(self.now + FIRST_CONTACT);
                 }
@@ -145,7 +148,7 @@ impl Run {
             self.fed += count;
             rest = &rest[count..];
             if count > 0 {
-                self.quiet_from = self.quiet_from.max(self.now);
+                self.last_byte = self.last_byte.max(self.now);
             }
             let said = self.master.poll(self.now).map(Said::of);
             let ended = said.as_ref().is_some_and(|said| !matches!(said, Said::Transmit(_)));
@@ -271,7 +274,8 @@ impl Run {
         if let Said::Transmit(frame) = said {
             assert!(!*transmitted, "sent twice");
             assert_eq!(frame, job.frame);
-            assert!(self.now >= self.quiet_from + self.silence, "the silence before a request was cut short");
+            let quiet_from = self.last_byte.max(self.request_left);
+            assert!(self.now >= quiet_from + self.silence, "the silence before a request was cut short");
             self.sent.push(frame);
             *transmitted = true;
             assert_eq!(self.master.deadline(), None);
@@ -284,7 +288,7 @@ impl Run {
                 }
             }
             self.master.sent(end);
-            self.quiet_from = self.quiet_from.max(end);
+            self.request_left = self.request_left.max(end);
             *limit = end + job.timeout;
             return false;
         }
@@ -332,7 +336,8 @@ impl Run {
                     (false, false) if is_apart => known.open.clear(),
                     (false, false) => {}
                 }
-                self.quiet_from = self.now;
+                // An answer proves that the request has left, whatever was computed.
+                self.request_left = self.request_left.min(self.now);
             }
             Said::Wrong { frame, error } => {
                 let Some((address, pdu)) = oracle::frame(&frame) else {
@@ -343,7 +348,8 @@ impl Run {
                 let owes = !known.open.is_empty();
                 assert!(!(owes && is_echo && matches!(error, AnswerError::Echo { .. })), "a late echo is no answer");
                 assert!(heard.windows(frame.len()).any(|part| part == frame));
-                self.quiet_from = self.now;
+                // An answer proves that the request has left, whatever was computed.
+                self.request_left = self.request_left.min(self.now);
                 self.leave_open(job, true);
             }
             Said::Corrupt(bytes) => {
