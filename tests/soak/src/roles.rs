@@ -88,7 +88,7 @@ fn words(
             came.extend(words.iter());
         }
     });
-    result.map_err(|error| note(&error, verdict)).ok().map(|_| came)
+    result.map_err(|error| note(rig, &error, verdict)).ok().map(|_| came)
 }
 
 /// Whether `came` is one of the things that may be there.
@@ -101,8 +101,12 @@ fn judge(rig: &Rig, unit: u8, address: u16, right: &[&[u16]], came: &[u16], verd
     verdict.blame(format!("unit {unit}, {address:04X}H: {right:?} is there, {came:?} was read"), rig.trace());
 }
 
-/// Counts an error by its kind.
-fn note(error: &CallError, verdict: &mut Verdict) {
+/// Counts an error by its kind. Everything asked here is allowed: a refusal was meant for something else.
+fn note(rig: &Rig, error: &CallError, verdict: &mut Verdict) {
+    if matches!(error.failure, Failure::Refused { .. }) {
+        verdict.false_refusals += 1;
+        verdict.blame(format!("{error}, but no drive refuses that"), rig.trace());
+    }
     let kind = match error.failure {
         Failure::Port(_) => "port",
         Failure::NoAnswer { .. } => "no answer",
@@ -132,7 +136,8 @@ impl Said {
     fn of(result: &Result<Done, Box<CallError>>) -> Self {
         match result {
             Ok(_) => Self::Done,
-            Err(error) if error.sent.is_none() || matches!(error.failure, Failure::Refused { .. }) => Self::NotDone,
+            Err(error) if error.sent.is_none() => Self::NotDone,
+            Err(error) if matches!(error.failure, Failure::Refused { .. } | Failure::NotTaken { .. }) => Self::NotDone,
             Err(_) => Self::Perhaps,
         }
     }
@@ -266,7 +271,7 @@ fn conclude(
 ) {
     match result {
         Ok(_) => verdict.done += 1,
-        Err(error) => note(error, verdict),
+        Err(error) => note(rig, error, verdict),
     }
     account.asked(value, Said::of(result));
     if let Some(wrong) = account.check(&rig.journal.taken(unit, address), verdict) {
@@ -367,7 +372,7 @@ impl Commander {
         let taken = rig.journal.taken(unit, COMMAND);
         match &result {
             Ok(_) => verdict.done += 1,
-            Err(error) => note(error, verdict),
+            Err(error) => note(rig, error, verdict),
         }
         let stops = self.stops.entry(unit).or_default();
         if let Some(wrong) = stops.check(&taken, Some(Said::of(&result)), verdict) {

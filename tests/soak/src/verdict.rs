@@ -31,6 +31,8 @@ pub struct Verdict {
     pub right: u64,
     /// Reads that brought others.
     pub wrong_values: u64,
+    /// Refusals that no drive gave for what was asked.
+    pub false_refusals: u64,
     /// Writes and commands reported done.
     pub done: u64,
     /// Writes and commands that a drive took more than once.
@@ -73,8 +75,8 @@ impl Verdict {
 
     /// Whether nothing happened that must not.
     pub fn is_true(&self) -> bool {
-        let bad = [self.wrong_values, self.twice, self.not_done, self.unasked, self.words_lost, self.panicked];
-        bad.iter().sum::<u64>() == 0
+        let bad = [self.wrong_values, self.false_refusals, self.twice, self.not_done, self.unasked];
+        bad.iter().sum::<u64>() + self.words_lost + self.panicked == 0
     }
 
     /// Both together.
@@ -82,6 +84,7 @@ impl Verdict {
     pub fn with(mut self, other: Self) -> Self {
         self.right += other.right;
         self.wrong_values += other.wrong_values;
+        self.false_refusals += other.false_refusals;
         self.done += other.done;
         self.twice += other.twice;
         self.not_done += other.not_done;
@@ -109,7 +112,7 @@ impl fmt::Display for Verdict {
         let seconds = self.wall.as_secs_f64();
         #[expect(clippy::cast_precision_loss, reason = "a figure for people")]
         let speed = self.requests as f64 / seconds.max(1e-9);
-        let rows: [(&str, String); 14] = [
+        let rows: [(&str, String); 15] = [
             ("seed", self.seed.to_string()),
             ("simulated time", format!("{:.2} h", self.simulated.as_secs_f64() / 3_600.0)),
             ("wall time", format!("{seconds:.1} s")),
@@ -118,6 +121,7 @@ impl fmt::Display for Verdict {
             ("right values read", self.right.to_string()),
             ("writes and commands done", self.done.to_string()),
             ("wrong values", self.wrong_values.to_string()),
+            ("refusals of something else", self.false_refusals.to_string()),
             ("done twice", self.twice.to_string()),
             ("reported done, not in the log", self.not_done.to_string()),
             ("in the log, never sent", self.unasked.to_string()),
