@@ -18,7 +18,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual soak-realtime wheel clean \
         machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -28,7 +28,7 @@ help: ## what can be made
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
-	@echo "make soak    a day of traffic on a hostile line, in virtual time"
+	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -162,10 +162,15 @@ fuzz-corpus: $(CARGO_FUZZ) ## adds what reaches code that nothing in fuzz/corpus
 SEED  ?= $(shell date +%s)
 HOURS ?= 24
 
-soak: soak-virtual ## a day of traffic on a hostile line
+MINUTES ?= 60
+
+soak: soak-virtual soak-realtime ## a day of traffic on a hostile line in virtual time, an hour of it in real time
 
 soak-virtual:
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-soak -- --hours $(HOURS) --seed $(SEED)
+
+soak-realtime: $(VENV)/.wheel
+	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
 	rm -rf $(VENV) $(PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -341,7 +341,7 @@ impl<'b, 'r> Call<'b, 'r> {
             let sure = match owner.next(&self.ask, &tried, in_time) {
                 Next::Ask(sure) => sure,
                 Next::LookForEcho => {
-                    owner.look_for_echo(&self.ask, give_up)?;
+                    owner.look_for_echo(&self.ask, &mut tried, give_up)?;
                     continue;
                 }
                 Next::Probe(unit, probe) => {

@@ -25,6 +25,9 @@ pub enum AdapterEcho {
     Absent,
 }
 
+/// How often one attempt looks whether the adapter echoes, where noise hides it.
+const LOOKS: u32 = 3;
+
 /// What to do next for a request.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Next {
@@ -178,9 +181,15 @@ impl Owner {
     }
 
     /// Reads one word to see whether the request comes back; what is answered does not matter.
+    ///
+    /// # Errors
+    ///
+    /// The port was lost, the caller gave up, or nothing was shown however often it was tried: the next request's echo
+    /// could be taken for its answer.
     pub(crate) fn look_for_echo(
         &mut self,
         ask: &Ask<'_>,
+        tried: &mut Tried,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
         let address = match *ask.request {
@@ -190,12 +199,17 @@ impl Owner {
         let Ok(read) = Request::read(address, 1) else {
             return Ok(());
         };
-        match self.exchange(&Ask { request: &read, in_doubt: true, ..*ask }, give_up, &mut |_| ()) {
-            // It has not shown anything: the next request's echo could be taken for its answer.
-            Err(mut error) if self.echo == AdapterEcho::Auto => {
-                error.sent = None;
-                Err(error)
+        tried.looks += 1;
+        let result = self.exchange(&Ask { request: &read, in_doubt: true, ..*ask }, give_up, &mut |_| ());
+        if self.echo != AdapterEcho::Auto {
+            return Ok(());
+        }
+        match result {
+            Err(error) if !is_line_trouble(&error.failure) => Err(Box::new(CallError { sent: None, ..*error })),
+            Err(error) if tried.looks >= LOOKS && !matches!(error.failure, Failure::Refused { .. }) => {
+                Err(Box::new(CallError { sent: None, ..*error }))
             }
+            _ if tried.looks >= LOOKS => Err(ask.failed(Failure::Doubtful, None, self.now(), &[])),
             _ => Ok(()),
         }
     }
@@ -220,7 +234,7 @@ impl Owner {
             return Ok(done);
         }
         // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.
-        let _ = self.look_for_echo(ask, give_up);
+        let _ = self.look_for_echo(ask, &mut Tried::default(), give_up);
         if self.echo == AdapterEcho::Absent {
             return Ok(done);
         }
@@ -250,19 +264,17 @@ impl Owner {
                 Err(_) => return Ok(()), // the count was checked when the probe was chosen
             },
         };
-        let silent_on_echo = tried.has_echoed();
         tried.note(probe);
         self.stats().count(Some(unit), |counters| counters.resyncs += 1);
         match self.exchange(&Ask { request: &request, ..*ask }, give_up, &mut |_| ()) {
-            Ok(_) if silent_on_echo => self.resync.is_mute(unit),
             Ok(_) => {}
             Err(mut error) => {
                 error.sent = None;
-                if !matches!(
-                    error.failure,
-                    Failure::NoAnswer { .. } | Failure::Corrupt(_) | Failure::Wrong(_) | Failure::Refused { .. }
-                ) {
+                if !is_line_trouble(&error.failure) {
                     return Err(error);
+                }
+                if probe == Probe::Echo && matches!(error.failure, Failure::NoAnswer { .. }) {
+                    self.resync.silent_on_echo(unit);
                 }
                 tried.failure = Some(error);
             }
@@ -349,4 +361,9 @@ impl Owner {
             self.echo = AdapterEcho::Absent;
         }
     }
+}
+
+/// Whether `failure` is of a kind that another request over the same line may not have.
+fn is_line_trouble(failure: &Failure) -> bool {
+    matches!(failure, Failure::NoAnswer { .. } | Failure::Corrupt(_) | Failure::Wrong(_) | Failure::Refused { .. })
 }

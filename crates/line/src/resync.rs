@@ -11,6 +11,13 @@ use crate::error::CallError;
 /// How often one attempt echoes a unit that is known to return echoes.
 const ECHOES: u32 = 2;
 
+/// How many echoes in a row a unit must be silent on before it is asked a read of another length instead: one echo may
+/// have been lost, and a fresh word is the better proof.
+const SILENT_BEFORE_READ: u32 = 2;
+
+/// After how many it is taken for one that knows no echo, and is not echoed first any more.
+const SILENT_FOR_GOOD: u32 = 5;
+
 /// How many reads of another length one doubt is worth. Each that stays open is one more answer to wait for, and only time
 /// helps with a unit that answers none of them.
 const OTHER_READS: u32 = 2;
@@ -55,6 +62,8 @@ pub(crate) enum Probe {
 /// What was tried for one attempt of a call, and what came of it.
 #[derive(Debug, Default)]
 pub(crate) struct Tried {
+    /// Looks at the adapter.
+    pub(crate) looks: u32,
     echoes: u32,
     other_read: bool,
     /// How the latest probe failed.
@@ -84,7 +93,10 @@ pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
 struct Known {
     /// It has answered something.
     alive: bool,
-    on_echo: OnEcho,
+    /// It has returned an echo.
+    echoes: bool,
+    /// Echoes in a row that it was silent on, if it never returned one.
+    silent_echoes: u32,
     /// A register that it answered a read of.
     readable: Option<u16>,
     /// Nothing is known of it, and the latest probe was an echo.
@@ -93,25 +105,13 @@ struct Known {
     other_reads: u32,
 }
 
-/// What a unit makes of an echo.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum OnEcho {
-    /// Nobody knows yet.
-    #[default]
-    Unknown,
-    /// It has returned one.
-    Returns,
-    /// It was silent on one, and then answered a read.
-    Silent,
-}
-
 impl Resync {
     /// `unit` answered `request`, or refused it.
     pub(crate) fn answered(&mut self, unit: UnitAddress, request: &Request<'_>, refused: bool) {
         let known = self.0.entry(unit).or_default();
         known.alive = true;
         match request {
-            Request::Echo { .. } if !refused => known.on_echo = OnEcho::Returns,
+            Request::Echo { .. } if !refused => known.echoes = true,
             Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
             _ => {}
         }
@@ -129,22 +129,23 @@ impl Resync {
         in_time: bool,
     ) -> Option<Probe> {
         let known = self.0.entry(unit).or_default();
-        let echoes = if in_time && known.on_echo == OnEcho::Returns { ECHOES } else { 1 };
-        let echo = (tried.echoes < echoes).then_some(Probe::Echo);
+        let again =
+            if known.echoes { in_time && tried.echoes < ECHOES } else { known.silent_echoes < SILENT_BEFORE_READ };
+        let echo = (tried.echoes == 0 || again).then_some(Probe::Echo);
         let address = match *request {
             Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
             _ => known.readable,
         };
         let other_read = || {
-            let is_worth_it = !tried.other_read && known.on_echo != OnEcho::Returns && known.other_reads < OTHER_READS;
-            let address = address.filter(|_| is_worth_it)?;
+            let is_worth_it = !tried.other_read && !known.echoes && known.other_reads < OTHER_READS;
+            let address = address.filter(|_| is_worth_it && known.silent_echoes >= SILENT_BEFORE_READ)?;
             (1..=MAX_WORDS)
                 .filter_map(|count| Some((count, Request::read(address, count).ok()?)))
                 .find(|(_, read)| master.tells_apart(now, unit, read))
                 .map(|(count, _)| Probe::OtherRead { address, count })
         };
         let probe = if known.alive {
-            if known.on_echo == OnEcho::Silent { other_read().or(echo) } else { echo.or_else(other_read) }
+            if known.silent_echoes >= SILENT_FOR_GOOD { other_read().or(echo) } else { echo.or_else(other_read) }
         } else if tried.has_echoed() || tried.other_read {
             None // silence is all that is known: one probe an attempt, so that it costs no more than an attempt
         } else if known.echo_was_last {
@@ -164,9 +165,10 @@ impl Resync {
         }
     }
 
-    /// `unit` was silent on an echo, and then answered a read of another length.
-    pub(crate) fn is_mute(&mut self, unit: UnitAddress) {
-        self.0.entry(unit).or_default().on_echo = OnEcho::Silent;
+    /// `unit` was silent on an echo.
+    pub(crate) fn silent_on_echo(&mut self, unit: UnitAddress) {
+        let known = self.0.entry(unit).or_default();
+        known.silent_echoes = known.silent_echoes.saturating_add(1);
     }
 }
 

@@ -64,7 +64,7 @@ fn a_unit_that_knows_no_echo_is_settled_by_a_read_of_another_length() {
     assert_eq!(rig.read(200, 1).unwrap(), [200], "in one call, though nothing is repeated on this bus");
     assert_eq!(rig.sent(&Request::read(7, 2).unwrap()), 1, "the register that is known to be readable");
     let stats = rig.bus.stats();
-    assert_eq!((stats.total.late, stats.total.resyncs), (1, 2), "{stats:?}");
+    assert_eq!((stats.total.late, stats.total.resyncs), (1, 3), "two echoes, and the read: {stats:?}");
 }
 
 /// A unit that answers each new question only when the next one has come: one behind, for as long as it is asked new ones.
