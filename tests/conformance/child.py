@@ -96,7 +96,11 @@ class Child:
     def open(
         self, port: Path | str, *, baudrate: int = 19200, timeout: float = 0.2, retries: int | None = 0
     ) -> Outcome:
+        """Opens *port*, in three tries: some libraries bound this by the time-out too, and a busy machine is slow."""
         using = {"port": str(port), "baudrate": baudrate, "timeout": timeout, "retries": retries}
+        for _ in range(2):
+            if (outcome := self.order("open", using)).error is None:
+                return outcome
         return self.order("open", using)
 
     def read(self, address: int, count: int = 1) -> Outcome:

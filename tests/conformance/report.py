@@ -202,8 +202,8 @@ but `unplug`. Seed {seed}. {reads} reads of two registers in each row, {all} in 
 retries included. [The simulator's page](simulator.md) says what each fault does; a `late` answer comes 250 to 500 ms
 after it was due, the port is unplugged before every 50th read, for 250 ms.
 
-Cells are right / wrong / error / hung. "Stopped": {streak} reads in a row were not right, or one hung, and no more
-were asked."""
+Cells are right / wrong / error / hung. While the port is away errors come as fast as a library raises them.
+"Stopped": {streak} reads in a row were not right, or one hung, and no more were asked."""
 
 SLOWEST = "The longest time from the end of a read that was not right to the end of the next right one (a dash: none):"
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from . import wire
 
 UNIT = 1
-# Between a late reply and the next one: more than the silence of 3.5 characters at 9600 bit/s and above.
+# Between a late reply or an echo and what follows: more than the silence of 3.5 characters at 9600 bit/s and above.
 GAP = 0.005
 
 
@@ -192,6 +192,7 @@ class Slave:
         reaction = self.behaviour(request, before, reply)
         if self.echo:
             self._write(wire.frame(request.unit, request.pdu))
+            self._free = time.monotonic() + GAP
         if reaction and reaction.lost:
             return
         self._apply(request)

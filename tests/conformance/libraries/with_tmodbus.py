@@ -10,6 +10,7 @@ import threading
 from collections.abc import Coroutine, Sequence
 from typing import Any
 
+import serialx  # noqa: F401 - tmodbus imports it while it opens a port, and would count that against its time-out
 from tmodbus import create_async_rtu_client
 
 from . import UNIT, Adapter
