@@ -63,11 +63,11 @@ def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 def machine() -> str:
     """What it ran on, in one line."""
     information = Path("/proc/cpuinfo")
-    models = [line.partition(":")[2].strip() for line in information.read_text().splitlines() if "model name" in line]
+    lines = information.read_text().splitlines() if information.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if "model name" in line]
     name = models[0] if models else platform.machine()
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, CPython {platform.python_version()}"
-    )
+    system = f"{platform.system()} {platform.release()}, CPython {platform.python_version()}"
+    return f"{name}, {os.cpu_count()} cores, {system}, load average {os.getloadavg()[2]:.1f} (15 minutes)"
 
 
 def versions(columns: Sequence[Column]) -> str:

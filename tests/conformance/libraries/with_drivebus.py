@@ -11,7 +11,7 @@ from . import UNIT, Adapter
 
 class Master(Adapter):
     distribution = "drivebus"
-    settings = "`Bus(port)`; by default a read is repeated twice, a write is not"
+    settings = "`Bus(port)`; by default a read is repeated twice after silence, four times after damage; a write is not"
 
     def __init__(self, port: str, baudrate: int, timeout: float, retries: int | None) -> None:
         if retries is None:
