@@ -221,7 +221,7 @@ impl<'b, 'r> Call<'b, 'r> {
         let allowed = self.ask.timeout.saturating_mul(retries.saturating_add(1));
         let now = self.bus.now_of(&self.bus.lock());
         let mut course = Course { allowed, until: now + allowed, asked: 0, left_open: None };
-        let (mut attempts, mut halves) = (0, 0);
+        let (mut attempts, mut left) = (0, retries.saturating_mul(2));
         loop {
             attempts += 1;
             let asked = course.asked;
@@ -230,11 +230,13 @@ impl<'b, 'r> Call<'b, 'r> {
                 Err(error) => error,
             };
             let is_port = matches!(error.failure, Failure::Port(_));
-            if course.asked > asked {
-                halves += if is_damaged(&error.failure) { 1 } else { 2 };
-            }
-            let most = if retries == 0 { 1 } else { retries.saturating_add(1).saturating_mul(2) };
-            let is_over = halves >= most || attempts > most.saturating_add(PROBED_IN_VAIN);
+            let cost = match course.asked > asked {
+                true if is_damaged(&error.failure) => 1,
+                true => 2,
+                false => 0,
+            };
+            let is_over = (cost > 0 && left == 0) || attempts > course.asked.saturating_add(PROBED_IN_VAIN);
+            left = left.saturating_sub(cost);
             if is_over || !is_passing(&error.failure) || error.ended >= course.until {
                 // How the port was lost tells more than that it is still not there. But where the request went out only
                 // the second time, that has to be said.

@@ -98,6 +98,25 @@ fn a_read_is_repeated_and_a_write_is_not() {
     assert_eq!(writes.iter().filter(|write| write.address == accel).count(), 1, "{writes:?}");
 }
 
+/// Silence takes a time-out and counts whole; damage takes none and counts half.
+#[test]
+fn a_damaged_answer_is_asked_for_twice_as_often_as_a_missing_one() {
+    for (retries, silent, damaged) in [(0, 1, 1), (1, 2, 3), (2, 3, 5)] {
+        let asked = |spoil: &dyn Fn(&Simulator)| {
+            let (simulator, bus) = pair();
+            spoil(&simulator);
+            let options = CallOptions { retries: Some(retries), ..CallOptions::default() };
+            let request = Request::read(STATE, 1).unwrap();
+            bus.call(unit(1).into(), &request, options, &mut || false, &mut |_| ()).unwrap_err();
+            simulator.wire().requests()
+        };
+        assert_eq!(asked(&|simulator| simulator.wire().drop_answers(100)), silent, "{retries} retries, silence");
+        let spoilt = [0x01, 0x03, 0x02, 0x00, 0x03, 0x00, 0x00];
+        let damage = |simulator: &Simulator| (0..100).for_each(|_| simulator.wire().answer_with(&spoilt));
+        assert_eq!(asked(&damage), damaged, "{retries} retries, damage");
+    }
+}
+
 #[test]
 fn a_reply_that_comes_during_the_next_request_is_never_its_answer() {
     let (simulator, bus) = pair();
