@@ -92,7 +92,7 @@ class Bus:
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
+        """Whether `close` was called; in a forked child True, for the line is its parent's."""
         return self._native.closed
 
     @property

@@ -29,9 +29,9 @@ class DrivebusError(Exception):
 
     Attributes:
         unit: The unit that was asked (1..247, 0 for a broadcast), or None where no unit is concerned.
-        request: The whole request frame, empty if nothing was sent.
+        request: The whole request frame, sent or not; empty if none was made.
         raw: The bytes that came back, as they came; empty if none did.
-        started: Unix time in seconds at which the request began, or None.
+        started: Unix time in seconds at which the request began; None if it was not sent, or where several were.
         ended: Unix time in seconds at which it was given up or answered, or None.
     """
 

@@ -290,7 +290,14 @@ class Motion(Registers):
                 self._write(address, words)
         except _LINE_ERRORS as error:
             if error.started is None:
-                raise
+                if not urgent:
+                    raise
+                raise type(error)(
+                    f"{name} could not be sent to unit {self.unit} ({error}); {_MAY[name]}",
+                    unit=self.unit,
+                    request=error.request,
+                    ended=error.ended,
+                ) from error
             raise Unconfirmed(
                 f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
                 f"{self._state_afterwards(urgent)}. It was not repeated",

@@ -61,6 +61,10 @@ class Guard:
         self.ending = True
         return None if self._ended or sys.is_finalizing() else self._end()
 
+    def leave_alone(self) -> None:
+        """Nothing is to be ended here, because somebody else will."""
+        self._ended = True
+
     def check(self) -> None:
         """Raises SystemExit where the program ends, and did so while this began: its end went out before its start."""
         if self.ended_by_others:
@@ -138,7 +142,9 @@ def _end_all() -> None:
 
 
 def _forget() -> None:
-    """In a forked child: the motors are the parent's."""
+    """In a forked child: the motors are the parent's, also where the child leaves the blocks that it was forked in."""
+    for guard in _guards.values():
+        guard.leave_alone()
     _guards.clear()
     _stop_listening()
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -317,3 +318,53 @@ def test_a_watchdog_that_nobody_closed_is_left_to_the_drive(simulator: Simulator
         pause.wait(0.05)
     assert simulator.drive(1).fault == CE
     assert commands(simulator) == [FORWARD], "run() outlives the program, as it says"
+
+
+def test_a_forked_child_leaves_the_line_to_its_parent(simulator: Simulator) -> None:
+    body = """
+    with drive.watchdog(60.0), drive.running(10.0):
+        for leave in (lambda: sys.exit(0), lambda: None):
+            child = os.fork()
+            if not child:
+                try:
+                    bus.read(1, 0x2100)
+                except drivebus.PortError as error:
+                    print("a forked child" in str(error), bus.closed, bus.link(1).asked, flush=True)
+                leave()
+                break
+            os.waitpid(child, 0)
+        else:
+            running()
+            os.kill(os.getpid(), signal.SIGKILL)
+    """
+    program = PROGRAM.replace("import signal", "import os, signal")
+    child = subprocess.run(
+        [sys.executable, "-c", program.format(body=body.strip()), simulator.port],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert child.stdout.splitlines() == ["True True 0", "True True 0", "running"], child.stderr
+    assert child.returncode == -signal.SIGKILL
+    assert commands(simulator) == [FORWARD], "no child sent a stop"
+    assert simulator.drive(1).register(0x0E04) == 600, "no child disarmed the watchdog"
+
+
+def test_a_forked_child_leaves_the_simulator_to_its_parent(tmp_path: Path) -> None:
+    program = """
+import os, sys, drivebus
+with drivebus.Simulator({1: "gd350"}, link=sys.argv[1]) as simulator, drivebus.Bus(simulator) as bus:
+    child = os.fork()
+    if not child:
+        sys.exit(7)
+    print(os.waitpid(child, 0)[1] >> 8, bus.read(1, 0x2100), os.path.islink(sys.argv[1]))
+"""
+    child = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "drive")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (child.stdout, child.returncode) == ("7 [3] True\n", 0), child.stderr

@@ -70,6 +70,15 @@ def test_a_motor_that_cannot_be_stopped_is_told_to_stop_again_and_then_to_coast(
     assert commands(virtual) == [FORWARD, STOP, STOP, STOP, COAST]
 
 
+def test_a_stop_that_cannot_be_sent_says_what_the_motor_may_do(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.run(hz=5.0)
+    virtual.line.unplug()
+    with pytest.raises(drivebus.PortError, match=r"stop could not be sent to .*the motor may still turn") as lost:
+        virtual_drive.stop()
+    assert lost.value.started is None
+    assert commands(virtual) == [FORWARD]
+
+
 def test_the_first_error_is_kept_when_stopping_fails_too(virtual: Simulator, virtual_drive: Drive) -> None:
     def fail() -> None:
         virtual.line.drop_answers(1000)

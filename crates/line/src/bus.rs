@@ -14,6 +14,7 @@ use crate::exchange::{Ask, Done};
 use crate::link::Link;
 use crate::opener::Opener;
 use crate::owner::{AdapterEcho, Owner};
+use crate::process::Process;
 use crate::queue::{LOOK_UP, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
@@ -55,6 +56,7 @@ pub struct Bus {
     options: BusOptions,
     name: String,
     closed: AtomicBool,
+    opened_by: Process,
     clock: Clock,
 }
 
@@ -108,6 +110,7 @@ impl Bus {
             options,
             name,
             closed: AtomicBool::new(false),
+            opened_by: Process::current(),
             clock,
         })
     }
@@ -122,9 +125,9 @@ impl Bus {
         &self.options
     }
 
-    /// Whether the bus was closed.
+    /// Whether the bus was closed, or was opened by another process: by the parent of this forked child.
     pub fn is_closed(&self) -> bool {
-        self.closed.load(Ordering::Acquire)
+        self.closed.load(Ordering::Acquire) || !self.opened_by.is_current()
     }
 
     /// Whether the line's clock is a simulation's.
@@ -137,6 +140,10 @@ impl Bus {
     /// From inside a `give_up`, the call that asks it closes the line when it ends.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);
+        // What a thread of the parent held when this child was forked, nobody here lets go.
+        if !self.opened_by.is_current() {
+            return;
+        }
         if self.queue.has_this_thread() {
             return;
         }
@@ -166,6 +173,9 @@ impl Bus {
     ) -> Result<Done, Box<CallError>> {
         let timeout = options.timeout.unwrap_or(self.options.timeout);
         let ask = Ask { destination, request, timeout, in_doubt: options.in_doubt };
+        if !self.opened_by.is_current() {
+            return Err(ask.failed(Failure::Forked, None, Instant::ZERO, &[]));
+        }
         if self.queue.has_this_thread() {
             let now = self.clock.now().unwrap_or_default();
             return Err(ask.failed(Failure::NotBegun(BeginError::OutOfTurn), None, now, &[]));
@@ -183,7 +193,7 @@ impl Bus {
 
     /// Of the last ten exchanges with `unit`, how many brought an answer.
     pub fn link(&self, unit: UnitAddress) -> Link {
-        self.lock().link(unit)
+        if self.opened_by.is_current() { self.lock().link(unit) } else { Link::default() }
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].

@@ -97,6 +97,9 @@ pub enum Failure {
     /// The port was opened again since the caller saw who answers. Nothing was sent.
     #[error("the port was opened again meanwhile, and another unit may answer; nothing was sent")]
     Reopened,
+    /// This is a child process, and the line is its parent's. Nothing was sent.
+    #[error("the bus belongs to the process that opened it; a forked child cannot use it")]
+    Forked,
     /// The bus was closed.
     #[error("the bus is closed")]
     Closed,

@@ -21,6 +21,7 @@ mod opener;
 mod order;
 mod owner;
 mod port;
+mod process;
 mod queue;
 mod resync;
 pub mod rs485;

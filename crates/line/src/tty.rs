@@ -27,6 +27,7 @@ pub use adapter::Adapter;
 use crate::clock::{monotonic, sleep_until};
 use crate::holder;
 use crate::identity::DeviceNumber;
+use crate::process::Process;
 use crate::rs485::Rs485;
 use crate::{Line, PortError, PortErrorKind};
 
@@ -62,6 +63,7 @@ pub struct Tty {
     /// When the last character handed over will have left the wire.
     wire_free: Instant,
     exclusive: bool,
+    opened_by: Process,
     notes: Vec<String>,
 }
 
@@ -90,6 +92,7 @@ impl Tty {
             delay_before: Duration::ZERO,
             wire_free: Instant::ZERO,
             exclusive: options.exclusive,
+            opened_by: Process::current(),
             notes: Vec::new(),
         };
         let (mut parity, mut data_bits) = (format.parity(), format.data_bits());
@@ -164,7 +167,8 @@ impl Line for Tty {
 
 impl Drop for Tty {
     fn drop(&mut self) {
-        if self.exclusive {
+        // A child that ends must not take the lock from its parent.
+        if self.exclusive && self.opened_by.is_current() {
             system::unlock(&self.port);
         }
     }

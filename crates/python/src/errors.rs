@@ -114,7 +114,7 @@ pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) ->
     };
     let message = error.to_string();
     match error.failure {
-        Failure::Port(_) | Failure::Reopened | Failure::Closed => Class::Port.raise(message, details),
+        Failure::Port(_) | Failure::Reopened | Failure::Forked | Failure::Closed => Class::Port.raise(message, details),
         Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
         Failure::Doubtful | Failure::NotAsked { .. } => Class::NoAnswer.raise(message, details),
         Failure::NotTaken { .. } => Class::Unconfirmed.raise(message, details),

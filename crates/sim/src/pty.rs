@@ -111,6 +111,8 @@ impl Pty {
 #[derive(Debug)]
 struct Link {
     path: PathBuf,
+    /// The process that made it. It outlives a child that was forked meanwhile.
+    made_by: u32,
 }
 
 impl Link {
@@ -122,7 +124,7 @@ impl Link {
             }
             _ => {}
         }
-        let link = Self { path };
+        let link = Self { path, made_by: std::process::id() };
         link.lead_to(target)?;
         Ok(link)
     }
@@ -139,7 +141,9 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
-        // Somebody may have removed it already.
-        let _ = fs::remove_file(&self.path);
+        if self.made_by == std::process::id() {
+            // Somebody may have removed it already.
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }

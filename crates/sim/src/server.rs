@@ -5,6 +5,7 @@
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::process;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -32,6 +33,8 @@ pub(crate) struct Worker {
     /// Closing it makes the other end readable (hung up), which wakes the thread.
     stop: Option<OwnedFd>,
     thread: Option<JoinHandle<()>>,
+    /// The process it runs in. A forked child inherits this, and no thread.
+    process: u32,
 }
 
 impl Worker {
@@ -42,7 +45,7 @@ impl Worker {
             sleep_precisely();
             work(woken.into());
         })?;
-        Ok(Self { stop: Some(stop.into()), thread: Some(thread) })
+        Ok(Self { stop: Some(stop.into()), thread: Some(thread), process: process::id() })
     }
 }
 
@@ -50,6 +53,10 @@ impl Drop for Worker {
     fn drop(&mut self) {
         self.stop = None;
         if let Some(thread) = self.thread.take() {
+            if self.process != process::id() {
+                std::mem::forget(thread); // there is nothing to wait for, nor to let go
+                return;
+            }
             // A panic in the thread has been reported by the thread.
             let _ = thread.join();
         }
