@@ -218,9 +218,10 @@ impl Framer {
                 expected &= !self.is_expected(frame.start);
                 frame.start
             }
-            None if quiet || self.len == CAPACITY => start,
+            None if quiet => start,
             // What an earlier silence ended is decided, even while newer bytes are not.
             None if self.ended > 0 && start >= self.ended => self.ended,
+            None if self.len == CAPACITY => start,
             None => 0,
         };
         if give_up == 0 {

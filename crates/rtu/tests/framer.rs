@@ -178,6 +178,19 @@ fn a_frame_broken_off_does_not_swallow_the_next() {
 }
 
 #[test]
+fn noise_that_silence_has_ended_takes_no_frame_with_it() {
+    // Nobody looked after the noise, and the frame fills what room was left.
+    let frame = Adu::request(UnitAddress::MIN.into(), &Request::custom(&[0x41], AnswerLength::BySilence).unwrap());
+    let mut framer = Framer::new(SILENCE);
+    assert_eq!(framer.receive(at(0), &[0x03; 510]), 510);
+    assert_eq!(framer.receive(at(5_000), frame.as_bytes()), 2);
+    assert_eq!(framer.poll(at(5_000)).unwrap().unwrap_err().bytes, [0x03; 510]);
+    assert_eq!(framer.receive(at(5_000), &frame.as_bytes()[2..]), 2);
+    assert_eq!(framer.poll(at(5_000)), None);
+    assert_eq!(framer.poll(at(6_750)).unwrap().unwrap().as_bytes(), frame.as_bytes());
+}
+
+#[test]
 fn a_deadline_passed_without_a_verdict_is_not_offered_again() {
     let unit = UnitAddress::MIN;
     let answer = Adu::answer(unit, &Answer::read(&[1, 2]).unwrap());
