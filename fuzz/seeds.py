@@ -224,6 +224,7 @@ def main() -> None:
     """The command."""
     listened = streams()
     framer = {name: bytes([0, 1, 2, 3]) + stream for name, stream in listened.items() if not name.startswith("printed")}
+    framer["held-noise-then-a-frame"] = bytes([0, 1, 2, 3, RUN, 3, 255, SEALED | 10 << 4, 2, 1, 0x41])
     hunts = {"words": 1, "write": 2, "echo": 3, "nameless": 4, "nameless-of-7": 5 | 6 << 3}
     answer, noise = anything(sealed(bytes([1, 3, 2, 1, 0xA0]))), bytes([RUN, 1, 9])
     framer |= {f"hunt-{name}": bytes([hunt, 1, 2, 3]) + noise + answer + noise for name, hunt in hunts.items()}

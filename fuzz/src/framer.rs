@@ -1,6 +1,6 @@
-//! Invariant: how the bytes of a moment are cut, and looking more often than needed, never changes which frames come
-//! out; every byte fed comes out once, in order; a frame has a right CRC; and the answer that is hunted for comes out
-//! whatever lumps it arrives in.
+//! Invariant: how the bytes of a moment are cut, looking more often than needed, and for a listener looking only when the
+//! next bytes are there, never changes which frames come out; every byte fed comes out once, in order; a frame has a
+//! right CRC; and the answer that is hunted for comes out whatever lumps it arrives in.
 
 use std::time::Duration;
 
@@ -23,6 +23,8 @@ enum Cut<'a> {
     Single,
     /// By these numbers in turn, looking once more between them.
     By(&'a [u8]),
+    /// Not, and nobody looks before the next bytes are there.
+    Late,
 }
 
 /// See the file's first lines. The input: what is hunted for, three cuts, then a stream.
@@ -54,6 +56,19 @@ pub fn framer(data: &[u8]) {
         assert_eq!(run(framer(), &stream, Cut::Single), whole);
     }
     assert_eq!(run(framer(), &stream, Cut::By(cuts)), whole);
+    // Who hunts for an answer may miss what others send.
+    if hunt.is_none() {
+        assert_eq!(bytes_of(run(framer(), &stream, Cut::Late)), bytes_of(whole));
+    }
+}
+
+/// The same, whenever it came out.
+pub(crate) fn bytes_of(heard: Vec<Heard>) -> Vec<Result<Vec<u8>, u8>> {
+    let bytes = |event| match event {
+        Heard::Frame(_, bytes) => Ok(bytes),
+        Heard::Skipped(byte) => Err(byte),
+    };
+    heard.into_iter().map(bytes).collect()
 }
 
 /// Feeds the stream, looking at every deadline and every arrival, and checks what holds by itself.
@@ -63,13 +78,15 @@ fn run(mut framer: Framer, stream: &[Arrival], cut: Cut<'_>) -> Vec<Heard> {
     let mut fed = Vec::new();
     for Arrival { gap, bytes } in stream {
         let next = now + *gap;
-        wait(&mut framer, now, next, &mut heard);
+        if !matches!(cut, Cut::Late) {
+            wait(&mut framer, now, next, &mut heard);
+        }
         now = next;
         let mut rest = &bytes[..];
         let mut turn = 0;
         while !rest.is_empty() {
             let count = match cut {
-                Cut::Whole | Cut::By([]) => rest.len(),
+                Cut::Whole | Cut::Late | Cut::By([]) => rest.len(),
                 Cut::Single => 1,
                 Cut::By(cuts) => usize::from(cuts[turn % cuts.len()]).clamp(1, rest.len()),
             };

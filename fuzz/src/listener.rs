@@ -5,7 +5,7 @@
 
 use drivebus_rtu::{Answer, Framer, Instant, Request};
 
-use crate::framer::{Heard, look, wait};
+use crate::framer::{bytes_of, look, wait};
 use crate::oracle;
 use crate::stream::{Arrival, Input, SILENCE, arrivals};
 
@@ -33,13 +33,7 @@ pub fn listener(data: &[u8]) {
     wait(&mut framer, now, now + SILENCE, &mut heard);
     assert_eq!(framer.pending(), [], "silence ends everything");
 
-    let heard: Vec<Result<Vec<u8>, u8>> = heard
-        .into_iter()
-        .map(|event| match event {
-            Heard::Frame(_, bytes) => Ok(bytes),
-            Heard::Skipped(byte) => Err(byte),
-        })
-        .collect();
+    let heard = bytes_of(heard);
     for bytes in heard.iter().flatten() {
         check_meaning(bytes);
     }

@@ -81,6 +81,12 @@ impl Known {
         self.is_strange(now) || self.open.iter().any(owed)
     }
 
+    /// Whether what it left open keeps it in quarantine: for good where it is known to return echoes.
+    fn holds(&self, now: Instant) -> bool {
+        let recent = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && now < *given_up + PATIENCE;
+        !self.open.is_empty() && (self.echoed || self.open.iter().any(recent))
+    }
+
     fn settle(&mut self) {
         self.open.clear();
         self.strange_until = None;
@@ -333,7 +339,7 @@ impl Run {
                     }
                     (false, true) => assert!(!known.is_doubtful(now) || !is_apart, "a refusal that may be late"),
                     // It answers in the order it was asked: what was open before will not come any more.
-                    (false, false) if is_apart => known.open.clear(),
+                    (false, false) if is_apart && known.holds(now) => known.open.clear(),
                     (false, false) => {}
                 }
                 // An answer proves that the request has left, whatever was computed.
