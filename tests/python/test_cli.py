@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -232,6 +231,16 @@ class TestMoving:
         assert child.returncode == 129
         assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8]
 
+    @pytest.mark.parametrize("command", ["stop", "coast"])
+    def test_a_stop_that_did_not_go_out_is_told(self, pty: drivebus.Simulator, command: str) -> None:
+        run("prepare", port=pty.port)
+        pty.line.drop_answers(1000)
+        unknown = run(command, port=pty.port)
+        assert (unknown.exit_code, f"not told to {command}" in unknown.stderr) == (3, True)
+        known = run("--profile", "gd350", command, port=pty.port)
+        assert (known.exit_code, f"{command} was sent" in known.stderr) == (7, True)
+        assert len([value for _, address, value in pty.drive(1).writes() if address == 0x2000]) == 1
+
     @pytest.mark.parametrize("words", [["run", "5"], ["jog", "--seconds", "0"]])
     def test_a_bad_link_starts_only_by_force(
         self, monkeypatch: pytest.MonkeyPatch, pty: drivebus.Simulator, words: list[str]
@@ -307,9 +316,6 @@ class TestUnits:
     def test_raw_names_the_unit_it_writes_to(self) -> None:
         assert "(unit 9 on" in run("raw", "09 06 20 00 00 05").stderr
 
-    def test_sim_takes_a_unit_once(self) -> None:
-        assert run("sim", "--units", "1=gd350,1=gd350", port=None).exit_code == 2
-
 
 class TestExitCodes:
     @pytest.mark.parametrize(
@@ -358,42 +364,6 @@ def test_every_command_has_help() -> None:
         result = run(name, "--help", port=None)
         assert result.exit_code == 0
         assert len(result.stdout.splitlines()) > 3
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to a whole console")
-def test_sim_serves_until_ctrl_c() -> None:
-    words = [sys.executable, "-m", "drivebus", "--json", "sim", "--units", "1=gd350,3=gd350"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
-        assert child.stdout is not None
-        port = json.loads(child.stdout.readline())["port"]
-        with drivebus.Bus(port) as bus:
-            assert [found.unit for found in bus.scan(range(1, 5))] == [1, 3]
-        child.send_signal(signal.SIGINT)
-        child.communicate(timeout=20)
-    assert child.returncode == 0
-
-
-@pytest.mark.skipif(os.name == "nt", reason="no pty")
-def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path) -> None:
-    link = tmp_path / "drive"
-    words = [sys.executable, "-m", "drivebus", "sim", "--faults", "0.02", "--fault", "deaf=1", "--seed", "7", "--echo"]
-    with subprocess.Popen([*words, "--link", link], stdout=subprocess.PIPE, text=True) as child:
-        assert child.stdout is not None
-        said = [child.stdout.readline().strip() for _ in range(3)]
-        assert said[0] == str(link.readlink())
-        assert said[1].startswith("Faults: flip_bit 0.02, ")
-        assert "deaf 1" in said[1]
-        assert said[2] == "Seed: 7"
-        with drivebus.Bus(link, timeout=0.05, retries=0) as bus, pytest.raises(drivebus.NoAnswer):
-            bus.read(1, 0x2103)
-        child.send_signal(signal.SIGINT)
-        child.communicate(timeout=20)
-    assert not link.is_symlink()
-
-
-@pytest.mark.parametrize("words", [["--fault", "late"], ["--fault", "latest=0.1"], ["--faults", "2"]])
-def test_sim_knows_its_faults(words: list[str]) -> None:
-    assert run("sim", *words, port=None).exit_code == 2
 
 
 def test_the_demonstration_holds() -> None:

@@ -134,8 +134,9 @@ impl Link {
         let mut name = self.path.file_name().unwrap_or_default().to_owned();
         name.push(format!(".{}", std::process::id()));
         let new = self.path.with_file_name(name);
-        symlink(target, &new)?;
-        fs::rename(&new, &self.path)
+        symlink(target, &new).and_then(|()| fs::rename(&new, &self.path)).map_err(|error| {
+            io::Error::new(error.kind(), format!("the link {} cannot be made: {error}", self.path.display()))
+        })
     }
 }
 

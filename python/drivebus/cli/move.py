@@ -37,7 +37,7 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 @pass_session
 def stop(session: Session, wait: float | None) -> None:
     """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
-    with session.drive() as drive:
+    with session.drive_to_halt("stop") as drive:
         drive.stop()
         if wait is not None:
             drive.wait_until_stopped(timeout=wait)
@@ -48,7 +48,7 @@ def stop(session: Session, wait: float | None) -> None:
 @pass_session
 def coast(session: Session) -> None:
     """Take the voltage off the motor; it turns on until friction ends it. Asks nothing."""
-    with session.drive() as drive:
+    with session.drive_to_halt("coast") as drive:
         drive.coast()
         _done(session, drive, "coast")
 

@@ -75,6 +75,21 @@ class Session:
         with self.bus() as bus:
             yield self.drive_on(bus)
 
+    @contextmanager
+    def drive_to_halt(self, command: str) -> Iterator[drivebus.Drive]:
+        """As `drive`, but an error before *command* can be sent says so."""
+        with self.bus() as bus:
+            try:
+                drive = self.drive_on(bus)
+            except drivebus.DrivebusError:
+                click.echo(
+                    f"Unit {self.unit} was not told to {command}: it did not say what it is. With --profile (or "
+                    "DRIVEBUS_PROFILE) it is not asked, and told at once.",
+                    err=True,
+                )
+                raise
+            yield drive
+
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
         """The drive that the options name, on a bus that is open."""
         return bus.drive(self.unit, self.profile)
@@ -98,9 +113,9 @@ class Session:
         if yes:
             return
         if not sys.stdin.isatty():
-            raise _Declined("without a terminal this needs --yes; nothing was sent")
+            raise _Declined("without a terminal this needs --yes; nothing was written")
         if not click.confirm("Is the machine clear, and shall it be done?", err=True):
-            raise _Declined("nothing was sent")
+            raise _Declined("nothing was written")
 
 
 pass_session = click.make_pass_decorator(Session)

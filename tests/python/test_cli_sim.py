@@ -1,0 +1,61 @@
+"""The command `drivebus sim`: what it serves, how it spoils it, and what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import drivebus
+from drivebus.cli import cli
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C to a whole console")
+def test_sim_serves_until_ctrl_c() -> None:
+    words = [sys.executable, "-m", "drivebus", "--json", "sim", "--units", "1=gd350,3=gd350"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        port = json.loads(child.stdout.readline())["port"]
+        with drivebus.Bus(port) as bus:
+            assert [found.unit for found in bus.scan(range(1, 5))] == [1, 3]
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=20)
+    assert child.returncode == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path) -> None:
+    link = tmp_path / "drive"
+    words = [sys.executable, "-m", "drivebus", "sim", "--faults", "0.02", "--fault", "deaf=1", "--seed", "7", "--echo"]
+    with subprocess.Popen([*words, "--link", link], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        said = [child.stdout.readline().strip() for _ in range(3)]
+        assert said[0] == str(link.readlink())
+        assert said[1].startswith("Faults: flip_bit 0.02, ")
+        assert "deaf 1" in said[1]
+        assert said[2] == "Seed: 7"
+        with drivebus.Bus(link, timeout=0.05, retries=0) as bus, pytest.raises(drivebus.NoAnswer):
+            bus.read(1, 0x2103)
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=20)
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize(
+    "words", [["--fault", "late"], ["--fault", "latest=0.1"], ["--faults", "2"], ["--units", "1=gd350,1=gd350"]]
+)
+def test_sim_takes_no_other_words(words: list[str]) -> None:
+    assert CliRunner().invoke(cli, ["sim", *words]).exit_code == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+def test_a_link_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    link = tmp_path / "nowhere" / "drive"
+    refused = CliRunner().invoke(cli, ["sim", "--link", str(link)])
+    assert (refused.exit_code, str(link) in refused.stderr) == (5, True)
