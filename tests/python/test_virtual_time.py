@@ -54,11 +54,13 @@ def test_a_command_that_has_no_effect_is_unconfirmed(
     assert virtual.drive(1).state == "stopped"
 
 
-def test_a_trip_instead_of_a_start_is_told(virtual: Simulator, virtual_drive: Drive) -> None:
+def test_a_trip_instead_of_a_start_is_told_at_once(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> None:
     virtual.drive(1).load = 4.0
     virtual_drive.write("P00.11", 0.1)
+    began = virtual_bus.now()
     with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent.*OL1"):
-        virtual_drive.run(hz=50.0)
+        virtual_drive.run(hz=50.0, confirm=60.0)
+    assert virtual_bus.now() - began < 30.0
     assert commands(virtual) == [FORWARD]
 
 

@@ -43,9 +43,16 @@ def test_it_is_set_in_ram_action_first_and_put_back_time_out_first(virtual: Simu
     assert virtual.drive(1).eeprom_writes == 0
 
 
-def test_a_motor_that_stops_is_waited_for(virtual: Simulator, virtual_drive: Drive) -> None:
-    virtual_drive.write("P00.12", 100.0)  # 20 s from 10 Hz: half the time-out
-    with virtual_drive.watchdog(40.0), virtual_drive.running(10.0):
+@pytest.mark.parametrize(
+    ("ramp", "hz"),
+    [
+        pytest.param(100.0, 10.0, id="for half the time-out"),
+        pytest.param(3600.0, 0.2, id="though its frequency falls a step in 0.7 s"),
+    ],
+)
+def test_a_motor_that_stops_is_waited_for(virtual: Simulator, virtual_drive: Drive, ramp: float, hz: float) -> None:
+    virtual_drive.write("P00.12", ramp)  # seconds from 50 Hz
+    with virtual_drive.watchdog(40.0), virtual_drive.running(hz, confirm=5.0):
         virtual_drive.wait_for_speed(timeout=100)
     assert settings(virtual) == (0, 0)
     virtual.advance(100)

@@ -133,63 +133,34 @@ class TestWhatMayBeRepeated:
         ]
 
 
-class TestAPortThatIsOpenedByTheWriteItself:
-    """Lost, and not opened again yet: what is sent next opens it, and reaches whoever is behind it now."""
-
-    @pytest.fixture
-    def line(self, virtual: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive) -> drivebus.Simulator:
-        virtual.drive(1).take_writes()
-        virtual.line.unplug()
-        with pytest.raises(drivebus.PortError):
-            virtual_drive.state()
-        virtual.line.replug()
-        assert virtual_bus.reconnects == 0
-        return virtual
-
-    def test_the_same_drive_is_written_to(
-        self, line: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive
-    ) -> None:
-        virtual_drive.write("P00.11", 2.0)
-        assert [address for _, address, _ in line.drive(1).writes()] == [RAM | ACCELERATION]
-        assert virtual_bus.reconnects == 1
-
-    def test_another_drive_is_not(
-        self,
-        line: drivebus.Simulator,
-        virtual_bus: drivebus.Bus,
-        virtual_drive: Drive,
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        read = virtual_bus.read
-        other = {IDENTIFICATION: [0x010A]}
-        monkeypatch.setattr(virtual_bus, "read", lambda unit, address: other.get(address) or read(unit, address))
-        with pytest.raises(drivebus.NotAllowed, match="another drive"):
-            virtual_drive.write("P00.11", 2.0)
-        assert line.drive(1).writes() == []
-
+class TestWhatWentOut:
     @pytest.mark.parametrize(
-        "write",
+        ("write", "error"),
         [
-            pytest.param(lambda drive: drive.write("P00.11", 2.0), id="drive"),
-            pytest.param(lambda drive: drive.bus.write(1, RAM | ACCELERATION, 20, read_back=ACCELERATION), id="bus"),
+            pytest.param(lambda drive: drive.run(10.0), drivebus.Unconfirmed, id="run"),
+            pytest.param(lambda drive: drive.write("P00.11", 2.0), drivebus.PortError, id="write"),
         ],
     )
-    def test_what_another_drive_shows_confirms_nothing(
-        self, virtual: drivebus.Simulator, virtual_drive: Drive, write: Callable[[Drive], None]
+    def test_is_not_sent_again_over_another_connection(
+        self,
+        bus: StandIn,
+        drive: Drive,
+        monkeypatch: pytest.MonkeyPatch,
+        write: Callable[[Drive], None],
+        error: type[drivebus.DrivebusError],
     ) -> None:
-        virtual_drive.state()
-        # The confirmation is lost, and with the next answer the adapter falls out and is back at once.
-        virtual.line.set_times(replug=0.0)
-        virtual.line.script([(1, "silence"), (2, "unplug")])
-        with pytest.raises(drivebus.NoAnswer) as unknown:
-            write(virtual_drive)
-        assert unknown.value.started is not None
-        assert virtual.drive(1).register(ACCELERATION) == 20
-        assert virtual.line.fault_counts()["unplug"] == 1
+        send = bus.write
 
-    def test_a_stop_goes_out_at_once(self, line: drivebus.Simulator, virtual_drive: Drive) -> None:
-        virtual_drive.stop()
-        assert [value for _, address, value in line.drive(1).writes() if address == CONTROL] == [STOP]
+        def lose(*words: Any, **how: Any) -> None:
+            send(*words, **how)
+            bus.reconnects += 1  # another thread asked meanwhile, and opened the port again
+            raise drivebus.PortError("gone", started=1.0)
+
+        monkeypatch.setattr(bus, "write", lose)
+        with pytest.raises(error) as lost:
+            write(drive)
+        assert lost.value.started == 1.0
+        assert len(bus.calls("write")) == 1
 
 
 class TestWhatGoesFirst:

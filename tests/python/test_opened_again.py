@@ -1,0 +1,72 @@
+"""A port that was lost and not opened again yet: what is sent next opens it, and reaches whoever is behind it now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+import drivebus
+from drivebus import Drive
+
+CONTROL, IDENTIFICATION, ACCELERATION, RAM = 0x2000, 0x2103, 0x000B, 0x8000
+STOP = 5
+
+
+@pytest.fixture
+def line(virtual: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive) -> drivebus.Simulator:
+    virtual.drive(1).take_writes()
+    virtual.line.unplug()
+    with pytest.raises(drivebus.PortError):
+        virtual_drive.state()
+    virtual.line.replug()
+    assert virtual_bus.reconnects == 0
+    return virtual
+
+
+def test_the_same_drive_is_written_to(
+    line: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive
+) -> None:
+    virtual_drive.write("P00.11", 2.0)
+    assert [address for _, address, _ in line.drive(1).writes()] == [RAM | ACCELERATION]
+    assert virtual_bus.reconnects == 1
+
+
+def test_another_drive_is_not(
+    line: drivebus.Simulator,
+    virtual_bus: drivebus.Bus,
+    virtual_drive: Drive,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    read = virtual_bus.read
+    other = {IDENTIFICATION: [0x010A]}
+    monkeypatch.setattr(virtual_bus, "read", lambda unit, address: other.get(address) or read(unit, address))
+    with pytest.raises(drivebus.NotAllowed, match="another drive"):
+        virtual_drive.write("P00.11", 2.0)
+    assert line.drive(1).writes() == []
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        pytest.param(lambda drive: drive.write("P00.11", 2.0), id="drive"),
+        pytest.param(lambda drive: drive.bus.write(1, RAM | ACCELERATION, 20, read_back=ACCELERATION), id="bus"),
+    ],
+)
+def test_what_another_drive_shows_confirms_nothing(
+    virtual: drivebus.Simulator, virtual_drive: Drive, write: Callable[[Drive], None]
+) -> None:
+    virtual_drive.state()
+    # The confirmation is lost, and with the next answer the adapter falls out and is back at once.
+    virtual.line.set_times(replug=0.0)
+    virtual.line.script([(1, "silence"), (2, "unplug")])
+    with pytest.raises(drivebus.NoAnswer) as unknown:
+        write(virtual_drive)
+    assert unknown.value.started is not None
+    assert virtual.drive(1).register(ACCELERATION) == 20
+    assert virtual.line.fault_counts()["unplug"] == 1
+
+
+def test_a_stop_goes_out_at_once(line: drivebus.Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.stop()
+    assert [value for _, address, value in line.drive(1).writes() if address == CONTROL] == [STOP]
