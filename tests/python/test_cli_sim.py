@@ -30,7 +30,8 @@ def test_sim_serves_until_ctrl_c() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty")
-def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path, end: str) -> None:
     link = tmp_path / "drive"
     words = [sys.executable, "-m", "drivebus", "sim", "--faults", "0.02", "--fault", "deaf=1", "--seed", "7", "--echo"]
     with subprocess.Popen([*words, "--link", link], stdout=subprocess.PIPE, text=True) as child:
@@ -42,7 +43,7 @@ def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path) -> Non
         assert said[2] == "Seed: 7"
         with drivebus.Bus(link, timeout=0.05, retries=0) as bus, pytest.raises(drivebus.NoAnswer):
             bus.read(1, 0x2103)
-        child.send_signal(signal.SIGINT)
+        child.send_signal(getattr(signal, end))
         child.communicate(timeout=20)
     assert not link.is_symlink()
 

@@ -28,6 +28,14 @@ def test_a_ramp_takes_what_the_drive_is_set_to(virtual_bus: Bus, virtual_drive: 
     assert virtual_bus.now() - began == pytest.approx(2.0, abs=LOOK)
 
 
+def test_a_scan_asks_each_unit_once(virtual: Simulator, virtual_bus: Bus) -> None:
+    virtual.advance(2.0)  # first contact is over
+    began = virtual_bus.now()
+    assert [found.unit for found in virtual_bus.scan(range(1, 12))] == [1, 2]
+    assert virtual.line.requests == 11
+    assert virtual_bus.now() - began == pytest.approx(9 * 0.1, abs=LOOK)
+
+
 def test_waiting_ends_when_the_time_is_up(virtual_bus: Bus, virtual_drive: Drive) -> None:
     virtual_drive.write({"P00.11": 1000.0, "P00.12": 1000.0})
     virtual_drive.run(hz=50.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 
 import click
@@ -91,7 +92,7 @@ def sim(
     echo: bool,
     link: str | None,
 ) -> None:
-    """Serve simulated drives until Ctrl-C, for this program or any other."""
+    """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other."""
     bits, parity, stop = session.line_format
     simulator = drivebus.Simulator(
         _simulated(units),
@@ -105,6 +106,10 @@ def sim(
         echo=echo,
         link=link,
     )
+    # Whoever ends it, the link goes with it.
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.default_int_handler)
     with simulator:
         if session.out.as_json:
             session.out.record({"port": simulator.port, "seed": seed, "faults": simulator.line.faults})
