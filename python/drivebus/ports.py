@@ -126,14 +126,14 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
         seed=int(options["seed"]),
         transport="process",
         clock=options["clock"],
-        strict_silence=_is_on(options["strict_silence"]),
+        strict_silence=_is_on("strict_silence", options["strict_silence"]),
         faults=faults,
-        echo=_is_on(options["echo"]),
+        echo=_is_on("echo", options["echo"]),
     )
 
 
-def _is_on(text: str) -> bool:
-    return text not in ("0", "false", "")
+def _is_on(option: str, text: str) -> bool:
+    return checks.one_of(option, text.lower(), ("0", "1", "false", "true")) in ("1", "true")
 
 
 def _share(kind: str, text: str, url: str) -> float:

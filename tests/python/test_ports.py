@@ -8,7 +8,7 @@ import pathlib
 import pytest
 import serial
 
-from drivebus import Bus, SerialFormat, Simulator
+from drivebus import Bus, NotAllowed, SerialFormat, Simulator
 
 pty_only = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
 
@@ -18,6 +18,19 @@ def test_a_simulator_in_process() -> None:
         assert bus.simulator is not None
         assert [found.unit for found in bus.scan(range(1, 10))] == [1, 7]
         assert bus.simulator.drive(7).state == "stopped"
+
+
+@pytest.mark.parametrize(("text", "echoes"), [("1", True), ("true", True), ("0", False), ("False", False)])
+def test_a_simulator_is_told_what_it_is_not(text: str, echoes: bool) -> None:
+    with Bus(f"sim://gd350?clock=virtual&echo={text}") as bus:
+        assert bus.simulator is not None
+        assert bus.simulator.line.echo is echoes
+
+
+@pytest.mark.parametrize("option", ["echo=off", "echo=", "strict_silence=2"])
+def test_what_is_neither_yes_nor_no_is_refused(option: str) -> None:
+    with pytest.raises(NotAllowed, match="allowed is 0, 1, false, true"):
+        Bus(f"sim://gd350?{option}")
 
 
 def test_a_simulator_in_real_time() -> None:
