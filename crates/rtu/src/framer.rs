@@ -213,6 +213,8 @@ impl Framer {
                 self.overrun = false;
                 return Some(Step::Frame(frame.clone()));
             }
+            // What came after an earlier silence may be a frame as a whole, of a function without a name.
+            Some(frame) if self.expect.is_none() && (1..frame.start).contains(&self.ended) => self.ended,
             Some(frame) => {
                 // What stands before the answer was not the answer, whatever it looked like.
                 expected &= !self.is_expected(frame.start);

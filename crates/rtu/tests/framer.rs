@@ -191,6 +191,19 @@ fn noise_that_silence_has_ended_takes_no_frame_with_it() {
 }
 
 #[test]
+fn what_begins_after_a_silence_is_not_cut_though_nobody_looked() {
+    let inner = Adu::answer(UnitAddress::MIN, &Answer::read(&[0x01A0]).unwrap());
+    let pdu = [&[0x41][..], inner.as_bytes(), &[0xFF]].concat();
+    let frame = Adu::request(UnitAddress::MIN.into(), &Request::custom(&pdu, AnswerLength::BySilence).unwrap());
+    let mut framer = Framer::new(SILENCE);
+    framer.receive(at(0), &[0xFF]);
+    framer.receive(at(5_000), frame.as_bytes());
+    assert_eq!(framer.poll(at(5_000)).unwrap().unwrap_err().bytes, [0xFF]);
+    assert_eq!(framer.poll(at(5_000)), None);
+    assert_eq!(framer.poll(at(6_750)).unwrap().unwrap().as_bytes(), frame.as_bytes());
+}
+
+#[test]
 fn a_deadline_passed_without_a_verdict_is_not_offered_again() {
     let unit = UnitAddress::MIN;
     let answer = Adu::answer(unit, &Answer::read(&[1, 2]).unwrap());
