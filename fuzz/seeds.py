@@ -79,6 +79,8 @@ def streams() -> dict[str, bytes]:
         "no-registers": bytes([TWO_WORDS, 1, 0, 0, 0, 0, 0]) + bytes([WORDS | SILENT, 1, 0, 0, 0]),
         "missing-bias": bytes([RUN, 0, 255]) + bytes([RUN, 1, 255]) + anything(read, SILENT),
         "longer-than-is-held": bytes([RUN, 2, 255, RUN, 3, 255]) + anything(read) + bytes([RUN, 0, 99]),
+        "nameless-behind-all-that-is-held": bytes([RUN, 1, 255, RUN, 1, 1, NAMELESS, 1, 0, 7, 9]),
+        "noise-then-a-frame-inside-a-frame": bytes([ONE, 0xFF, SEALED | 10 << 4, 11, 1, 0x41]) + inner + b"\xff",
         "two-in-one-burst": anything(read + answer) + anything(answer + read, SILENT),
     }
     both = (anything(request) + (anything(answer, SILENT) if answer else b"") for _, request, answer in exchanges())
@@ -101,6 +103,9 @@ def frames() -> dict[str, bytes]:
         "longest-write": b"\0\0" + bytes([16, 0, 0, 0, 123, 246]) + bytes(246),
         "longest-frame": b"\0\0" + sealed(bytes([1]) + longest + bytes(1)),
         "too-long-a-frame": b"\0\0" + sealed(bytes([1]) + longest + bytes(4)),
+        "more-words-than-asked": b"\0\5" + bytes([3, 0, 0, 0, 1]) + bytes([3, 4, 0, 1, 0, 2]),
+        "fewer-words-than-asked": b"\0\5" + bytes([3, 0, 0, 0, 2]) + bytes([3, 2, 0, 1]),
+        "another-value-echoed": b"\0\5" + bytes([6, 0, 1, 0, 2]) + bytes([6, 0, 1, 0, 3]),
         "last-register": b"\0\5" + bytes([3, 0xFF, 0xFF, 0, 1]) + bytes([3, 2, 0, 0]),
         "beyond-the-last-register": b"\0\5" + bytes([3, 0xFF, 0xFF, 0, 2]) + bytes([3, 4, 0, 0, 0, 0]),
     }

@@ -6,6 +6,7 @@
 #![allow(clippy::missing_panics_doc, reason = "to panic is how a target says that its invariant does not hold")]
 
 mod bus;
+mod doubts;
 mod frame;
 mod framer;
 mod listener;
@@ -14,6 +15,7 @@ mod oracle;
 mod profile;
 mod slave;
 mod stream;
+mod told;
 
 pub use bus::bus;
 pub use frame::frame;

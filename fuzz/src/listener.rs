@@ -41,6 +41,7 @@ pub fn listener(data: &[u8]) {
     let fed: Vec<u8> = bursts.concat();
     let told: Vec<u8> = heard.iter().flat_map(|event| event.clone().unwrap_or_else(|byte| vec![byte])).collect();
     assert_eq!(told, fed, "every byte comes out once, in order");
+    check_beginnings(&heard, &bursts);
     if bursts.iter().all(|burst| burst.len() <= HELD) {
         let tried: Vec<Result<Vec<u8>, u8>> =
             bursts.iter().flat_map(|burst| oracle::frames_in(burst)).map(|event| event.map(<[u8]>::to_vec)).collect();
@@ -66,6 +67,27 @@ pub(crate) fn bursts(stream: &[Arrival]) -> Vec<Vec<u8>> {
         }
     }
     bursts
+}
+
+/// A frame whose length its function does not tell is one only after silence, or right behind another frame.
+fn check_beginnings(heard: &[Result<Vec<u8>, u8>], bursts: &[Vec<u8>]) {
+    let ends = bursts.iter().scan(0, |end, burst| {
+        *end += burst.len();
+        Some(*end)
+    });
+    let mut beginnings: Vec<usize> = [0].into_iter().chain(ends).collect();
+    let mut place = 0;
+    for event in heard {
+        match event {
+            Ok(bytes) => {
+                let told = oracle::lengths(bytes).contains(&bytes.len());
+                assert!(told || beginnings.contains(&place), "{bytes:02X?} has no beginning");
+                place += bytes.len();
+                beginnings.push(place);
+            }
+            Err(_) => place += 1,
+        }
+    }
 }
 
 fn check_meaning(bytes: &[u8]) {

@@ -7,14 +7,18 @@
 use std::time::Duration;
 
 use drivebus_rtu::{
-    Answer, AnswerError, AnswerLength, BeginError, Destination, Event, FIRST_CONTACT, Instant, Master, PATIENCE,
-    Request, TURNAROUND, Tally, UnitAddress,
+    AnswerError, AnswerLength, BeginError, Destination, FIRST_CONTACT, Instant, Master, PATIENCE, Request, TURNAROUND,
+    Tally, UnitAddress,
 };
 
+use crate::doubts::Known;
 use crate::oracle::{self, Asked, Length, Verdict};
 use crate::stream::{Arrival, GAPS, Input, Lumps, SILENCE};
+use crate::told::{Said, pdu_of};
 
 const UNITS: u8 = 3;
+/// Open requests that a master tells apart.
+const REMEMBERED: usize = 16;
 
 /// See the file's first lines. The input: the line, then requests with what happens while each is under way.
 pub fn master(data: &[u8]) {
@@ -30,6 +34,7 @@ pub fn master(data: &[u8]) {
         last_byte: Instant::ZERO,
         request_left: Instant::ZERO,
         units: Default::default(),
+        is_crowded: false,
         sent: Vec::new(),
         fed: 0,
         lumps: Lumps::default(),
@@ -59,49 +64,6 @@ struct Progress {
     heard: Vec<u8>,
 }
 
-/// What the model knows of one unit.
-#[derive(Debug, Default)]
-struct Known {
-    /// PDUs of requests that it left open, and when each was given up.
-    open: Vec<(Vec<u8>, Instant)>,
-    /// It has returned an echo, ever.
-    echoed: bool,
-    /// Until when another program's question may be answered.
-    strange_until: Option<Instant>,
-}
-
-impl Known {
-    fn is_strange(&self, now: Instant) -> bool {
-        self.strange_until.is_some_and(|until| now < until)
-    }
-
-    /// Whether nobody who knows all this would ask it as if nothing were open.
-    fn is_doubtful(&self, now: Instant) -> bool {
-        let owed = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && (self.echoed || now < *given_up + PATIENCE);
-        self.is_strange(now) || self.open.iter().any(owed)
-    }
-
-    /// Whether what it left open keeps it in quarantine: for good where it is known to return echoes.
-    fn holds(&self, now: Instant) -> bool {
-        let recent = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && now < *given_up + PATIENCE;
-        !self.open.is_empty() && (self.echoed || self.open.iter().any(recent))
-    }
-
-    fn settle(&mut self) {
-        self.open.clear();
-        self.strange_until = None;
-    }
-
-    /// Whether a read like `pdu` is open, so that its answer looks the same.
-    fn has_read_like(&self, pdu: &[u8]) -> bool {
-        self.open.iter().any(|(open, _)| open[0] == 3 && open[3..5] == pdu[3..5])
-    }
-
-    fn has_open_echo(&self, now: Instant) -> bool {
-        self.open.iter().any(|(open, given_up)| open[0] == 8 && now < *given_up + PATIENCE)
-    }
-}
-
 struct Run {
     master: Master,
     silence: Duration,
@@ -113,6 +75,8 @@ struct Run {
     request_left: Instant,
     /// Number 0 is nobody.
     units: [Known; UNITS as usize + 1],
+    /// More was open at once than the master tells apart: it may doubt more than this model does.
+    is_crowded: bool,
     sent: Vec<Vec<u8>>,
     fed: usize,
     lumps: Lumps,
@@ -337,7 +301,14 @@ impl Run {
                             known.open.push((job.asked.pdu.clone(), now));
                         }
                     }
-                    (false, true) => assert!(!known.is_doubtful(now) || !is_apart, "a refusal that may be late"),
+                    (false, true) => {
+                        assert!(!known.is_doubtful(now) || !is_apart || self.is_crowded, "a refusal that may be late");
+                    }
+                    (false, false) if self.is_crowded => {
+                        if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {
+                            known.open.clear();
+                        }
+                    }
                     // It answers in the order it was asked: what was open before will not come any more.
                     (false, false) if is_apart && known.holds(now) => known.open.clear(),
                     (false, false) => {}
@@ -375,6 +346,7 @@ impl Run {
     fn leave_open(&mut self, job: &Job, sent: bool) {
         if let (Destination::Unit(unit), true) = (job.destination, sent) {
             self.units[usize::from(unit.get())].open.push((job.asked.pdu.clone(), self.now));
+            self.is_crowded |= self.units.iter().map(|known| known.open.len()).sum::<usize>() > REMEMBERED;
         }
     }
 
@@ -387,76 +359,12 @@ impl Run {
             let (known, in_quarantine) = (&self.units[usize::from(number)], self.master.in_quarantine(self.now, unit));
             assert!(in_quarantine || !known.is_doubtful(self.now), "unit {number} is free, {known:?}");
             let may_owe = !known.open.is_empty() || known.is_strange(self.now);
-            assert!(!in_quarantine || may_owe, "unit {number} owes nothing");
+            assert!(!in_quarantine || may_owe || self.is_crowded, "unit {number} owes nothing");
         }
         let Tally { late, foreign, noise, own_echo, .. } = self.master.take_tally();
         let frames = usize::try_from(late + foreign + own_echo).unwrap_or(usize::MAX);
         assert!(4 * frames + usize::try_from(noise).unwrap_or(usize::MAX) <= self.fed, "counted what never came");
         // What is held may be counted later.
         self.fed = self.fed.min(2 * 256);
-    }
-}
-
-/// An event, kept.
-#[derive(Debug, PartialEq)]
-enum Said {
-    Transmit(Vec<u8>),
-    Answer { pdu: Vec<u8>, exception: bool },
-    Wrong { frame: Vec<u8>, error: AnswerError },
-    Corrupt(Vec<u8>),
-    NoAnswer(Vec<u8>),
-    BroadcastDone,
-    Busy,
-}
-
-impl Said {
-    fn of(event: Event<'_>) -> Self {
-        match event {
-            Event::Transmit(frame) => Self::Transmit(frame.to_vec()),
-            Event::Answer(answer) => {
-                Self::Answer { pdu: pdu_told(&answer), exception: matches!(answer, Answer::Exception { .. }) }
-            }
-            Event::Wrong { error, frame } => Self::Wrong { frame: frame.to_vec(), error },
-            Event::Corrupt { bytes, .. } => Self::Corrupt(bytes.to_vec()),
-            Event::NoAnswer { bytes } => Self::NoAnswer(bytes.to_vec()),
-            Event::BroadcastDone => Self::BroadcastDone,
-            Event::Busy => Self::Busy,
-        }
-    }
-}
-
-fn four(function: u8, first: u16, second: u16) -> Vec<u8> {
-    [&[function][..], &first.to_be_bytes(), &second.to_be_bytes()].concat()
-}
-
-/// The PDU of a request, put together here.
-pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
-    match *request {
-        Request::ReadHolding { address, count, .. } => four(3, address, count),
-        Request::WriteSingle { address, value, .. } => four(6, address, value),
-        Request::Echo { data, .. } => four(8, 0, data),
-        Request::WriteMultiple { address, words, .. } => {
-            let count = u8::try_from(words.len()).unwrap_or(0);
-            let mut pdu = four(16, address, count.into());
-            pdu.push(2 * count);
-            pdu.extend(words.iter().flat_map(u16::to_be_bytes));
-            pdu
-        }
-        Request::Custom { pdu, .. } => pdu.to_vec(),
-    }
-}
-
-/// The PDU that an answer must have been told by, put together here.
-pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
-    match *answer {
-        Answer::Read { words, .. } => {
-            let count = u8::try_from(2 * words.len()).unwrap_or(0);
-            [3, count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
-        }
-        Answer::WriteSingle { address, value, .. } => four(6, address, value),
-        Answer::Echo { data, .. } => four(8, 0, data),
-        Answer::WriteMultiple { address, count, .. } => four(16, address, count),
-        Answer::Exception { function, code, .. } => vec![function | 0x80, code.0],
-        Answer::Custom { pdu, .. } => pdu.to_vec(),
     }
 }

@@ -146,7 +146,7 @@ fn first_in(bytes: &[u8], silent: bool) -> Option<(usize, usize)> {
 }
 
 /// How long a frame of either direction that begins with `here` can be, shortest first, where its function tells.
-fn lengths(here: &[u8]) -> Vec<usize> {
+pub(crate) fn lengths(here: &[u8]) -> Vec<usize> {
     let even = |at: usize, most: u8| here.get(at).filter(|&&bytes| bytes >= 2 && bytes <= most && bytes % 2 == 0);
     let mut lengths = match here {
         [248..=255, ..] => vec![],

@@ -1,0 +1,67 @@
+//! What a master says, kept, and the PDUs of requests and answers, put together without the crate that is judged.
+
+use drivebus_rtu::{Answer, AnswerError, Event, Request};
+
+/// An event, kept.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Said {
+    Transmit(Vec<u8>),
+    Answer { pdu: Vec<u8>, exception: bool },
+    Wrong { frame: Vec<u8>, error: AnswerError },
+    Corrupt(Vec<u8>),
+    NoAnswer(Vec<u8>),
+    BroadcastDone,
+    Busy,
+}
+
+impl Said {
+    pub(crate) fn of(event: Event<'_>) -> Self {
+        match event {
+            Event::Transmit(frame) => Self::Transmit(frame.to_vec()),
+            Event::Answer(answer) => {
+                Self::Answer { pdu: pdu_told(&answer), exception: matches!(answer, Answer::Exception { .. }) }
+            }
+            Event::Wrong { error, frame } => Self::Wrong { frame: frame.to_vec(), error },
+            Event::Corrupt { bytes, .. } => Self::Corrupt(bytes.to_vec()),
+            Event::NoAnswer { bytes } => Self::NoAnswer(bytes.to_vec()),
+            Event::BroadcastDone => Self::BroadcastDone,
+            Event::Busy => Self::Busy,
+        }
+    }
+}
+
+fn four(function: u8, first: u16, second: u16) -> Vec<u8> {
+    [&[function][..], &first.to_be_bytes(), &second.to_be_bytes()].concat()
+}
+
+/// The PDU of a request, put together here.
+pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
+    match *request {
+        Request::ReadHolding { address, count, .. } => four(3, address, count),
+        Request::WriteSingle { address, value, .. } => four(6, address, value),
+        Request::Echo { data, .. } => four(8, 0, data),
+        Request::WriteMultiple { address, words, .. } => {
+            let count = u8::try_from(words.len()).unwrap_or(0);
+            let mut pdu = four(16, address, count.into());
+            pdu.push(2 * count);
+            pdu.extend(words.iter().flat_map(u16::to_be_bytes));
+            pdu
+        }
+        Request::Custom { pdu, .. } => pdu.to_vec(),
+    }
+}
+
+/// The PDU that an answer must have been told by, put together here.
+pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
+    match *answer {
+        Answer::Read { words, .. } => {
+            let count = u8::try_from(2 * words.len()).unwrap_or(0);
+            [3, count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
+        }
+        Answer::WriteSingle { address, value, .. } => four(6, address, value),
+        Answer::Echo { data, .. } => four(8, 0, data),
+        Answer::WriteMultiple { address, count, .. } => four(16, address, count),
+        Answer::Exception { function, code, .. } => vec![function | 0x80, code.0],
+        Answer::Custom { pdu, .. } => pdu.to_vec(),
+    }
+}
