@@ -286,7 +286,9 @@ impl<'b, 'r> Call<'b, 'r> {
             before = Some(sent);
             times += 1;
             writing.connection = Some(self.bus.lock().stats().reconnects);
-            let reading = Call { ask: Ask { request: &read, ..self.ask }, read_back: None, ..writing };
+            // What is read back decides: it is never asked in doubt, not even for a write that was.
+            let ask = Ask { request: &read, in_doubt: false, ..self.ask };
+            let reading = Call { ask, read_back: None, ..writing };
             let mut shows = Vec::new();
             let outcome = reading.repeat(turn, self.retries, give_up, &mut |answer| {
                 if let Answer::Read { words, .. } = answer {
@@ -363,7 +365,9 @@ impl<'b, 'r> Call<'b, 'r> {
                     });
                 }
             };
-            let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(self.verify)));
+            // Whatever else is repeated would be done twice.
+            let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
+            let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(twice)));
             let Some(unit) = self.unit.filter(|_| !agreement.is_immediate()) else {
                 let result = course.ask(&mut owner, &self.ask, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);

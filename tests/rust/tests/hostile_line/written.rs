@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use drivebus_line::{CallError, CallOptions, Failure};
 use drivebus_rtu::Request;
 
-use crate::scripted::{Pieces, Rig, at_once, right, unit};
+use crate::scripted::{Pieces, Rig, after, at_once, millis, right, unit};
 
 /// A unit that keeps what is written to it.
 #[derive(Default)]
@@ -116,4 +116,33 @@ fn without_a_place_to_read_it_back_a_write_is_sent_once() {
     assert!(matches!(error.failure, Failure::NoAnswer { .. }) && error.sent.is_some(), "{error}");
     assert_eq!(rig.sent(&Request::write(0x2000, 1)), 1);
     assert!(unit.lock().unwrap().log.is_empty());
+}
+
+/// Only what is read can be compared; sent twice, a command would be obeyed twice.
+#[test]
+fn to_verify_never_sends_a_write_or_an_echo_twice() {
+    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    for request in [Request::write(0x2000, 1), Request::write_many(0x2000, &[1, 5]).unwrap(), Request::echo(7)] {
+        let rig = Rig::new(|_, request| at_once(&right(request)));
+        rig.call(unit(1).into(), &request, verify, &mut || false, &mut |_| ()).unwrap();
+        assert_eq!(rig.sent(&request), 1, "{request:?}");
+    }
+}
+
+/// A write may be in doubt, what is read back never: the late answer to an earlier read would decide.
+#[test]
+fn a_write_in_doubt_is_not_confirmed_by_the_late_answer_to_an_earlier_read() {
+    let rig = Rig::new(|number, request| match number {
+        // The look at the adapter, and then a read whose answer comes a good second late: 500 ms for itself, 500 ms for
+        // the write, and then it is there in the place of what was read back.
+        1 => after(millis(1_020), &right(request)),
+        2 => Vec::new(), // the write, which the unit does not hear
+        _ => after(millis(30), &right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    rig.read(5, 1).unwrap_err();
+    // Register 100 shows 100, whatever is written to it.
+    let options = CallOptions { in_doubt: true, read_back: Some(100), ..CallOptions::default() };
+    let error = rig.call(unit(1).into(), &Request::write(100, 5), options, &mut || false, &mut |_| ()).unwrap_err();
+    assert_eq!(error.failure, Failure::NotTaken { times: 1, shows: vec![100] });
 }
