@@ -53,8 +53,8 @@ struct Course {
     until: Instant,
     /// How often it was asked.
     asked: u32,
-    /// The number of requests to the unit, if the last of them was a read of this call, which it left open.
-    left_open: Option<u64>,
+    /// What the owner says was asked of the unit, if the last of it was a read of this call, which it left open.
+    left_open: Option<(u64, u64)>,
 }
 
 impl Course {
@@ -330,7 +330,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 owner.close();
                 return Err(self.ask.failed(Failure::Closed, None, self.bus.now_of(&owner), &[]));
             }
-            if let Err(failure) = owner.reopen(give_up) {
+            if let Err(failure) = owner.prepare(give_up) {
                 return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
             }
             if self.connection.is_some_and(|known| known != owner.stats().reconnects) {

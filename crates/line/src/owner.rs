@@ -111,9 +111,11 @@ impl Owner {
         self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
     }
 
-    /// How many requests went to `unit` so far.
-    pub(crate) fn asked(&self, unit: UnitAddress) -> u64 {
-        self.stats().units.get(&unit).map_or(0, |counters| counters.requests)
+    /// How many requests went to `unit` so far, and how often the port was opened again: who finds both unchanged knows
+    /// that nobody else has asked it since.
+    pub(crate) fn asked(&self, unit: UnitAddress) -> (u64, u64) {
+        let stats = self.stats();
+        (stats.units.get(&unit).map_or(0, |counters| counters.requests), stats.reconnects)
     }
 
     /// How well `unit` could be reached lately.
@@ -126,13 +128,15 @@ impl Owner {
         self.line.as_deref_mut()
     }
 
-    /// Opens the line again if it was lost, unless `give_up` says so first.
-    pub(crate) fn reopen(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
+    /// Makes ready for a request: opens the line again if it was lost, unless `give_up` says so first.
+    pub(crate) fn prepare(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {
             let line = self.opener.open(give_up)?;
             self.take_line(line);
             self.stats().reconnects += 1;
         }
+        // Nothing is in flight, unless a caller's own code panicked while it was: then that is given up.
+        self.master.abort(self.now());
         Ok(())
     }
 
@@ -167,7 +171,12 @@ impl Owner {
         if self.echo == AdapterEcho::Auto && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;
         }
-        if in_quarantine && !matches!(ask.request, Request::Echo { .. }) {
+        let in_doubt = match *ask.request {
+            // A word of the caller's own choosing may be one that it has sent before.
+            Request::Echo { data, .. } => !self.words.is_latest(data) && self.master.may_owe_an_echo(now, unit),
+            _ => in_quarantine,
+        };
+        if in_doubt {
             if let Some(probe) = self.resync.probe(&self.master, now, unit, ask.request, tried, in_time) {
                 return Next::Probe(unit, probe);
             }
@@ -227,10 +236,10 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<Done, Box<CallError>> {
         let done = result?;
-        if self.echo != AdapterEcho::Auto
-            || ask.destination == Destination::Broadcast
-            || !ask.request.expected().may_repeat_request()
-        {
+        let Destination::Unit(unit) = ask.destination else {
+            return Ok(done);
+        };
+        if self.echo != AdapterEcho::Auto || !ask.request.expected().may_repeat_request() {
             return Ok(done);
         }
         // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.
@@ -238,8 +247,7 @@ impl Owner {
         if self.echo == AdapterEcho::Absent {
             return Ok(done);
         }
-        // The answer may still come, and is owed without the master knowing it.
-        self.master.opened(done.ended);
+        self.master.still_owed(done.ended, unit, ask.request);
         let failure = Failure::NoAnswer { timeout: ask.timeout, attempts: 1 };
         Err(ask.failed(failure, Some(done.sent), done.ended, &[]))
     }
@@ -340,12 +348,21 @@ impl Owner {
 
     /// Keeps what the exchange has shown about the adapter and the line.
     fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>, tally: Tally) {
-        if self.echo != AdapterEcho::Auto {
+        if self.given_echo != AdapterEcho::Auto {
+            return;
+        }
+        let is_broadcast = ask.destination == Destination::Broadcast;
+        if tally.own_echo > 0 && (self.echo == AdapterEcho::Auto || !is_broadcast) {
+            self.echo = AdapterEcho::Present;
+            self.master.strip_echo(true);
+            return;
+        }
+        if is_broadcast || ask.request.expected().may_repeat_request() {
             return;
         }
         let length = Adu::request(ask.destination, ask.request).as_bytes().len();
-        // Bytes that are no frame might be an echo that did not survive.
-        let clean = usize::try_from(tally.noise).is_ok_and(|noise| noise < length)
+        // Bytes that are no frame might be what is left of an echo.
+        let clean = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= length)
             && match result {
                 Ok(_) => true,
                 Err(error) => match error.failure {
@@ -354,11 +371,14 @@ impl Owner {
                     _ => false,
                 },
             };
-        if tally.own_echo > 0 {
-            self.echo = AdapterEcho::Present;
-            self.master.strip_echo(true);
-        } else if clean && ask.destination != Destination::Broadcast && !ask.request.expected().may_repeat_request() {
-            self.echo = AdapterEcho::Absent;
+        match self.echo {
+            AdapterEcho::Auto if clean => self.echo = AdapterEcho::Absent,
+            // It did not echo this time: to be looked at again before anything depends on it.
+            AdapterEcho::Present if clean && result.is_ok() => {
+                self.echo = AdapterEcho::Auto;
+                self.master.strip_echo(false);
+            }
+            _ => {}
         }
     }
 }

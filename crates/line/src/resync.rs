@@ -39,6 +39,11 @@ impl FreshWords {
         Self(AtomicU16::new(u16::from_le_bytes([a, b])))
     }
 
+    /// Whether `word` is the one that was given out last, so that only the echo that it was meant for carries it.
+    pub(crate) fn is_latest(&self, word: u16) -> bool {
+        self.0.load(Ordering::Relaxed) == word.wrapping_add(Self::STEP)
+    }
+
     /// A word that no open echo carries.
     pub(crate) fn next(&self) -> u16 {
         self.0.fetch_add(Self::STEP, Ordering::Relaxed)
@@ -93,9 +98,9 @@ pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
 struct Known {
     /// It has answered something.
     alive: bool,
-    /// It has returned an echo.
+    /// It has returned an echo, and was not silent on [`SILENT_FOR_GOOD`] since.
     echoes: bool,
-    /// Echoes in a row that it was silent on, if it never returned one.
+    /// Echoes in a row that it was silent on.
     silent_echoes: u32,
     /// A register that it answered a read of.
     readable: Option<u16>,
@@ -111,7 +116,10 @@ impl Resync {
         let known = self.0.entry(unit).or_default();
         known.alive = true;
         match request {
-            Request::Echo { .. } if !refused => known.echoes = true,
+            Request::Echo { .. } if !refused => {
+                known.echoes = true;
+                known.silent_echoes = 0;
+            }
             Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
             _ => {}
         }
@@ -169,6 +177,8 @@ impl Resync {
     pub(crate) fn silent_on_echo(&mut self, unit: UnitAddress) {
         let known = self.0.entry(unit).or_default();
         known.silent_echoes = known.silent_echoes.saturating_add(1);
+        // Another unit may have its address now.
+        known.echoes &= known.silent_echoes < SILENT_FOR_GOOD;
     }
 }
 

@@ -244,6 +244,11 @@ impl Expected {
         matches!(self.0, Kind::Echo { .. })
     }
 
+    /// Whether something may be changed: neither a read nor an echo.
+    pub(crate) const fn is_write(self) -> bool {
+        !self.is_read() && !self.is_echo()
+    }
+
     /// Whether words are read.
     pub(crate) const fn is_read(self) -> bool {
         matches!(self.0, Kind::Read { .. })

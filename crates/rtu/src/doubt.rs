@@ -9,7 +9,7 @@
 //! | the answer to a read that no open answer could pass for | requests of our own | the same |
 //! | the refusal of an echo (exception to 08H), while no other echo is open | requests of our own | the same |
 //! | [`FIRST_CONTACT`] after the line was opened | questions of others | it answers within that time or never |
-//! | [`PATIENCE`] after the last request it left open | requests of our own, to a unit that never returned an echo | the same |
+//! | [`PATIENCE`] after the last request it left open | requests of our own, to a unit that returns no echo | the same |
 //!
 //! Behind a gateway answers may overtake each other, and none of the orders above holds. There an open answer counts as
 //! possible for [`OVERTAKING`], and a read that it could pass for has to be repeated: see [`Attribution`]. What another
@@ -35,6 +35,10 @@ pub const OVERTAKING: Duration = Duration::from_secs(3);
 /// Longest time that one answer given up may count as possible. Each answer taken meanwhile may have been the open one, so
 /// that its own is open instead; an answer that is displaced so three times over is not expected of any gateway.
 const LONGEST: Duration = Duration::from_secs(9);
+
+/// After so many echoes that stayed open, one that returned some before counts as a unit that never did: another one may
+/// have its address now.
+const MUTE: u8 = 5;
 
 /// Open requests that are told apart; of more, only the unit and the time are kept.
 const KEPT: usize = 16;
@@ -79,7 +83,7 @@ pub(crate) struct Doubts {
     strangers_until: Instant,
     /// Units that left a request of ours open.
     open: UnitSet,
-    /// Units that have returned an echo, ever.
+    /// Units that have returned an echo, and did not leave [`MUTE`] open since.
     echoers: UnitSet,
     ledger: [Option<Open>; KEPT],
     /// Units of which something had to be forgotten, and when the latest of it was asked.
@@ -124,6 +128,9 @@ impl Doubts {
             open.count = open.count.saturating_add(1);
             open.given_up = now;
             open.last = now;
+            if expected.is_echo() && open.count >= MUTE {
+                self.echoers.remove(unit);
+            }
             return;
         }
         let open = Open { unit, expected, count: 1, given_up: now, last: now };
@@ -143,6 +150,11 @@ impl Doubts {
         self.is_strange(now, unit) || (self.open.contains(unit) && !self.is_over(now, unit))
     }
 
+    /// Whether `unit` may owe anything, echoes included.
+    pub(crate) fn may_owe_an_echo(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.is_strange(now, unit) || self.open.contains(unit)
+    }
+
     /// Whether `unit` owes an answer, and what it answers to `expected` can still be told apart: what does not fit is
     /// late then, and not wrong.
     pub(crate) fn sorts_out(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
@@ -157,6 +169,13 @@ impl Doubts {
                 && !self.is_strange(now, unit)
                 && !self.forgotten.contains(unit)
                 && !self.of(unit).any(|open| open.expected.could_pass_for(expected)))
+    }
+
+    /// Whether a refusal that `unit` gives to `expected` may be meant for something else that it was asked before.
+    pub(crate) fn may_refuse_another(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
+        self.is_strange(now, unit)
+            || self.forgotten.contains(unit)
+            || self.of(unit).any(|open| open.expected != expected && open.expected.function() == expected.function())
     }
 
     /// `unit` has answered what could not be mistaken, and with it everything before.
@@ -175,7 +194,9 @@ impl Doubts {
     /// `unit` has refused an echo. Refusals look alike: where another echo is open, this may be the refusal of that one,
     /// and prove nothing of what was asked since.
     pub(crate) fn refused_echo(&mut self, now: Instant, unit: UnitAddress) {
-        let earlier = self.of(unit).any(|open| open.expected.is_echo() && now < open.last + PATIENCE);
+        let earlier = self
+            .of(unit)
+            .any(|open| open.expected.function() == Expected::ECHO.function() && now < open.last + PATIENCE);
         if earlier || self.is_strange(now, unit) || self.forgotten.contains(unit) {
             self.left_open(now, unit, Expected::ECHO);
         } else {

@@ -256,10 +256,21 @@ impl Master {
         self.doubts.opened(now);
     }
 
+    /// Says that what was taken for the answer of `unit` to `request` may have been none, so that it is still owed.
+    pub fn still_owed(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>) {
+        self.doubts.left_open(now, unit, request.expected());
+    }
+
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or
     /// a read whose answer cannot be mistaken.
     pub fn in_quarantine(&self, now: Instant, unit: UnitAddress) -> bool {
         self.doubts.contains(now, unit)
+    }
+
+    /// Whether an echo from before may still come back from `unit`. It could be mistaken for nothing but another echo of
+    /// the same word.
+    pub fn may_owe_an_echo(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.doubts.may_owe_an_echo(now, unit)
     }
 
     /// When the quarantine of first contact with `unit` ends by itself; `None` where it is over, or was none.
@@ -333,6 +344,14 @@ impl Master {
                         Err(_) if apart => self.tally.late += 1,
                         // Refusals of reads look alike.
                         Ok(Answer::Exception { .. }) if apart && expected.is_read() => self.tally.late += 1,
+                        // So do those of writes, and what went out in doubt was not refused because another was.
+                        Ok(Answer::Exception { .. })
+                            if doubted
+                                && expected.is_write()
+                                && self.doubts.may_refuse_another(now, unit, expected) =>
+                        {
+                            self.tally.late += 1;
+                        }
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
                             let right = outcome.is_ok();

@@ -169,3 +169,69 @@ fn a_refusal_of_the_echo_is_no_proof_at_first_contact() {
     assert_eq!(rig.read(200, 1).unwrap(), [200]);
     assert!(rig.wire.lock().unwrap().now >= drivebus_rtu::Instant::ZERO + FIRST_CONTACT);
 }
+
+/// Another drive in the place of the one that was there: what the old one knew, the new one may not.
+#[test]
+fn a_unit_that_returns_no_echo_any_more_is_trusted_again() {
+    let mut read_lost = false;
+    let rig = Rig::new(move |number, request| match (number, request[1]) {
+        (0, _) => at_once(&right(request)), // the look at the adapter
+        (1, 8) => at_once(&right(request)),
+        (_, 8) => Vec::new(),
+        _ if !std::mem::replace(&mut read_lost, true) => Vec::new(),
+        _ => at_once(&right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    rig.ask(&Request::echo(0xBEEF)).unwrap();
+    rig.read(100, 1).unwrap_err();
+    let words = (0..20).find_map(|_| {
+        rig.pass(millis(1_000));
+        rig.read(200, 1).ok()
+    });
+    assert_eq!(words, Some(vec![200]), "{:?}", rig.bus.stats());
+}
+
+/// The refusal of an earlier write says nothing of the stop: only the stop's own would mean that nothing was done.
+#[test]
+fn a_stop_in_doubt_is_not_refused_by_the_late_refusal_of_another_write() {
+    let refusal = [1, 0x86, 2, 0xC3, 0xA1];
+    let rig = Rig::new(move |number, request| match number {
+        1 => after(millis(520), &refusal),
+        2 => after(millis(60), &right(request)),
+        _ => at_once(&right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    rig.ask(&Request::write(0x0100, 1)).unwrap_err();
+    let stop = CallOptions { in_doubt: true, ..CallOptions::default() };
+    rig.call(unit(1).into(), &Request::write(0x2000, 5), stop, &mut || false, &mut |_| ()).unwrap();
+}
+
+/// An echo proves something only by a word that no open echo carries.
+#[test]
+fn an_echo_asked_twice_is_not_confirmed_by_its_first_answer() {
+    let echo = Request::echo(0x1234);
+    let rig = Rig::new(|number, request| match number {
+        1 => after(millis(520), &right(request)),
+        _ if request == drivebus_rtu::Adu::request(unit(1).into(), &Request::echo(0x1234)).as_bytes() => Vec::new(),
+        _ => after(millis(60), &right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    rig.ask(&echo).unwrap_err();
+    rig.ask(&echo).expect_err("the second one was lost");
+}
+
+/// A caller's own code may panic at any moment; the bus is there for the others.
+#[test]
+fn a_caller_that_panics_leaves_a_bus_that_works() {
+    let rig = Rig::new(|number, request| match number {
+        1 => after(millis(300), &right(request)),
+        _ => at_once(&right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    let read = Request::read(100, 1).unwrap();
+    let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        rig.call(unit(1).into(), &read, CallOptions::default(), &mut || panic!("asked"), &mut |_| ())
+    }));
+    assert!(panicked.is_err());
+    assert_eq!(rig.read(200, 1).unwrap(), [200]);
+}

@@ -118,3 +118,30 @@ fn the_answer_is_still_there_at_its_last_byte() {
         assert_eq!(done.ended.saturating_duration_since(done.sent), shortest);
     }
 }
+
+/// What is left of an echo that lost some bytes is noise in front of the answer, and no sign of an adapter without echo.
+#[test]
+fn an_echo_that_lost_bytes_does_not_pass_for_none() {
+    for lost in 1..=5 {
+        let rig = Rig::echoing(
+            move |number, sent| vec![(Duration::ZERO, if number == 0 { sent[lost..].to_vec() } else { sent.to_vec() })],
+            |_, request| if request[1] == 3 { vec![(millis(80), right(request))] } else { Vec::new() },
+        );
+        assert_eq!(rig.read(100, 1).unwrap(), [100]);
+        let error = rig.ask(&Request::write(0x2001, 7)).expect_err("its own echo");
+        assert!(matches!(error.failure, Failure::NoAnswer { .. }), "{lost} bytes lost: {error}");
+    }
+}
+
+/// An adapter that was taken for one without echo is known as soon as it sends back what no unit answers.
+#[test]
+fn an_adapter_that_begins_to_echo_is_noticed() {
+    let rig = Rig::echoing(
+        |number, sent| if number < 2 { Vec::new() } else { whole(number, sent) },
+        |_, request| if request[1] == 3 { vec![(millis(80), right(request))] } else { Vec::new() },
+    );
+    for address in 0..3 {
+        assert_eq!(rig.read(address, 1).unwrap(), [address]);
+    }
+    rig.ask(&Request::write(0x2001, 7)).expect_err("its own echo");
+}
