@@ -2,12 +2,15 @@
 
 use drivebus_rtu::{Instant, PATIENCE};
 
+/// So many echoes left open, and a unit that returned some counts as one that returns none.
+const MUTE: usize = 5;
+
 /// What the model knows of one unit.
 #[derive(Debug, Default)]
 pub(crate) struct Known {
     /// PDUs of requests that it left open, and when each was given up.
     pub(crate) open: Vec<(Vec<u8>, Instant)>,
-    /// It has returned an echo, ever.
+    /// It has returned an echo, and did not leave [`MUTE`] open since.
     pub(crate) echoed: bool,
     /// Until when another program's question may be answered.
     pub(crate) strange_until: Option<Instant>,
@@ -28,6 +31,16 @@ impl Known {
     pub(crate) fn holds(&self, now: Instant) -> bool {
         let recent = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && now < *given_up + PATIENCE;
         !self.open.is_empty() && (self.echoed || self.open.iter().any(recent))
+    }
+
+    /// It left `pdu` open, which was given up at `now`.
+    pub(crate) fn leave_open(&mut self, pdu: Vec<u8>, now: Instant) {
+        let is_echo = pdu[0] == 8;
+        self.open.push((pdu, now));
+        let echoes = self.open.iter().filter(|(pdu, _)| pdu[0] == 8);
+        if is_echo && echoes.count() >= MUTE {
+            self.echoed = false;
+        }
     }
 
     pub(crate) fn settle(&mut self) {

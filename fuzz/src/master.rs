@@ -291,14 +291,14 @@ impl Run {
                     }
                     // The refusal of an earlier echo looks the same.
                     (true, true) if known.is_strange(now) || known.has_open_echo(now) => {
-                        known.open.push((job.asked.pdu.clone(), now));
+                        known.leave_open(job.asked.pdu.clone(), now);
                     }
                     (true, true) => {
                         // With so much open that not all is remembered, the master waits for an echo.
                         if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {
                             known.settle();
                         } else {
-                            known.open.push((job.asked.pdu.clone(), now));
+                            known.leave_open(job.asked.pdu.clone(), now);
                         }
                     }
                     (false, true) => {
@@ -345,7 +345,7 @@ impl Run {
 
     fn leave_open(&mut self, job: &Job, sent: bool) {
         if let (Destination::Unit(unit), true) = (job.destination, sent) {
-            self.units[usize::from(unit.get())].open.push((job.asked.pdu.clone(), self.now));
+            self.units[usize::from(unit.get())].leave_open(job.asked.pdu.clone(), self.now);
             self.is_crowded |= self.units.iter().map(|known| known.open.len()).sum::<usize>() > REMEMBERED;
         }
     }

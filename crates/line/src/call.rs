@@ -10,17 +10,14 @@ use std::time::Duration;
 
 use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
 
-use crate::PortErrorKind;
 use crate::backoff::Verdict;
 use crate::bus::Bus;
+use crate::course::{Course, is_unanswered};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::owner::{Next, Owner};
+use crate::owner::Next;
 use crate::queue::{Priority, Turn};
 use crate::resync::Tried;
-
-/// How many more attempts than questions there may be: those that end with a probe.
-const PROBED_IN_VAIN: u32 = 4;
 
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,42 +40,6 @@ pub struct CallOptions {
     /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
     /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
     pub connection: Option<u64>,
-}
-
-/// What the attempts of one call leave to the next.
-struct Course {
-    /// How long the caller allowed them to take.
-    allowed: Duration,
-    /// When that is over: from the beginning, and then from the first question on.
-    until: Instant,
-    /// How often it was asked.
-    asked: u32,
-    /// What the owner says was asked of the unit, if the last of it was a read of this call, which it left open.
-    left_open: Option<(u64, u64)>,
-}
-
-impl Course {
-    /// Asks, and remembers whether the same may be asked again.
-    fn ask(
-        &mut self,
-        owner: &mut Owner,
-        ask: &Ask<'_>,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        if self.asked == 0 {
-            self.until = owner.now() + self.allowed;
-        }
-        self.asked += 1;
-        let result = owner.exchange(ask, give_up, take);
-        self.left_open = match (&result, ask.destination, ask.request) {
-            (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
-                Some(owner.asked(unit))
-            }
-            _ => None,
-        };
-        result
-    }
 }
 
 /// A call under way.
@@ -207,9 +168,6 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     /// Asks, and asks again up to `retries` times while nothing comes of it.
-    ///
-    /// The time that the caller allowed, the time-out for each of these times, is allowed once for making sure of the
-    /// unit and once, from the first question on, for asking.
     fn repeat(
         &self,
         turn: &mut Turn<'b>,
@@ -218,30 +176,20 @@ impl<'b, 'r> Call<'b, 'r> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut lost = None;
-        let allowed = self.ask.timeout.saturating_mul(retries.saturating_add(1));
         let now = self.bus.now_of(&self.bus.lock());
-        let mut course = Course { allowed, until: now + allowed, asked: 0, left_open: None };
-        let (mut attempts, mut left) = (0, retries.saturating_mul(2));
+        let mut course = Course::new(now, self.ask.timeout, retries);
         loop {
-            attempts += 1;
-            let asked = course.asked;
+            let asked = course.asked();
             let error = match self.attempt(turn, &mut course, give_up, take) {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
             let is_port = matches!(error.failure, Failure::Port(_));
-            let cost = match course.asked > asked {
-                true if is_damaged(&error.failure) => 1,
-                true => 2,
-                false => 0,
-            };
-            let is_over = (cost > 0 && left == 0) || attempts > course.asked.saturating_add(PROBED_IN_VAIN);
-            left = left.saturating_sub(cost);
-            if is_over || !is_passing(&error.failure) || error.ended >= course.until {
+            if !course.goes_on(&error, asked) {
                 // How the port was lost tells more than that it is still not there. But where the request went out only
                 // the second time, that has to be said.
                 let lost = lost.filter(|_| is_port && error.sent.is_none());
-                return Err(lost.unwrap_or_else(|| attempted(error, course.asked)));
+                return Err(lost.unwrap_or_else(|| attempted(error, course.asked())));
             }
             lost = is_port.then_some(error);
             if let Some(unit) = self.unit {
@@ -320,7 +268,7 @@ impl<'b, 'r> Call<'b, 'r> {
     ) -> Result<Done, Box<CallError>> {
         let mut tried = Tried::default();
         let mut agreement: Option<Agreement> = None;
-        let mut asked = 0;
+        let (mut asked, mut known) = (0, None);
         loop {
             if !turn.let_pass(give_up) {
                 return Err(self.failed(self.bus.given_up()));
@@ -336,9 +284,9 @@ impl<'b, 'r> Call<'b, 'r> {
             if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
-            let in_time = self.bus.now_of(&owner) < course.until;
-            let again = self.unit.is_some_and(|unit| course.left_open.take() == Some(owner.asked(unit)));
-            if again {
+            let in_time = course.is_in_time(self.bus.now_of(&owner));
+            let by_now = self.unit.map(|unit| owner.asked(unit));
+            if by_now.is_some_and(|by_now| course.owes_only_this(by_now)) {
                 let ask = Ask { in_doubt: true, ..self.ask };
                 return course.ask(&mut owner, &ask, give_up, take);
             }
@@ -365,6 +313,9 @@ impl<'b, 'r> Call<'b, 'r> {
                     });
                 }
             };
+            if by_now != known {
+                agreement = None; // what somebody else asked in between may be open now
+            }
             // Whatever else is repeated would be done twice.
             let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
             let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(twice)));
@@ -372,6 +323,9 @@ impl<'b, 'r> Call<'b, 'r> {
                 let result = course.ask(&mut owner, &self.ask, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);
             };
+            if asked == 0 {
+                course.asks(owner.now());
+            }
             if asked == 1 {
                 owner.stats().count(Some(unit), |counters| counters.verified += 1);
             }
@@ -383,6 +337,7 @@ impl<'b, 'r> Call<'b, 'r> {
                     take(answer);
                 }
             });
+            known = Some(owner.asked(unit));
             match result {
                 Ok(done) if agreed => return Ok(done),
                 Ok(done) if asked >= u32::from(agreement.longest()) => {
@@ -409,23 +364,4 @@ fn attempted(mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
         error.failure = Failure::NoAnswer { timeout, attempts: attempts.max(1) };
     }
     error
-}
-
-/// Whether the same read may well succeed the next time.
-fn is_passing(failure: &Failure) -> bool {
-    match failure {
-        Failure::Busy { .. } | Failure::Doubtful | Failure::Disagreeing { .. } => true,
-        Failure::Port(error) => error.kind == PortErrorKind::Lost,
-        other => is_unanswered(other),
-    }
-}
-
-/// Whether the request went out, and no right answer came.
-fn is_unanswered(failure: &Failure) -> bool {
-    matches!(failure, Failure::NoAnswer { .. }) || is_damaged(failure)
-}
-
-/// Whether an answer came that was none.
-fn is_damaged(failure: &Failure) -> bool {
-    matches!(failure, Failure::Wrong(_) | Failure::Corrupt(_))
 }

@@ -9,6 +9,7 @@ mod backoff;
 mod bus;
 mod call;
 pub mod clock;
+mod course;
 mod error;
 mod exchange;
 mod hint;

@@ -43,6 +43,9 @@ pub(crate) enum Next {
     GiveUp,
 }
 
+/// How many requests went to a unit, and how often the port was opened again by then.
+pub(crate) type Asked = (u64, u64);
+
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
@@ -111,9 +114,8 @@ impl Owner {
         self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
     }
 
-    /// How many requests went to `unit` so far, and how often the port was opened again: who finds both unchanged knows
-    /// that nobody else has asked it since.
-    pub(crate) fn asked(&self, unit: UnitAddress) -> (u64, u64) {
+    /// What was asked of `unit` so far: who finds it unchanged knows that nobody else has asked it since.
+    pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
         let stats = self.stats();
         (stats.units.get(&unit).map_or(0, |counters| counters.requests), stats.reconnects)
     }

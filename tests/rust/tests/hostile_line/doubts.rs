@@ -175,8 +175,8 @@ fn a_refusal_of_the_echo_is_no_proof_at_first_contact() {
 fn a_unit_that_returns_no_echo_any_more_is_trusted_again() {
     let mut read_lost = false;
     let rig = Rig::new(move |number, request| match (number, request[1]) {
-        (0, _) => at_once(&right(request)), // the look at the adapter
-        (1, 8) => at_once(&right(request)),
+        // The look at the adapter, and one echo.
+        (0, _) | (1, 8) => at_once(&right(request)),
         (_, 8) => Vec::new(),
         _ if !std::mem::replace(&mut read_lost, true) => Vec::new(),
         _ => at_once(&right(request)),
@@ -234,4 +234,19 @@ fn a_caller_that_panics_leaves_a_bus_that_works() {
     }));
     assert!(panicked.is_err());
     assert_eq!(rig.read(200, 1).unwrap(), [200]);
+}
+
+/// To be sure of an answer is no reason to ask more often than the caller allows while there is none.
+#[test]
+fn a_verified_read_is_not_repeated_more_often_than_allowed() {
+    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    let read = Request::read(100, 1).unwrap();
+    let rig = Rig::new(|_, request| {
+        let mut answer = right(request);
+        answer[4] ^= 1;
+        at_once(&answer)
+    });
+    let error = rig.call(unit(1).into(), &read, verify, &mut || false, &mut |_| ()).unwrap_err();
+    assert!(matches!(error.failure, Failure::Corrupt(_)), "{error}");
+    assert_eq!(rig.sent(&read), 1);
 }
