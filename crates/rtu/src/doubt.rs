@@ -173,9 +173,12 @@ impl Doubts {
 
     /// Whether a refusal that `unit` gives to `expected` may be meant for something else that it was asked before.
     pub(crate) fn may_refuse_another(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
+        let owes = self.contains(now, unit);
+        let may_come = |last| owes || (self.overtaking && !is_past(now, last));
+        let rival = |open: &Open| open.expected != expected && open.expected.function() == expected.function();
         self.is_strange(now, unit)
-            || self.forgotten.contains(unit)
-            || self.of(unit).any(|open| open.expected != expected && open.expected.function() == expected.function())
+            || (self.forgotten.contains(unit) && may_come(self.forgotten_at))
+            || self.of(unit).any(|open| rival(open) && may_come(open.last))
     }
 
     /// `unit` has answered what could not be mistaken, and with it everything before.

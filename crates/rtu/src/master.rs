@@ -346,9 +346,7 @@ impl Master {
                         Ok(Answer::Exception { .. }) if apart && expected.is_read() => self.tally.late += 1,
                         // So do those of writes, and what went out in doubt was not refused because another was.
                         Ok(Answer::Exception { .. })
-                            if doubted
-                                && expected.is_write()
-                                && self.doubts.may_refuse_another(now, unit, expected) =>
+                            if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
                         {
                             self.tally.late += 1;
                         }

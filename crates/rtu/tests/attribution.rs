@@ -35,9 +35,25 @@ impl Luck<'_> {
 /// What a program asks, in turn.
 #[derive(Debug, Clone, Copy)]
 enum Wish {
-    Read { unit: u8, address: u16, count: u16 },
-    Write { unit: u8, address: u16, value: u16 },
+    Read {
+        unit: u8,
+        address: u16,
+        count: u16,
+    },
+    Write {
+        unit: u8,
+        address: u16,
+        value: u16,
+    },
+    /// A write that goes out at once, in doubt or not.
+    Stop {
+        unit: u8,
+        address: u16,
+    },
 }
+
+/// What a stop writes, and others too.
+const STOP: u16 = 1;
 
 /// What a unit makes of an echo.
 #[derive(Debug, Clone, Copy)]
@@ -179,6 +195,11 @@ impl Program<'_> {
     /// Runs one request to its end; every right answer goes to `agreement`.
     fn exchange(&mut self, unit: UnitAddress, request: &Request<'_>, agreement: &mut Agreement) -> (Outcome, bool) {
         self.master.begin(self.now, unit.into(), request, TIMEOUT).unwrap();
+        self.follow(unit, agreement)
+    }
+
+    /// Runs the request that was begun to its end.
+    fn follow(&mut self, unit: UnitAddress, agreement: &mut Agreement) -> (Outcome, bool) {
         loop {
             match self.master.poll(self.now) {
                 Some(Event::Transmit(frame)) => {
@@ -273,6 +294,7 @@ fn wishes() -> impl Strategy<Value = Vec<Wish>> {
         // Few shapes, so that a late answer fits the next request.
         3 => (unit(), 0..=REGISTERS, 1..=2_u16).prop_map(|(unit, address, count)| Wish::Read { unit, address, count }),
         1 => (unit(), 0..=REGISTERS, 0..3_u16).prop_map(|(unit, address, value)| Wish::Write { unit, address, value }),
+        1 => (unit(), 0..=REGISTERS).prop_map(|(unit, address)| Wish::Stop { unit, address }),
     ];
     prop::collection::vec(wish, 1..40)
 }
@@ -310,7 +332,7 @@ proptest! {
         }
         program.master.opened(program.now);
         for wish in wishes {
-            let (Wish::Read { unit, .. } | Wish::Write { unit, .. }) = wish;
+            let (Wish::Read { unit, .. } | Wish::Write { unit, .. } | Wish::Stop { unit, .. }) = wish;
             let to = UnitAddress::new(unit).unwrap();
             match wish {
                 Wish::Read { address, count, .. } => {
@@ -323,6 +345,15 @@ proptest! {
                     let came = program.ask(to, &Request::write(address, value));
                     let taken = &program.line.units[&unit].taken[before..];
                     prop_assert!(came != Outcome::Confirmed || taken == [(address, value)], "{came:?}, {taken:?}");
+                    prop_assert!(came != Outcome::Refused || address >= REGISTERS, "refused, and not by the unit");
+                }
+                Wish::Stop { address, .. } => {
+                    let stop = Request::write(address, STOP);
+                    program.master.begin_in_doubt(program.now, to.into(), &stop, TIMEOUT).unwrap();
+                    let (came, _) = program.follow(to, &mut Agreement::new(Attribution::Certain, 1));
+                    // In doubt it may be an earlier one that was confirmed, but of the same kind and never refused.
+                    let taken = &program.line.units[&unit].taken;
+                    prop_assert!(came != Outcome::Confirmed || taken.contains(&(address, STOP)), "never taken");
                     prop_assert!(came != Outcome::Refused || address >= REGISTERS, "refused, and not by the unit");
                 }
             }
