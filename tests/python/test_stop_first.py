@@ -47,7 +47,7 @@ def test_a_stop_and_its_confirmation_overtake_200_reads_that_wait() -> None:
         assert waiting > WAITING / 4, "reads were still waiting when the stop was confirmed"
         stop = seen.index(STOP)
         assert stop == sent, "the next request after the one in flight"
-        # The line is free until this program asks, and others begin meanwhile. In its turn it would come after all of them.
+        # The line is free until this program asks, so others begin. In its turn it would come after all of them.
         assert any(request.startswith(STATE) for request in seen[stop + 1 : stop + WAITING // 2])
         assert answers == [other] * WAITING
         assert drive.wait_until_stopped(30).state is drivebus.State.STOPPED
