@@ -11,7 +11,7 @@ import threading
 import pytest
 
 import drivebus
-from drivebus import Bus, Choice, ControlSource, Drive, NoAnswer, Simulator, State, Unconfirmed
+from drivebus import Bus, Choice, ControlSource, Drive, NoAnswer, Simulator, State
 
 CONTROL, SETPOINT, ACCELERATION = 0x2000, 0x2001, 0x000B
 RAM = 0x8000
@@ -339,72 +339,6 @@ class TestParameters:
         with pytest.raises(drivebus.NotAllowed, match="stopped"):
             obedient.write({"P00.11": 3.0, "P00.03": 40.0})
         assert len(simulator.drive(1).writes()) == before
-
-
-class TestASpoiltLine:
-    def test_a_lost_answer_is_asked_for_again(self, simulator: Simulator, bus: Bus) -> None:
-        simulator.line.drop_answers(1)
-        assert bus.read(1, 0x2103) == [0x01A0]
-        assert bus.stats().timeouts == 1
-
-    def test_a_command_is_never_repeated(self, simulator: Simulator, obedient: Drive) -> None:
-        obedient.run(5.0)
-        simulator.line.drop_answers(1)
-        with pytest.raises(drivebus.Unconfirmed) as unknown:
-            obedient.stop()
-        assert commands(simulator) == [FORWARD, STOP]
-        assert isinstance(unknown.value.__cause__, drivebus.NoAnswer)
-        assert unknown.value.request == bytes.fromhex("01 06 20 00 00 05 42 09")
-
-    def test_a_stop_is_sent_to_a_drive_that_seems_deaf(self, simulator: Simulator, obedient: Drive) -> None:
-        obedient.run(hz=5.0)
-        simulator.line.drop_answers(1000)
-        with pytest.raises(NoAnswer):
-            obedient.status()
-        with pytest.raises(NoAnswer) as unsent:
-            obedient.setpoint = 10.0
-        assert unsent.value.started is None, "only an echo was sent, and it did not come back"
-        with pytest.raises(Unconfirmed):
-            obedient.stop()
-        stops = [value for _, address, value in simulator.drive(1).writes() if address == 0x2000]
-        assert stops == [1, 5]
-        simulator.line.clear()
-        obedient.wait_until_stopped(timeout=20)
-
-    def test_a_late_answer_is_never_taken_for_another(self, simulator: Simulator, bus: Bus) -> None:
-        bus.read(1, 0x2103)  # now it is known that nothing echoes, and the next request is the write itself
-        simulator.line.delay_answers(0.3, 1)
-        with pytest.raises(drivebus.NoAnswer):
-            bus.write(1, RAM | ACCELERATION, 111)
-        assert bus.read(1, 0x2103) == [0x01A0]
-        assert bus.read(1, ACCELERATION) == [111]
-
-    def test_noise_around_an_answer_is_skipped(self, simulator: Simulator, bus: Bus) -> None:
-        simulator.line.noise_before(b"\x00\xff", 1)
-        assert bus.read(1, 0x2103) == [0x01A0]
-        simulator.line.noise_after(b"\x00", 1)
-        assert bus.read(1, 0x2103) == [0x01A0]
-        assert bus.read(1, 0x2100, 1) == [3]
-
-    def test_statistics_count_what_happened(self, bus: Bus) -> None:
-        bus.read(1, 0x2103)
-        with pytest.raises(drivebus.Refused):
-            bus.read(2, 0x6300)
-        stats = bus.stats()
-        assert stats.requests >= 2
-        assert stats.refusals == 1
-        assert stats.units[1].answers >= 1
-        assert stats.units[2].refusals == 1
-        assert stats["refusals"] == stats.refusals
-        assert stats.hints == []
-
-    def test_statistics_say_what_noise_means(self, simulator: Simulator, bus: Bus) -> None:
-        simulator.line.noise_before(b"\x00", 100)
-        for _ in range(10):
-            bus.read(1, 0x2103)
-        [hint] = bus.stats().hints
-        assert hint.startswith("line: ")
-        assert "bias" in hint
 
 
 def test_the_silence_between_frames_is_kept(simulator: Simulator, obedient: Drive) -> None:
