@@ -62,6 +62,15 @@ def test_a_command_that_has_no_effect_is_unconfirmed(
     assert virtual.drive(1).state == "stopped"
 
 
+def test_a_motor_that_does_not_turn_round_is_told(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual_drive.run(hz=10.0)
+    virtual_drive.wait_for_speed(timeout=60)
+    virtual_drive.write("P00.02", 1)  # as above: the next command has no effect
+    with pytest.raises(drivebus.Unconfirmed, match=r"run_reverse was sent to unit 1.*forward"):
+        virtual_drive.run(hz=10.0, reverse=True)
+    assert virtual.drive(1).state == "forward"
+
+
 def test_a_trip_instead_of_a_start_is_told_at_once(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> None:
     virtual.drive(1).load = 4.0
     virtual_drive.write("P00.11", 0.1)
