@@ -112,8 +112,9 @@ class Watchdog:
         try:
             self._drive.write(self._wanted)
             shown = self._drive.snapshot(*self._wanted)
-        except DrivebusError:
-            # It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the line busy.
+        except BaseException:
+            # Ctrl-C as well. It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the
+            # line busy.
             with suppress(DrivebusError):
                 self._put_back()
             raise

@@ -145,6 +145,25 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
     assert settings(virtual) == (0, 2)
 
 
+def test_one_that_is_interrupted_gives_back_what_the_drive_had(
+    virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    snapshot = virtual_drive.snapshot
+    calls = iter([snapshot])
+
+    def interrupted(*names: str) -> drivebus.Snapshot:
+        try:
+            return next(calls)(*names)
+        except StopIteration:
+            raise KeyboardInterrupt from None
+
+    monkeypatch.setattr(virtual_drive, "snapshot", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        virtual_drive.watchdog(1.0)
+    assert written(virtual)[:2] == [(ACTION, 0), (TIMEOUT, 10)]
+    assert settings(virtual) == (0, 0)
+
+
 def test_the_thread_says_what_went_wrong_and_goes_on() -> None:
     with (
         Simulator({1: "gd350"}, transport="process") as simulator,
