@@ -143,6 +143,7 @@ class Bus:
 
         Raises:
             NoAnswer, BadAnswer: After the bus's retries; with *verify*, also where the words change all the time.
+            PortError: The port is lost, or the bus closed.
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
         unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
@@ -169,8 +170,8 @@ class Bus:
 
         Nothing here asks what stands at *address*: a word in a command register moves the motor.
 
-        After a request that was left open, a unit is first asked to return an echo; if it does not, the write is not
-        sent. An *urgent* write does without it and overtakes all who wait: that is for a stop, which a drive may hear
+        A unit that may still owe another answer is first asked for an echo, or for a read that cannot be mistaken; if it
+        answers neither, the write is not sent. An *urgent* write does without it and overtakes all who wait: that is for a stop, which a drive may hear
         although nothing is heard of it. Its confirmation may belong to the very same write, sent before.
 
         With *read_back*, the address at which the same words can be read, a confirmation that is missing is looked for
