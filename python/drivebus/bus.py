@@ -170,9 +170,10 @@ class Bus:
 
         Nothing here asks what stands at *address*: a word in a command register moves the motor.
 
-        A unit that may still owe another answer is first asked for an echo, or for a read that cannot be mistaken; if it
-        answers neither, the write is not sent. An *urgent* write does without it and overtakes all who wait: that is for a stop, which a drive may hear
-        although nothing is heard of it. Its confirmation may belong to the very same write, sent before.
+        A unit that may still owe another answer is first asked for an echo, or for a read that cannot be mistaken; if
+        it answers neither, the write is not sent. An *urgent* write does without it and overtakes all who wait: that is
+        for a stop, which a drive may hear although nothing is heard of it. Its confirmation may belong to the very same
+        write, sent before.
 
         With *read_back*, the address at which the same words can be read, a confirmation that is missing is looked for
         there, and the write is repeated (the bus's retries) only while the unit shows other words. That is for absolute
