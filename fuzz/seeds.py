@@ -57,7 +57,7 @@ def streams() -> dict[str, bytes]:
     read = sealed(bytes([1, 3, 0x21, 3, 0, 1]))
     answer = sealed(bytes([1, 3, 2, 1, 0xA0]))
     inner = sealed(bytes([1, 6, 0x20, 0, 0, 1]))
-    seeds = {
+    return {
         "request-and-answer": anything(read) + anything(answer, SILENT),
         "answer-in-lumps": bytes([LUMPS, LATER | 4]) + anything(answer),
         "bytes-one-by-one": bytes([LUMPS, 5 << 4 | 1]) + anything(read) + anything(answer, SILENT),
@@ -83,8 +83,6 @@ def streams() -> dict[str, bytes]:
         "noise-then-a-frame-inside-a-frame": bytes([ONE, 0xFF, SEALED | 10 << 4, 11, 1, 0x41]) + inner + b"\xff",
         "two-in-one-burst": anything(read + answer) + anything(answer + read, SILENT),
     }
-    both = (anything(request) + (anything(answer, SILENT) if answer else b"") for _, request, answer in exchanges())
-    return seeds | {f"printed-{name[0]}": stream for name, stream in zip(exchanges(), both, strict=True)}
 
 
 def frames() -> dict[str, bytes]:
@@ -228,7 +226,7 @@ def profiles() -> dict[str, bytes]:
 def main() -> None:
     """The command."""
     listened = streams()
-    framer = {name: bytes([0, 1, 2, 3]) + stream for name, stream in listened.items() if not name.startswith("printed")}
+    framer = {name: bytes([0, 1, 2, 3]) + stream for name, stream in listened.items()}
     framer["held-noise-then-a-frame"] = bytes([0, 1, 2, 3, RUN, 3, 255, SEALED | 10 << 4, 2, 1, 0x41])
     hunts = {"words": 1, "write": 2, "echo": 3, "nameless": 4, "nameless-of-7": 5 | 6 << 3}
     answer, noise = anything(sealed(bytes([1, 3, 2, 1, 0xA0]))), bytes([RUN, 1, 9])
