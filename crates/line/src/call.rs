@@ -285,8 +285,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
             let in_time = course.is_in_time(self.bus.now_of(&owner));
-            let by_now = self.unit.map(|unit| owner.asked(unit));
-            if by_now.is_some_and(|by_now| course.owes_only_this(by_now)) {
+            if self.unit.is_some_and(|unit| course.owes_only_this(&owner, unit)) {
                 let ask = Ask { in_doubt: true, ..self.ask };
                 return course.ask(&mut owner, &ask, give_up, take);
             }
@@ -313,7 +312,7 @@ impl<'b, 'r> Call<'b, 'r> {
                     });
                 }
             };
-            if by_now != known {
+            if agreement.is_some() && self.unit.map(|unit| owner.asked(unit)) != known {
                 agreement = None; // what somebody else asked in between may be open now
             }
             // Whatever else is repeated would be done twice.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request};
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::PortErrorKind;
 use crate::error::{CallError, Failure};
@@ -75,10 +75,10 @@ impl Course {
         result
     }
 
-    /// Whether all that the unit owes is the answer to this very question, so that it may be asked again as it is. Says
-    /// so once; `by_now` is what was asked of the unit.
-    pub(crate) fn owes_only_this(&mut self, by_now: Asked) -> bool {
-        self.left_open.take() == Some(by_now)
+    /// Whether all that `unit` owes is the answer to this very question, so that it may be asked again as it is. Says so
+    /// once.
+    pub(crate) fn owes_only_this(&mut self, owner: &Owner, unit: UnitAddress) -> bool {
+        self.left_open.take().is_some_and(|then| then == owner.asked(unit))
     }
 
     /// Whether there is another attempt after one that ended with `error`, before which it had been `asked` so often.

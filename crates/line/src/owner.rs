@@ -359,7 +359,7 @@ impl Owner {
             self.master.strip_echo(true);
             return;
         }
-        if is_broadcast || ask.request.expected().may_repeat_request() {
+        if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
             return;
         }
         let length = Adu::request(ask.destination, ask.request).as_bytes().len();

@@ -82,6 +82,21 @@ fn a_refusal_is_there_at_its_last_byte() {
     assert!(!master.in_quarantine(at(200_000), unit(1)));
 }
 
+/// Refusals of reads are all alike: a read that its length tells apart from what is open is answered by words only.
+#[test]
+fn a_late_refusal_is_not_that_of_a_read_of_another_length() {
+    let mut master = waiting(&Request::read(0x2100, 1).unwrap());
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    let end = send(&mut master, 200_000, &Request::read(0x2200, 2).unwrap());
+    let refusal = Adu::answer(unit(1), &Answer::exception(3, ExceptionCode::ILLEGAL_ADDRESS));
+    master.receive(at(end + 2_000), refusal.as_bytes());
+    assert_eq!(master.poll(at(end + 2_000)), None);
+    assert_eq!(master.take_tally().late, 1);
+    master.receive(at(end + 9_000), &words(1, &[3, 4]));
+    assert!(matches!(master.poll(at(end + 9_000)), Some(Event::Answer(Answer::Read { .. }))));
+    assert!(!master.in_quarantine(at(end + 9_000), unit(1)));
+}
+
 #[test]
 fn strangers_do_not_stop_the_clock() {
     let mut master = waiting(&Request::read(0x2100, 1).unwrap());
@@ -284,4 +299,26 @@ fn a_false_beginning_does_not_hide_the_answer() {
     master.receive(at(5_000), &[&[0x01, 0x03], words(1, &[3]).as_slice()].concat());
     assert!(matches!(master.poll(at(5_000)), Some(Event::Answer(Answer::Read { .. }))));
     assert_eq!(master.take_tally().noise, 2);
+}
+
+/// A unit that returns echoes owes its answer until it has returned one; any other may keep it for itself in the end.
+#[test]
+fn time_ends_the_doubt_only_about_a_unit_that_returns_no_echo() {
+    for echoes in [false, true] {
+        let mut master = waiting(&Request::echo(0x1234));
+        if echoes {
+            master.receive(
+                at(5_000),
+                Adu::answer(unit(1), &Answer::confirming(&Request::echo(0x1234)).unwrap()).as_bytes(),
+            );
+            assert!(matches!(master.poll(at(5_000)), Some(Event::Answer(Answer::Echo { .. }))));
+        } else {
+            assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+        }
+        let end = send(&mut master, 200_000, &Request::read(0x2100, 1).unwrap());
+        let given_up = at(end) + TIMEOUT;
+        assert!(matches!(master.poll(given_up), Some(Event::NoAnswer { .. })));
+        assert!(master.in_quarantine(given_up + PATIENCE.saturating_sub(Duration::from_nanos(1)), unit(1)));
+        assert_eq!(master.in_quarantine(given_up + PATIENCE, unit(1)), echoes);
+    }
 }

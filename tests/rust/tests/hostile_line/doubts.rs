@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drivebus_line::{CallOptions, Failure};
-use drivebus_rtu::{FIRST_CONTACT, Request};
+use drivebus_line::{CallOptions, Failure, Priority};
+use drivebus_rtu::{Answer, FIRST_CONTACT, Request};
 
 use crate::scripted::{Pieces, Rig, after, at_once, millis, right, unit};
 
@@ -142,8 +142,8 @@ fn a_read_can_be_verified() {
     };
     let rig = Rig::new(move |number, _| at_once(&answer(if number == 0 { 0xBAD } else { 100 })));
     let mut words = Vec::new();
-    let mut take = |given: drivebus_rtu::Answer<'_>| {
-        if let drivebus_rtu::Answer::Read { words: given, .. } = given {
+    let mut take = |given: Answer<'_>| {
+        if let Answer::Read { words: given, .. } = given {
             words.extend(given.iter());
         }
     };
@@ -249,4 +249,42 @@ fn a_verified_read_is_not_repeated_more_often_than_allowed() {
     let error = rig.call(unit(1).into(), &read, verify, &mut || false, &mut |_| ()).unwrap_err();
     assert!(matches!(error.failure, Failure::Corrupt(_)), "{error}");
     assert_eq!(rig.sent(&read), 1);
+}
+
+/// A read that is repeated within its call goes out in doubt only while nobody else has asked the unit in between.
+#[test]
+fn a_read_that_a_stop_overtook_is_repeated_beyond_doubt() {
+    let rig = Rig::new(|number, request| match number {
+        1 => Vec::new(),
+        // An echo comes first, then the read that overtakes.
+        3 => after(millis(520), &right(request)),
+        _ => after(millis(60), &right(request)),
+    });
+    rig.read(7, 1).unwrap();
+    let (waits, it_waits) = std::sync::mpsc::channel();
+    std::thread::scope(|scope| {
+        let stop = || {
+            let urgent = CallOptions { priority: Some(Priority::Stop), ..CallOptions::default() };
+            let mut give_up = || waits.send(()).is_err();
+            let read = Request::read(300, 1).unwrap();
+            rig.call(unit(1).into(), &read, urgent, &mut give_up, &mut |_| ()).unwrap_err();
+        };
+        let (mut stop, mut came) = (Some(stop), Vec::new());
+        let mut give_up = || {
+            if let Some(stop) = stop.take() {
+                scope.spawn(stop);
+                it_waits.recv().unwrap(); // asked whether it gives up: it stands in the queue
+            }
+            false
+        };
+        let twice = CallOptions { retries: Some(1), ..CallOptions::default() };
+        let read = Request::read(100, 1).unwrap();
+        rig.call(unit(1).into(), &read, twice, &mut give_up, &mut |answer| {
+            if let Answer::Read { words, .. } = answer {
+                came = words.iter().collect();
+            }
+        })
+        .unwrap();
+        assert_eq!(came, [100]);
+    });
 }

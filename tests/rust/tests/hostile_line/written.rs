@@ -146,3 +146,17 @@ fn a_write_in_doubt_is_not_confirmed_by_the_late_answer_to_an_earlier_read() {
     let error = rig.call(unit(1).into(), &Request::write(100, 5), options, &mut || false, &mut |_| ()).unwrap_err();
     assert_eq!(error.failure, Failure::NotTaken { times: 1, shows: vec![100] });
 }
+
+#[test]
+fn nothing_is_written_over_another_connection_than_the_caller_knows() {
+    let rig = Rig::new(|_, request| at_once(&right(request)));
+    let write = Request::write(100, 5);
+    let known = CallOptions { connection: Some(rig.bus.stats().reconnects), ..CallOptions::default() };
+    let call = |options| rig.call(unit(1).into(), &write, options, &mut || false, &mut |_| ());
+    call(known).unwrap();
+    rig.wire.lock().unwrap().vanish_after_sending = true;
+    rig.read(7, 1).unwrap_err();
+    let error = call(known).unwrap_err();
+    assert_eq!((error.failure, error.sent, rig.sent(&write)), (Failure::Reopened, None, 1));
+    call(CallOptions { connection: Some(1), ..known }).unwrap();
+}
