@@ -145,6 +145,10 @@ impl Rig {
         }
     }
 
+    pub(crate) fn now(&self) -> Instant {
+        self.simulator.now()
+    }
+
     /// The last transmissions on the wire.
     pub(crate) fn trace(&self) -> Vec<Transmission> {
         self.wire.trace()

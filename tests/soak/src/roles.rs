@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Debug;
+use std::time::Duration;
 
 use drivebus_line::{CallError, CallOptions, Done, Failure, Priority};
-use drivebus_rtu::{Answer, Request};
+use drivebus_rtu::{Answer, Instant, Request};
 
 use crate::chance::Chance;
 use crate::rig::{BLOCKS, Rig, UNITS, known};
@@ -21,6 +22,8 @@ const STOP: u16 = 5;
 const COMMANDS: [u16; 3] = [1, 2, 6];
 /// 630.00 Hz and a little less.
 const SETPOINTS: u16 = 63_000;
+/// How long an answer that is late may be owed: more than ten times as long as the line holds one back.
+const OWED: Duration = Duration::from_secs(1);
 /// Writes that may still turn up in a log.
 const REMEMBERED: usize = 8;
 
@@ -310,15 +313,16 @@ pub(crate) struct Commander {
 /// The stops of one unit. They are all alike, so that only their number tells.
 #[derive(Debug, Default)]
 struct Stops {
-    /// The answer to one of them may still come.
-    owed: bool,
+    /// When the answer to one of them was given up, which may still come.
+    owed: Option<Instant>,
     /// One went out and is not in the log yet: the adapter was pulled out in the silence after it.
     under_way: bool,
 }
 
 impl Stops {
     /// Compares with the commands that were `taken` since the last time: `said` of a stop, or `None` of no stop at all.
-    fn check(&mut self, taken: &[u16], said: Option<Said>, verdict: &mut Verdict) -> Option<String> {
+    fn check(&mut self, now: Instant, taken: &[u16], said: Option<Said>, verdict: &mut Verdict) -> Option<String> {
+        let owed = self.owed.is_some_and(|then| now < then + OWED);
         let stops = taken.iter().filter(|&&command| command == STOP).count();
         let sent = usize::from(said.is_some_and(|said| said != Said::NotDone));
         let possible = sent + usize::from(self.under_way);
@@ -328,7 +332,7 @@ impl Stops {
             verdict.twice += 1;
             wrong = Some(format!("{possible} stops were sent, {taken:?} was done"));
         } else if missing && said == Some(Said::Done) {
-            if self.owed {
+            if owed {
                 verdict.confirmed_by_earlier += 1;
             } else {
                 verdict.not_done += 1;
@@ -336,8 +340,9 @@ impl Stops {
             }
         }
         self.under_way = missing;
-        if let Some(said) = said {
-            self.owed = said == Said::Perhaps || self.owed;
+        // What was confirmed by an earlier one's answer has its own still to come.
+        if said == Some(Said::Perhaps) || (said == Some(Said::Done) && owed) {
+            self.owed = Some(now);
         }
         wrong
     }
@@ -358,11 +363,13 @@ impl Commander {
         conclude(rig, account, unit, SETPOINT, setpoint, &result, verdict);
         let taken = rig.journal.taken(unit, COMMAND);
         let stops = self.stops.entry(unit).or_default();
-        if let Some(wrong) = stops.check(&taken, None, verdict) {
+        if let Some(wrong) = stops.check(rig.now(), &taken, None, verdict) {
             verdict.blame(format!("unit {unit}: {wrong}"), rig.trace());
         }
         // What the unit owed was cleared up before the command went out.
-        stops.owed = result.as_ref().is_err_and(|error| error.sent.is_none());
+        if result.as_ref().map_or_else(|error| error.sent.is_some(), |_| true) {
+            stops.owed = None;
+        }
     }
 
     /// A stop overtakes those who wait, and does not wait for the unit's debts.
@@ -375,7 +382,7 @@ impl Commander {
             Err(error) => note(rig, error, verdict),
         }
         let stops = self.stops.entry(unit).or_default();
-        if let Some(wrong) = stops.check(&taken, Some(Said::of(&result)), verdict) {
+        if let Some(wrong) = stops.check(rig.now(), &taken, Some(Said::of(&result)), verdict) {
             verdict.blame(format!("unit {unit}: {wrong}; {result:?}"), rig.trace());
         }
     }
