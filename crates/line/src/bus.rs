@@ -127,7 +127,13 @@ impl Bus {
 
     /// Whether the bus was closed, or was opened by another process: by the parent of this forked child.
     pub fn is_closed(&self) -> bool {
-        self.closed.load(Ordering::Acquire) || !self.opened_by.is_current()
+        self.is_shut() || !self.opened_by.is_current()
+    }
+
+    /// As [`is_closed`](Self::is_closed), for who is in the process that opened it: asking which that is takes a system
+    /// call, and a call asks three times.
+    pub(crate) fn is_shut(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
     }
 
     /// Whether the line's clock is a simulation's.
@@ -183,9 +189,9 @@ impl Bus {
         if self.options.read_only && request.is_write() {
             return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now(), &[]));
         }
-        let mut give_up = || self.is_closed() || give_up();
+        let mut give_up = || self.is_shut() || give_up();
         let result = Call::new(self, ask, options).run(&mut give_up, take);
-        if self.is_closed() {
+        if self.is_shut() {
             self.close();
         }
         result
@@ -252,7 +258,7 @@ impl Bus {
     }
 
     pub(crate) fn given_up(&self) -> Failure {
-        if self.is_closed() { Failure::Closed } else { Failure::Interrupted }
+        if self.is_shut() { Failure::Closed } else { Failure::Interrupted }
     }
 
     /// A thread that panicked has left the master in a state that the next `begin` refuses, not in a wrong one.

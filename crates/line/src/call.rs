@@ -160,7 +160,7 @@ impl<'b, 'r> Call<'b, 'r> {
             ended = give_up();
             ended
         });
-        if ended || self.bus.is_closed() {
+        if ended || self.bus.is_shut() {
             return Err(self.failed(self.bus.given_up()));
         }
         *turn = self.turn(give_up)?;
@@ -274,7 +274,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 return Err(self.failed(self.bus.given_up()));
             }
             let mut owner = self.bus.lock();
-            if self.bus.is_closed() {
+            if self.bus.is_shut() {
                 owner.close();
                 return Err(self.ask.failed(Failure::Closed, None, self.bus.now_of(&owner), &[]));
             }
