@@ -297,6 +297,8 @@ impl Run {
                         // With so much open that not all is remembered, the master waits for an echo.
                         if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {
                             known.settle();
+                            // Or it has refused so many that it counts as one that returns none.
+                            known.echoed &= !self.is_crowded;
                         } else {
                             known.leave_open(job.asked.pdu.clone(), now);
                         }
