@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import itertools
 import os
 import random
 import sys
@@ -29,9 +30,11 @@ RAM = 0x8000
 """INVT's address bit for RAM."""
 ALLOWED = 8.0
 """Seconds after which a call counts as hung: eight units may each be silent for a call before its turn comes."""
+REMEMBERED = 500
+"""Values of each unit that may be confirmed after its log was last judged."""
 SETTLED = 0.25
 """Share of the run after which memory is taken to have its size."""
-GROWTH = 8 * 1024
+GROWTH = 2 * 1024
 """KiB of growth after that which would be a leak."""
 
 
@@ -53,6 +56,7 @@ class Soak:
         self._lock = threading.Lock()
         self._next = dict.fromkeys(UNITS, 0)
         self._confirmed: dict[int, list[int]] = {unit: [] for unit in UNITS}
+        self._taken: dict[int, list[int]] = {unit: [0] for unit in UNITS}
 
     def call(self, what: Callable[[], str]) -> None:
         """Makes one call and counts how it ended."""
@@ -105,14 +109,22 @@ class Soak:
                 self.counts["unplugged"] += 1
 
     def judge(self) -> list[str]:
-        """What the drives' own logs say against the program's."""
+        """What the drives' own logs say against the program's. It is forgotten then: memory tells of leaks."""
         wrong = [text for text in self.counts if text.startswith("WRONG")]
         for unit in UNITS:
-            taken = collections.Counter(
-                value for _, address, value in self.simulator.drive(unit).writes() if address == RAM | WRITTEN
-            )
-            wrong += [f"unit {unit} took {value} {times} times" for value, times in taken.items() if times > 1]
-            wrong += [f"unit {unit} never took {value}" for value in self._confirmed[unit] if not taken[value]]
+            # First what was confirmed: all of it was taken before.
+            with self._lock:
+                confirmed, self._confirmed[unit] = self._confirmed[unit], []
+            log = self.simulator.drive(unit).take_writes()
+            taken = self._taken[unit] + [value for _, address, value in log if address == RAM | WRITTEN]
+            # One thread writes, and never the same again: a value that is not the highest yet was taken twice.
+            wrong += [
+                f"unit {unit} took {value} after {before}"
+                for before, value in itertools.pairwise(taken[len(self._taken[unit]) - 1 :])
+                if value <= before
+            ]
+            wrong += [f"unit {unit} never took {value}" for value in confirmed if value not in taken]
+            self._taken[unit] = taken[-REMEMBERED:]
         return wrong
 
 
@@ -156,15 +168,17 @@ def soak(run: Soak, seconds: float, rate: float) -> int:
         thread.start()
     began = time.monotonic()
     watched: list[tuple[int, int]] = []
+    wrong: list[str] = []
     while (spent := time.monotonic() - began) < seconds:
         if spent >= seconds * SETTLED:
             watched.append((resident(), open_files()))
         time.sleep(min(5.0, seconds / 20))
+        wrong += run.judge()
     run.done.set()
     for thread in threads:
         thread.join(4 * ALLOWED)
     stuck = sum(thread.is_alive() for thread in threads)
-    wrong = run.judge()
+    wrong += run.judge()
     memory, files = [kib for kib, _ in watched], [count for _, count in watched]
     stats = run.bus.stats()
     print(f"{stats.requests} transactions, {stats.reconnects} times opened again, slowest call {run.slowest:.2f} s")
@@ -173,6 +187,7 @@ def soak(run: Soak, seconds: float, rate: float) -> int:
     print(
         f"memory: {memory[0]} to {max(memory)} KiB, at the end {memory[-1]}; open files: {min(files)} to {max(files)}"
     )
+    wrong = list(dict.fromkeys(wrong))
     if memory[-1] - memory[0] > GROWTH:
         wrong.append(f"memory grew by {memory[-1] - memory[0]} KiB")
     if max(files) - min(files) > 4:
