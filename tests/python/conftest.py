@@ -7,11 +7,18 @@ tests about time and about what the line carries.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 
 import pytest
 
 import drivebus
+
+# Whoever starts the tests in the background may have them ignore these, and the programs under test would inherit it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+for name in ("SIGHUP", "SIGTERM"):
+    if hasattr(signal, name):
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 TRANSPORTS = ["process", pytest.param("pty", marks=pytest.mark.skipif(os.name == "nt", reason="no pty")), "tcp"]
 RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
