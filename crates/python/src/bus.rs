@@ -1,6 +1,6 @@
 //! `Bus` for Python: arguments in, one call of the core without the GIL, exceptions out.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
@@ -19,7 +19,8 @@ use crate::open;
 #[pyclass(frozen, module = "drivebus._native")]
 #[derive(Debug)]
 pub(crate) struct Bus {
-    core: CoreBus,
+    /// Shared with the threads that work for it.
+    pub(crate) core: Arc<CoreBus>,
     /// Where the line's clock stands on the calendar, if it is a simulation's: it began when the bus was opened.
     virtual_ahead: Option<f64>,
 }
@@ -54,7 +55,7 @@ impl Bus {
                 other => refuse(other),
             })?;
         let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
-        Ok(Self { core, virtual_ahead })
+        Ok(Self { core: Arc::new(core), virtual_ahead })
     }
 
     #[getter]
