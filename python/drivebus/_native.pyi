@@ -13,6 +13,7 @@ from typing_extensions import Buffer
 __version__: Final[str]
 __all__ = [
     "Bus",
+    "Plan",
     "Profile",
     "SerialFormat",
     "SimulatedDrive",
@@ -234,6 +235,8 @@ class Profile:
         """
     def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
         """The fewest reads (address, count) that hold all *names*."""
+    def compile(self, names: Iterable[str], /) -> Plan:
+        """The fewest reads that hold all *names*, with the way from their words to values. NotAllowed as `plan`."""
     def command(self, name: str, /) -> tuple[int, int]:
         """Address and code of a command.
 
@@ -260,6 +263,22 @@ class Profile:
     def faults(self) -> list[dict[str, Any]]: ...
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code."""
+
+@final
+class Plan:
+    """What to read for some names, and where in the answers their values are."""
+
+    @property
+    def names(self) -> list[str]:
+        """As they were given."""
+    @property
+    def reads(self) -> list[tuple[int, int]]:
+        """Address and number of words of each read."""
+    def values(self, answers: Sequence[Sequence[int]], /) -> list[int | float]:
+        """The value of each name, in their order, out of the words that each read brought.
+
+        Ints where the drive counts or names, floats where it measures.
+        """
 
 @final
 class Simulator:

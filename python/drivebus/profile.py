@@ -7,26 +7,65 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from drivebus import _native
 from drivebus.errors import NotAllowed
-from drivebus.values import Description, Fault, WatchdogSettings
+from drivebus.values import Choice, Description, Fault, Value, WatchdogSettings
 
-__all__ = ["Profile", "identify", "profiles"]
+__all__ = ["Profile", "ReadPlan", "identify", "profiles"]
+
+_PLANS_KEPT = 256
+"""Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
+
+
+class ReadPlan:
+    """What to read for some names, and what the words that come mean: worked out once, used for every answer.
+
+    Attributes:
+        names: As they were asked for.
+        reads: Address and number of words of each read: the fewest that hold all of them.
+        units: The engineering unit of each name.
+        native: The same for the compiled core, which knows no labels.
+    """
+
+    __slots__ = ("_labels", "names", "native", "reads", "units")
+
+    def __init__(self, profile: Profile, native: _native.Plan) -> None:
+        self.native = native
+        self.names = tuple(native.names)
+        self.reads = tuple(native.reads)
+        known = [profile.describe(name) for name in self.names]
+        self.units: Mapping[str, str] = {name: row.unit for name, row in zip(self.names, known, strict=True)}
+        self._labels = [
+            (index, {value: Choice(value, label) for value, label in row.choices.items()})
+            for index, row in enumerate(known)
+            if row.choices
+        ]
+
+    def values(self, answers: Sequence[Sequence[int]]) -> list[Value]:
+        """The value of each name, in their order, out of the words that each read brought."""
+        values: list[Value] = self.native.values(answers)
+        for index, labels in self._labels:
+            value = values[index]
+            # A float is never a choice, although one may equal its number.
+            if isinstance(value, int):
+                values[index] = labels.get(value, value)
+        return values
 
 
 class Profile:
     """What one family of drives means by its words. Immutable, and shared freely between drives and threads."""
 
-    __slots__ = ("_descriptions", "_names", "_native")
+    __slots__ = ("_descriptions", "_names", "_native", "_plans")
 
     def __init__(self, native: _native.Profile) -> None:
         self._native = native
         self._names = native.names()
         self._descriptions: dict[str, Description] = {}
+        self._plans: dict[tuple[str, ...], ReadPlan] = {}
 
     @classmethod
     def builtin(cls, name: str) -> Profile:
@@ -123,6 +162,20 @@ class Profile:
     def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
         """The fewest reads (address, count) that hold all *names*."""
         return self._native.plan(names)
+
+    def compile(self, names: Sequence[str], /) -> ReadPlan:
+        """The fewest reads that hold all *names*, and the way from their words to values."""
+        key = tuple(names)
+        try:
+            plan = self._plans.get(key)
+        except TypeError:  # what cannot be looked up is no name, as the core says in its own words
+            plan = None
+        if plan is None:
+            plan = ReadPlan(self, self._native.compile(key))
+            if len(self._plans) >= _PLANS_KEPT:
+                self._plans.clear()
+            self._plans[key] = plan
+        return plan
 
     def command(self, name: str, /) -> tuple[int, int]:
         """Address and code of a command such as `"run_forward"` or `"coast"`."""

@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from drivebus.values import Description, Fault, Link, WatchdogSettings
+from drivebus.values import Description, Fault, Link, Value, WatchdogSettings
 
-__all__ = ["BusProtocol", "ProfileProtocol"]
+__all__ = ["BusProtocol", "PlanProtocol", "ProfileProtocol"]
 
 
 class BusProtocol(Protocol):
@@ -62,6 +62,25 @@ class BusProtocol(Protocol):
         """Whether the line was closed for good."""
 
 
+class PlanProtocol(Protocol):
+    """What to read for some names, and what the words mean."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """As they were asked for."""
+
+    @property
+    def reads(self) -> Sequence[tuple[int, int]]:
+        """Address and number of words of each read."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The engineering unit of each name."""
+
+    def values(self, answers: Sequence[Sequence[int]], /) -> list[Value]:
+        """The value of each name out of the words that each read brought."""
+
+
 class ProfileProtocol(Protocol):
     """What one family of drives means by its words."""
 
@@ -100,8 +119,8 @@ class ProfileProtocol(Protocol):
     def fields(self, name: str, raw: int, /) -> dict[str, str]:
         """The bit fields of a word, each with its meaning."""
 
-    def plan(self, names: Sequence[str], /) -> list[tuple[int, int]]:
-        """The fewest reads that hold all *names*."""
+    def compile(self, names: Sequence[str], /) -> PlanProtocol:
+        """The fewest reads that hold all *names*, and the way from their words to values."""
 
     def command(self, name: str, /) -> tuple[int, int]:
         """Address and code of a command."""

@@ -82,17 +82,16 @@ class Registers:
 
     def snapshot(self, *names: str, verify: bool = False) -> Snapshot:
         """Reads *names* in the fewest requests, under one time stamp. With *verify* as `read` does."""
-        places = {name: self.profile.address(name) for name in names}
-        words: dict[int, int] = {}
+        plan = self.profile.compile(names)
+        answers: list[list[int]] = []
         started = ended = 0.0
-        for index, (address, count) in enumerate(self.profile.plan(names)):
+        for address, count in plan.reads:
             with self._explained():
-                answer, sent, ended = self.bus.read_stamped(self.unit, address, count, verify=verify)
-            started = started if index else sent
-            words.update(enumerate(answer, address))
-        values = {name: self.value(name, words[place]) for name, place in places.items()}
-        units = {name: self.profile.describe(name).unit for name in names}
-        return Snapshot(values, units, started, ended - started)
+                words, sent, ended = self.bus.read_stamped(self.unit, address, count, verify=verify)
+            started = started if answers else sent
+            answers.append(words)
+        values = dict(zip(plan.names, plan.values(answers), strict=True))
+        return Snapshot(values, plan.units, started, ended - started)
 
     def read_words(self, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
         """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""

@@ -106,3 +106,27 @@ fn a_gd350_is_read_in_few_requests() {
     // At 19200 8E1 with 5 ms delay: 20 characters of 11 bits and 96 bit times for a request, 22 for a word.
     assert_eq!(profile.serial().read_cost(), ReadCost { request: 316, word: 22 });
 }
+
+#[test]
+fn a_compiled_plan_finds_each_value_in_the_words_of_its_reads() {
+    let profile = Profile::builtin("gd350").unwrap();
+    // Out of order, twice, across a gap, and from both sides of it.
+    let names = ["output_current", "P00.11", "running_frequency", "fault_code", "output_current", "hdi_frequency_2"];
+    let entries: Vec<_> = names.iter().map(|name| profile.find(name).unwrap()).collect();
+    let plan = profile.compile(&entries).unwrap();
+    assert_eq!(plan.reads(), profile.plan(entries.iter().copied()).unwrap());
+    // Each address holds itself.
+    let words: Vec<u16> = plan.reads().iter().flat_map(|read| read.address..read.address + read.count).collect();
+    assert_eq!(plan.words(), words.len());
+    let counts: Vec<_> = plan.values(&words).map(|(_, value)| value.unwrap().count()).collect();
+    assert_eq!(counts, [0x3004, 0x000B, 0x3000, 0x2102, 0x3004, 0x3011]);
+    let cut: Vec<_> = plan.values(&words[..1]).map(|(_, value)| value.is_some()).collect();
+    assert_eq!(cut, [false, true, false, false, false, false], "what did not come has no value");
+}
+
+#[test]
+fn nothing_is_read_for_no_names() {
+    let plan = Profile::builtin("gd350").unwrap().compile(&[]).unwrap();
+    assert!(plan.reads().is_empty());
+    assert_eq!((plan.words(), plan.values(&[1]).count()), (0, 0));
+}

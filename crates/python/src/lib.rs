@@ -11,6 +11,7 @@ mod errors;
 mod format;
 mod frames;
 mod open;
+mod plan;
 mod profile;
 mod pyserial;
 mod sim;
@@ -27,6 +28,8 @@ mod _native {
     use crate::format::SerialFormat;
     #[pymodule_export]
     use crate::frames::{crc16, decode, decode_answer, encode_echo, encode_read, encode_write};
+    #[pymodule_export]
+    use crate::plan::Plan;
     #[pymodule_export]
     use crate::profile::Profile;
     #[pymodule_export]

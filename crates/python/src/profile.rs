@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Fault, Input, Kind, Store, Value};
+use drivebus_drives::{self as drives, Command, Entry, Fault, Input, Kind, Quantity, Store, Value};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyString};
 
 use crate::convert::{one_word, shown};
 use crate::errors::{not_allowed, refuse};
+use crate::plan::Plan;
 
 /// What one family of drives means by its registers.
 #[pyclass(name = "Profile", frozen, module = "drivebus._native")]
@@ -78,7 +79,7 @@ impl Profile {
         let py = name.py();
         let entry = self.find(name)?;
         let quantity = entry.quantity();
-        let value = |value: Option<Value>| value.map(|value| number(py, entry, value));
+        let value = |value: Option<Value>| value.map(|value| number(py, quantity, value));
         let dict = PyDict::new(py);
         dict.set_item("name", entry.name())?;
         dict.set_item("code", entry.code())?;
@@ -127,7 +128,7 @@ impl Profile {
     #[pyo3(signature = (name, raw, /))]
     fn decode<'py>(&self, name: &Bound<'py, PyAny>, raw: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let entry = self.find(name)?;
-        Ok(number(name.py(), entry, entry.decode(one_word("raw", raw)?)))
+        Ok(number(name.py(), entry.quantity(), entry.decode(one_word("raw", raw)?)))
     }
 
     #[pyo3(signature = (name, value, /))]
@@ -165,6 +166,14 @@ impl Profile {
         Ok(spans.into_iter().map(|span| (span.address, span.count)).collect())
     }
 
+    #[pyo3(signature = (names, /))]
+    fn compile(&self, names: &Bound<'_, PyAny>) -> PyResult<Plan> {
+        let names = names.try_iter()?.map(|name| text("name", &name?)).collect::<PyResult<Vec<_>>>()?;
+        let entries = names.iter().map(|name| self.0.find(name).map_err(refuse)).collect::<PyResult<Vec<_>>>()?;
+        let plan = self.0.compile(&entries).map_err(refuse)?;
+        Ok(Plan::new(names, plan))
+    }
+
     #[pyo3(signature = (name, /))]
     fn command(&self, name: &Bound<'_, PyAny>) -> PyResult<(u16, u16)> {
         let command: Command = text("command", name)?.parse().map_err(refuse)?;
@@ -187,7 +196,7 @@ impl Profile {
             let entry = self.0.find(&row.code).map_err(refuse)?;
             let dict = PyDict::new(py);
             dict.set_item("code", &row.code)?;
-            dict.set_item("value", number(py, entry, entry.decode(row.raw)))?;
+            dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
             dict.set_item("label", &row.label)?;
             dict.set_item("verified", row.verified)?;
             dict.set_item("note", &row.note)?;
@@ -245,8 +254,8 @@ fn text(what: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
 }
 
 /// `value` as a float where the drive measures, as an int where it counts or names.
-fn number<'py>(py: Python<'py>, entry: &Entry, value: Value) -> Bound<'py, PyAny> {
-    if entry.quantity().measures() {
+pub(crate) fn number<'py>(py: Python<'py>, quantity: &Quantity, value: Value) -> Bound<'py, PyAny> {
+    if quantity.measures() {
         PyFloat::new(py, value.to_f64()).into_any()
     } else {
         PyInt::new(py, value.count()).into_any()

@@ -1,0 +1,72 @@
+//! A read plan: what to read for some entries, and where in the words that come each of them is.
+//!
+//! Made once and used for every answer: what is asked again and again is neither looked up nor planned again.
+
+use crate::entry::{AccessError, Entry};
+use crate::plan::ReadSpan;
+use crate::profile::Profile;
+use crate::quantity::Quantity;
+use crate::value::Value;
+
+/// The cheapest reads that hold some entries, and the way from their words to values.
+///
+/// The words of all reads stand one after the other, in the order of [`reads`](Self::reads).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReadPlan {
+    reads: Vec<ReadSpan>,
+    fields: Vec<Field>,
+}
+
+/// One entry of a plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Field {
+    /// Where its word is.
+    position: usize,
+    quantity: Quantity,
+}
+
+impl Profile {
+    /// As [`plan`](Self::plan), with what leads from the words back to each of `entries`, in their order.
+    ///
+    /// # Errors
+    ///
+    /// [`AccessError`]: one of them can only be written.
+    pub fn compile(&self, entries: &[&Entry]) -> Result<ReadPlan, AccessError> {
+        let reads = self.plan(entries.iter().copied())?;
+        let position = |address| {
+            let mut before = 0;
+            for read in &reads {
+                if (read.address..=read.address + (read.count - 1)).contains(&address) {
+                    return before + usize::from(address - read.address);
+                }
+                before += usize::from(read.count);
+            }
+            before // the plan holds every address
+        };
+        let fields = entries
+            .iter()
+            .map(|entry| Field { position: position(entry.address()), quantity: entry.quantity().clone() })
+            .collect();
+        Ok(ReadPlan { reads, fields })
+    }
+}
+
+impl ReadPlan {
+    /// What to read, in address order.
+    pub fn reads(&self) -> &[ReadSpan] {
+        &self.reads
+    }
+
+    /// How many words all reads bring.
+    pub fn words(&self) -> usize {
+        self.reads.iter().map(|read| usize::from(read.count)).sum()
+    }
+
+    /// The value of each entry in `words`, which holds those of all reads; none of an entry whose word is missing.
+    pub fn values(&self, words: &[u16]) -> impl Iterator<Item = (&Quantity, Option<Value>)> {
+        self.fields.iter().map(|field| {
+            let value = words.get(field.position).map(|&word| field.quantity.decode(word));
+            (&field.quantity, value)
+        })
+    }
+}

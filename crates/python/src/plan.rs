@@ -1,0 +1,59 @@
+//! `Plan` for Python: what to read for some names, and the way from the words to their values.
+
+use drivebus_drives::ReadPlan;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::convert::words_of;
+use crate::errors::not_allowed;
+use crate::profile::number;
+
+/// Reads and their values, worked out once.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Plan {
+    names: Vec<String>,
+    core: ReadPlan,
+}
+
+#[pymethods]
+impl Plan {
+    #[getter]
+    fn names(&self) -> Vec<&str> {
+        self.names.iter().map(String::as_str).collect()
+    }
+
+    #[getter]
+    fn reads(&self) -> Vec<(u16, u16)> {
+        self.core.reads().iter().map(|read| (read.address, read.count)).collect()
+    }
+
+    #[pyo3(signature = (answers, /))]
+    fn values<'py>(&self, answers: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyList>> {
+        let py = answers.py();
+        let reads = self.core.reads();
+        let answers = answers
+            .try_iter()?
+            .map(|words| words_of(&words?)?.map_err(|word| not_allowed(format!("{word} is not the words of a read"))))
+            .collect::<PyResult<Vec<_>>>()?;
+        let fits = answers.len() == reads.len()
+            && answers.iter().zip(reads).all(|(words, read)| words.len() == usize::from(read.count));
+        if !fits {
+            let came: Vec<_> = answers.iter().map(Vec::len).collect();
+            return Err(not_allowed(format!("words {came:?} for the reads {:?}", self.reads())));
+        }
+        let words = answers.concat();
+        let values = self.core.values(&words).filter_map(|(quantity, value)| Some(number(py, quantity, value?)));
+        PyList::new(py, values.collect::<Vec<_>>())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<_native.Plan of {} names in {} reads>", self.names.len(), self.core.reads().len())
+    }
+}
+
+impl Plan {
+    pub(crate) fn new(names: Vec<String>, core: ReadPlan) -> Self {
+        Self { names, core }
+    }
+}
