@@ -87,7 +87,7 @@ def python(folder: Path) -> str:
 def cycle() -> str:
     """The share of the shortest possible cycle."""
     done = subprocess.run(
-        [sys.executable, "benches/python/cycle.py"], cwd=ROOT, check=True, capture_output=True, text=True
+        [sys.executable, "-m", "benches.python.cycle"], cwd=ROOT, check=True, capture_output=True, text=True
     )
     return done.stdout.strip()
 

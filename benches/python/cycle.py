@@ -2,24 +2,21 @@
 
 The shortest cycle is: the request's 8 characters, 3.5 characters of silence, the answer's characters, 3.5 characters of
 silence. The simulated drive answers as soon as the protocol lets it (P14.03 = 0), so what is missing to 100 % is what
-the master and the operating system add. The share is that of the median; a busy machine shows in the mean.
+the master and the operating system add. More than 100 % is possible only by cutting into the silence: the simulator
+counts such requests as violations. A run's figure is that of its median cycle; a line's is the median of its runs.
 
-usage: cycle.py [--seconds S] [--json FILE]
+usage: python -m benches.python.cycle [--only drivebus,c] [--baud 115200] [--words 1] [--runs 3] [--json]
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import statistics
-import time
-from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
+
+from benches.python.masters import UNIT, Order
+from benches.python.race import Result, markdown, parser, race, show, workers
 
 import drivebus
 
-UNIT, STATE, MONITOR = 1, 0x2100, 0x3000
 RESPONSE_DELAY = "P14.03"
 
 BAUD_RATES = [9600, 19200, 115200]
@@ -27,72 +24,79 @@ COUNTS = [1, 16]
 
 
 class Cycle(NamedTuple):
-    """One measurement."""
+    """One master at one speed and length."""
 
     baudrate: int
     words: int
-    cycles: int
-    shortest: float  # seconds of one cycle
-    mean: float  # measured
-    median: float
-    violations: int
+    shortest: float
+    """Seconds that no master can go below."""
+    result: Result
 
     @property
     def share(self) -> float:
         """Of the shortest possible cycle, in percent."""
-        return 100 * self.shortest / self.median
+        return 100 * self.shortest / self.result.median
+
+    def figures(self) -> dict[str, object]:
+        """For JSON."""
+        shares = [100 * self.shortest / run.median for run in self.result.runs]
+        return {
+            "baudrate": self.baudrate,
+            "words": self.words,
+            "master": self.result.master,
+            "shortest": self.shortest,
+            "median": self.result.median,
+            "share": self.share,
+            "shares": sorted(shares),
+            "cpu": self.result.cpu,
+            "violations": self.result.violations,
+            "asked": self.result.asked,
+        }
+
+    def row(self) -> list[str]:
+        """For a table."""
+        shares = [100 * self.shortest / run.median for run in self.result.runs]
+        return [
+            str(self.baudrate),
+            str(self.words),
+            self.result.master,
+            f"{self.share:.2f} %",
+            f"{min(shares):.2f} … {max(shares):.2f}",
+            f"{1e6 * self.result.cpu:.0f} µs",
+            f"{self.result.violations} of {self.result.asked}",
+        ]
 
 
-def shortest(line: drivebus.SerialFormat, count: int) -> float:
+HEAD = ["bit/s", "words", "master", "share of the shortest cycle", "all runs", "processor time", "silence violations"]
+
+
+def shortest(line: drivebus.SerialFormat, words: int) -> float:
     """Seconds that no master can go below."""
-    characters = 8 + 5 + 2 * count
-    return characters * line.char_time + 2 * line.t35
-
-
-def measure(baudrate: int, count: int, seconds: float) -> Cycle:
-    """Reads *count* words again and again for about *seconds*."""
-    with drivebus.Simulator({UNIT: "gd350"}, baudrate=baudrate) as simulator:
-        with drivebus.Bus(simulator.port, baudrate=baudrate) as bus:
-            drive = bus.drive(UNIT, "gd350")
-            drive.write(RESPONSE_DELAY, 0)
-            least = shortest(bus.format, count)
-            cycles = max(20, round(seconds / least))
-            for _ in range(5):
-                bus.read(UNIT, MONITOR, count)
-            moments = [time.perf_counter()]
-            for _ in range(cycles):
-                bus.read(UNIT, MONITOR, count)
-                moments.append(time.perf_counter())
-        took = [end - start for start, end in pairwise(moments)]
-        violations = simulator.line.silence_violations
-        return Cycle(baudrate, count, cycles, least, statistics.mean(took), statistics.median(took), violations)
-
-
-def table(cycles: list[Cycle]) -> str:
-    """As Markdown."""
-    head = [
-        "| bit/s | words | shortest, ms | mean, ms | median, ms | share | silence violations |",
-        "| ---: " * 7 + "|",
-    ]
-    rows = [
-        f"| {each.baudrate} | {each.words} | {1e3 * each.shortest:.3f} | {1e3 * each.mean:.3f} "
-        f"| {1e3 * each.median:.3f} | {each.share:.2f} % | {each.violations} |"
-        for each in cycles
-    ]
-    return "\n".join(head + rows)
+    return (8 + 5 + 2 * words) * line.char_time + 2 * line.t35
 
 
 def main() -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
-    parser.add_argument("--seconds", type=float, default=3.0, help="for each measurement")
-    parser.add_argument("--json", type=Path, help="write the figures there as well")
-    arguments = parser.parse_args()
-    cycles = [measure(baudrate, count, arguments.seconds) for baudrate in BAUD_RATES for count in COUNTS]
-    print(table(cycles))
-    if arguments.json:
-        rows = [{**each._asdict(), "share": each.share} for each in cycles]
-        arguments.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    options = parser(__doc__, 1.0)
+    options.add_argument("--baud", type=int, action="append", choices=BAUD_RATES)
+    options.add_argument("--words", type=int, action="append", choices=range(1, 17))
+    given = options.parse_args()
+    cycles = []
+    with workers(given) as masters:
+        for baudrate in given.baud or BAUD_RATES:
+            with drivebus.Simulator({UNIT: "gd350"}, baudrate=baudrate, parity="N", stopbits=2) as simulator:
+                with drivebus.Bus(simulator.port, baudrate=baudrate, parity="N", stopbits=2) as bus:
+                    bus.drive(UNIT, "gd350").write(RESPONSE_DELAY, 0)
+                line = simulator.format
+                for words in given.words or COUNTS:
+                    least = shortest(line, words)
+                    order = Order(
+                        simulator.port, baudrate, True, line.char_time, line.t35, words,
+                        warm=5, cycles=max(20, round(given.seconds / least)), limit=3 * given.seconds,
+                    )  # fmt: skip
+                    results = race(masters, given.runs, order, lambda: simulator.line.silence_violations)
+                    cycles += [Cycle(baudrate, words, least, result) for result in results]
+    show(given.json, [each.figures() for each in cycles], markdown(HEAD, [each.row() for each in cycles]))
 
 
 if __name__ == "__main__":
