@@ -1,7 +1,7 @@
 //! The bus as its callers see it: safe from any thread, one exchange at a time, retries by kind.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, UnitAddress};
@@ -15,6 +15,7 @@ use crate::link::Link;
 use crate::opener::Opener;
 use crate::owner::{AdapterEcho, Owner};
 use crate::process::Process;
+use crate::punctual;
 use crate::queue::{LOOK_UP, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
@@ -53,6 +54,8 @@ pub struct Bus {
     stats: Arc<Mutex<Stats>>,
     words: Arc<FreshWords>,
     notes: Mutex<Vec<String>>,
+    /// What the system refused to the threads of the bus's own.
+    priority_refused: OnceLock<String>,
     options: BusOptions,
     name: String,
     closed: AtomicBool,
@@ -106,6 +109,7 @@ impl Bus {
             stats: owner.shared_stats(),
             words,
             notes: Mutex::new(notes),
+            priority_refused: OnceLock::new(),
             owner: Mutex::new(owner),
             options,
             name,
@@ -249,7 +253,18 @@ impl Bus {
         {
             *notes = line.notes();
         }
-        notes.clone()
+        let late = (!self.is_virtual()).then(punctual::note).flatten();
+        notes.iter().cloned().chain(late).chain(self.priority_refused.get().cloned()).collect()
+    }
+
+    /// To be called by each thread that works for this bus alone: it goes before the programs around it, where the
+    /// system allows that; where it does not, [`notes`](Self::notes) says so. In virtual time nothing is asked for.
+    pub fn enter_thread(&self) {
+        if !self.is_virtual()
+            && let Err(refused) = punctual::go_first()
+        {
+            self.priority_refused.get_or_init(|| refused);
+        }
     }
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.

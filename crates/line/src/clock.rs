@@ -1,18 +1,14 @@
 //! The clock of real lines, and how they wait on it.
 //!
 //! The only place of this crate that reads the time. A wait is one system call that ends shortly before its
-//! moment, and a spin for the rest: left to the kernel alone a wait ends some 80 µs late, which is much beside a
+//! moment, and a spin for the rest: left to the kernel alone a wait ends up to 80 µs late, which is much beside a
 //! silence of 334 µs at 115 200 bit/s, and is paid with every frame.
 
 use std::thread;
 
 use drivebus_rtu::{Duration, Instant};
 
-/// How long before its moment a wait leaves the kernel and spins.
-///
-/// The timer slack of Linux is 50 µs, and waking a core takes as much again. On a virtual machine with two cores half of
-/// the waits ended 22 to 42 µs late with 60 µs, and 0.6 µs late with 100 µs; 130 µs gained nothing more.
-const SPIN: Duration = Duration::from_micros(100);
+use crate::punctual::spin;
 
 /// Now, in nanoseconds of the system's monotonic clock.
 ///
@@ -34,8 +30,9 @@ pub fn monotonic() -> Instant {
 /// Blocks the thread until `until`, and never wakes it earlier.
 pub fn sleep_until(until: Instant) {
     let left = until.saturating_duration_since(monotonic());
-    if left > SPIN {
-        thread::sleep(left.saturating_sub(SPIN));
+    let spin = spin();
+    if left > spin {
+        thread::sleep(left.saturating_sub(spin));
     }
     while monotonic() < until {
         std::hint::spin_loop();
@@ -56,9 +53,10 @@ pub(crate) fn wait_for(
     /// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take at most 24 days.
     const TURN: Duration = Duration::from_secs(3_600);
 
+    let spin = spin();
     loop {
         let left = until.saturating_duration_since(monotonic());
-        let in_kernel = left.saturating_sub(SPIN).min(TURN);
+        let in_kernel = left.saturating_sub(spin).min(TURN);
         let timeout = Timespec::try_from(in_kernel).unwrap_or_default(); // cannot fail: at most an hour
         let mut descriptors = [PollFd::from_borrowed_fd(descriptor, events)];
         match poll(&mut descriptors, Some(&timeout)) {

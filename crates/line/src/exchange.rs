@@ -66,6 +66,7 @@ pub(crate) fn exchange(
     begin(master, now, ask.destination, ask.request, ask.patience())
         .map_err(|error| ask.failed(Failure::NotBegun(error), sent, now, &[]))?;
 
+    let mut pace = line.char_time().map(Pace::new);
     let mut buffer = [0; 256];
     // What is queued already is no answer, and the line was not silent while it came: read without waiting.
     let mut until = now;
@@ -79,6 +80,7 @@ pub(crate) fn exchange(
                 return Err(ask.failed(Failure::Port(error), sent, now, &[]));
             }
         };
+        let came = rest.len();
         loop {
             // Whatever there is no room for now, there is after polling.
             rest = &rest[master.receive(now, rest)..];
@@ -107,6 +109,41 @@ pub(crate) fn exchange(
         }
         let wake = now + LOOK_UP;
         until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
+        if let Some(nearly) = pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, master.lacks())) {
+            line.sleep(nearly.min(wake));
+            // What has come by then is taken without waiting for more.
+            until = now;
+        }
+    }
+}
+
+/// Bytes that come one by one, so that nobody need wake up for each.
+#[derive(Debug)]
+struct Pace {
+    char_time: Duration,
+    /// How many have come.
+    count: u32,
+    /// When the first of them began, at the latest.
+    begun: Instant,
+}
+
+impl Pace {
+    const fn new(char_time: Duration) -> Self {
+        Self { char_time, count: 0, begun: Instant::from_nanos(u64::MAX) }
+    }
+
+    /// Takes down that at `now` there were `came` bytes more. If two or more are still lacking: the moment at which only
+    /// the last of them is missing. That one is worth waking up for.
+    fn nearly_whole(&mut self, now: Instant, came: usize, lacks: usize) -> Option<Instant> {
+        let (came, lacks) = (u32::try_from(came).unwrap_or(u32::MAX), u32::try_from(lacks).unwrap_or(u32::MAX));
+        if came == 0 {
+            return None; // nothing new: they come in lumps, and the next is waited for
+        }
+        self.count = self.count.saturating_add(came);
+        let begun = now.saturating_duration_since(Instant::ZERO + self.char_time * self.count);
+        self.begun = self.begun.min(Instant::ZERO + begun);
+        let chars = self.char_time * self.count.saturating_add(lacks);
+        (lacks > 1).then(|| self.begun + chars.saturating_sub(self.char_time / 2))
     }
 }
 

@@ -23,6 +23,7 @@ mod order;
 mod owner;
 mod port;
 mod process;
+mod punctual;
 mod queue;
 mod resync;
 pub mod rs485;

@@ -3,6 +3,7 @@
 //! Serial ports, TCP connections and the simulated line implement it; the bus owner uses nothing else of them.
 
 use std::fmt;
+use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
@@ -35,6 +36,14 @@ pub trait Line: Send + fmt::Debug {
 
     /// Waits until `until` without touching what arrives.
     fn sleep(&mut self, until: Instant);
+
+    /// How long a character takes, if bytes arrive one by one as the wire carries them; `None` where they come in one
+    /// piece, or on a clock of their own.
+    ///
+    /// Then an answer that has begun is not looked for again before it can be whole.
+    fn char_time(&self) -> Option<Duration> {
+        None
+    }
 
     /// What is open, for people: a path or an address.
     fn name(&self) -> String;

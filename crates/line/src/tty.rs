@@ -151,6 +151,10 @@ impl Line for Tty {
         sleep_until(until);
     }
 
+    fn char_time(&self) -> Option<Duration> {
+        Some(self.format.chars(1))
+    }
+
     fn name(&self) -> String {
         self.name.clone()
     }

@@ -368,6 +368,24 @@ impl Framer {
         }
     }
 
+    /// How many bytes the answer looked for, or our own request before it, lacks at least; 0 where nothing of it is
+    /// there, or only silence tells.
+    pub(crate) fn lacks(&self) -> usize {
+        let here = self.pending();
+        if !self.is_expected(self.taken) {
+            return 0;
+        }
+        let answer = match *here {
+            // It may be a refusal.
+            [_] => EXCEPTION_ADU,
+            [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
+            _ => self.answer_len().unwrap_or_default(),
+        };
+        let own = self.own.as_bytes();
+        let len = if own.starts_with(here) { answer.min(own.len()) } else { answer };
+        len.saturating_sub(here.len())
+    }
+
     fn is_quiet(&self, now: Instant) -> bool {
         self.last.is_none_or(|last| now >= last + self.silence)
     }

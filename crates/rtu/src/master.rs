@@ -187,6 +187,14 @@ impl Master {
         }
     }
 
+    /// How many bytes an answer that has begun lacks at least; 0 while none has, or only silence tells its end.
+    ///
+    /// Whoever knows how long a character takes need not look before they can have come.
+    #[must_use]
+    pub fn lacks(&self) -> usize {
+        if matches!(self.state, State::Waiting { .. }) { self.framer.lacks() } else { 0 }
+    }
+
     /// What has happened by `now`; `None` when there is nothing to say.
     pub fn poll(&mut self, now: Instant) -> Option<Event<'_>> {
         match self.state {

@@ -322,3 +322,46 @@ fn time_ends_the_doubt_only_about_a_unit_that_returns_no_echo() {
         assert_eq!(master.in_quarantine(given_up + PATIENCE, unit(1)), echoes);
     }
 }
+
+/// Every cut of what may come after a request: what is said to be lacking is never more than what does, or the answer
+/// would be looked for too late.
+#[test]
+fn what_an_answer_lacks_is_never_overstated() {
+    let read = Request::read(0x3000, 16).unwrap();
+    let one = Request::read(0x0300, 1).unwrap();
+    let write = Request::write(0x2001, 0x1388);
+    let echo = |request: &Request<'_>| Adu::request(unit(1).into(), request).as_bytes().to_vec();
+    let answer = |answer: Answer<'_>| Adu::answer(unit(1), &answer).as_bytes().to_vec();
+    let sixteen = words(1, &[7; 16]);
+    let refusal = answer(Answer::exception(3, ExceptionCode::ILLEGAL_ADDRESS));
+    let cases = [
+        (&read, sixteen.clone()),
+        (&read, refusal.clone()),
+        (&read, [echo(&read), sixteen.clone()].concat()),
+        (&one, words(1, &[7])),
+        (&one, [echo(&one), refusal.clone()].concat()),
+        (&write, answer(Answer::confirming(&write).unwrap())),
+        (&write, answer(Answer::exception(6, ExceptionCode::ILLEGAL_VALUE))),
+    ];
+    for (request, bytes) in cases {
+        for strips in [false, true] {
+            let mut master = waiting(request);
+            master.strip_echo(strips);
+            for (count, &byte) in bytes.iter().enumerate() {
+                let now = at(100_000 + 573 * count as u64);
+                let left = bytes.len() - count;
+                assert!(master.lacks() <= left, "{request:?}: {} of {left} at {count} of {bytes:02X?}", master.lacks());
+                assert_eq!(master.receive(now, &[byte]), 1);
+                if master.poll(now).is_some() {
+                    break;
+                }
+            }
+        }
+    }
+    // And it says enough to be of use: of 37 bytes, not each is looked for.
+    let mut master = waiting(&read);
+    let _ = master.receive(at(100_000), &sixteen[..4]);
+    assert!(master.poll(at(100_000)).is_none());
+    assert_eq!(master.lacks(), 33);
+    assert_eq!(waiting(&read).lacks(), 0, "nothing has begun");
+}

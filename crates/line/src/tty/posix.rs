@@ -132,6 +132,15 @@ pub(super) fn receive(port: &mut SerialPort, buffer: &mut [u8], until: Instant) 
         sleep_until(until);
         return Ok(0); // a read of nothing would look like the end of the port
     }
+    if until <= monotonic() {
+        // No wait is wanted: one system call tells all. A port that is gone says so here as well.
+        return match rustix::io::read(&*port, &mut *buffer) {
+            Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "hung up")),
+            Ok(count) => Ok(count),
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            Err(error) => Err(error.into()),
+        };
+    }
     loop {
         let Some(ready) = wait_for(port.as_fd(), PollFlags::IN, until)? else { return Ok(0) };
         match rustix::io::read(&*port, &mut *buffer) {
