@@ -294,11 +294,12 @@ class Simulator:
         realtime: bool = True,
         strict_silence: bool = False,
         link: str | os.PathLike[str] | None = None,
+        fifo: int | None = None,
     ) -> Simulator:
         """*transport*: `"pty"`, `"tcp"` (RTU over TCP on 127.0.0.1), or `"process"` (only by `Bus(simulator)`).
 
         *realtime* False needs `"process"`: the clock jumps to what happens next. *link* is a symbolic link that is kept
-        leading to the pseudo-terminal.
+        leading to the pseudo-terminal. *fifo*: after how many characters a port hands them over; 8 if it is not said.
         """
     @property
     def port(self) -> str:

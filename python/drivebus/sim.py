@@ -143,6 +143,8 @@ class Simulator:
             `"all"` is every kind but `"unplug"`. docs/simulator.md says what each does.
         echo: Whether the adapter hands back what it sends.
         link: A symbolic link that is kept leading to the pseudo-terminal, whatever name `line.replug()` gave it.
+        fifo: After how many characters of an answer a pseudo-terminal or TCP port hands them over, 1..256, as the FIFO
+            of a UART does; the end of an answer comes at once. 1: each character at its moment.
 
     Raises:
         NotAllowed: An argument is wrong.
@@ -172,6 +174,7 @@ class Simulator:
         faults: Mapping[str, float] | None = None,
         echo: bool = False,
         link: str | os.PathLike[str] | None = None,
+        fifo: int = 8,
     ) -> None:
         checks.one_of("transport", transport, ("pty", "tcp", "process"))
         checks.one_of("clock", clock, ("real", "virtual"))
@@ -194,6 +197,7 @@ class Simulator:
             realtime=clock == "real",
             strict_silence=strict_silence,
             link=link,
+            fifo=checks.whole("fifo", fifo, 1, 256),
         )
         self.line.set_faults(**rates)
         self.line.echo = echo

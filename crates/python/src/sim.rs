@@ -96,9 +96,10 @@ impl Simulator {
 impl Simulator {
     #[new]
     #[pyo3(
-        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false, link = None),
-        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False, link=None)"
+        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false, link = None, fifo = None),
+        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False, link=None, fifo=None)"
     )]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
         units: &Bound<'_, PyAny>,
         format: SerialFormat,
@@ -107,9 +108,14 @@ impl Simulator {
         realtime: bool,
         strict_silence: bool,
         link: Option<PathBuf>,
+        fifo: Option<usize>,
     ) -> PyResult<Self> {
         let units = units_of(units)?;
-        let options = Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
+        let mut options =
+            Options::default().format(format.0).seed(seed).realtime(realtime).strict_silence(strict_silence);
+        if let Some(characters) = fifo {
+            options = options.fifo(characters);
+        }
         let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
         let core = sim::Simulator::new(named, options).map_err(refuse)?;
         let server = Server::start(&core, transport, link)?;

@@ -9,7 +9,7 @@ use drivebus_rtu::Instant;
 
 /// How long before an exact moment to wake up and wait awake: more than the usual lateness of a sleep on Linux
 /// (50 µs timer slack and the wake-up itself), little enough to cost nothing.
-pub(crate) const WAKE_EARLY: Duration = Duration::from_micros(100);
+const WAKE_EARLY: Duration = Duration::from_micros(100);
 
 /// Where the present comes from.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +35,15 @@ impl Clock {
         match self {
             Self::Virtual => world,
             Self::Real(start) => Instant::ZERO + start.elapsed(),
+        }
+    }
+
+    /// The system's name of the moment `at`; `None` in virtual time, which it does not know.
+    #[cfg(unix)]
+    pub(crate) fn system(self, at: Instant) -> Option<SystemInstant> {
+        match self {
+            Self::Virtual => None,
+            Self::Real(start) => start.checked_add(Duration::from_nanos(at.as_nanos())),
         }
     }
 

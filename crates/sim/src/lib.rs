@@ -52,20 +52,26 @@ mod error;
 mod faults;
 mod handles;
 mod heard;
+#[cfg(unix)]
+mod lateness;
 mod line;
 mod motor;
 mod outlet;
+#[cfg(unix)]
+mod pacer;
+#[cfg(unix)]
+mod port;
 #[cfg(target_os = "linux")]
 mod pty;
 mod ramp;
 mod random;
-#[cfg(unix)]
-mod server;
 mod simulator;
 mod spoil;
 #[cfg(unix)]
 mod tcp;
 mod trace;
+#[cfg(unix)]
+mod watch;
 mod wire;
 mod wire_handle;
 mod world;

@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::fs;
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -14,8 +14,10 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use crate::outlet::Outlet;
-use crate::server::{Worker, serve};
+use crate::pacer::{Next, Served, Serving};
+use crate::port::Port;
 use crate::simulator::Shared;
+use crate::watch::{Key, Watch};
 
 /// A pseudo-terminal that is served until this is dropped.
 ///
@@ -56,12 +58,12 @@ impl Socket {
 impl Outlet for Socket {
     /// Programs see a hang-up. Their side of the old one stays open here, so that nobody else gets its name.
     fn unplug(&self) {
-        self.lock().worker = None;
+        self.lock().serving = None;
     }
 
     fn replug(&self) -> io::Result<()> {
         let mut pty = self.lock();
-        if pty.worker.is_some() {
+        if pty.serving.is_some() {
             return Ok(());
         }
         // Opened before the old one is let go, so that it has another name.
@@ -78,8 +80,8 @@ impl Outlet for Socket {
 #[derive(Debug)]
 struct Pty {
     path: PathBuf,
-    /// Holds our side and closes it. Before `_held`, so that the thread has ended when the pseudo-terminal is given up.
-    worker: Option<Worker>,
+    /// Holds our side and closes it. Before `_held`, so that it is closed when the pseudo-terminal is given up.
+    serving: Option<Serving>,
     /// The programs' side, kept open so that ours does not fail between two programs.
     _held: OwnedFd,
 }
@@ -99,11 +101,21 @@ impl Pty {
         rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
 
         let shared = Arc::clone(shared);
-        let worker = Worker::start("drivebus-sim-pty", move |stop| {
-            // The only failure is that of the pseudo-terminal itself; its users then see it closed.
-            let _ = serve(&shared, ours.as_fd(), stop.as_fd());
-        })?;
-        Ok(Self { path, worker: Some(worker), _held: held })
+        let serving = Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, watch, key)?))))?;
+        Ok(Self { path, serving: Some(serving), _held: held })
+    }
+}
+
+/// Our side of a pseudo-terminal. It fails only as a whole; its users then see it closed.
+struct Ours(Port);
+
+impl Served for Ours {
+    fn serve(&mut self, readable: bool, _watch: &Watch, _key: Key) -> Next {
+        self.0.serve(readable)
+    }
+
+    fn leave(&mut self, watch: &Watch) {
+        self.0.leave(watch);
     }
 }
 

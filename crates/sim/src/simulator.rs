@@ -29,6 +29,18 @@ pub struct Options {
     seed: u64,
     realtime: bool,
     strict_silence: bool,
+    fifo: Fifo,
+}
+
+/// After how many characters a served port hands them over.
+#[derive(Debug, Clone, Copy)]
+struct Fifo(usize);
+
+impl Default for Fifo {
+    /// As Linux sets up a 16550A: an interrupt when 8 of its 16 places are filled.
+    fn default() -> Self {
+        Self(8)
+    }
 }
 
 impl Options {
@@ -56,6 +68,14 @@ impl Options {
     pub fn strict_silence(self, strict_silence: bool) -> Self {
         Self { strict_silence, ..self }
     }
+
+    /// After how many characters (at least 1) a pseudo-terminal or TCP port hands over what has come, as the FIFO of a
+    /// UART does: 8 if it is not said. Where a run of characters ends, what is left comes at once. With 1 each character
+    /// comes at its moment, which costs a wake-up and a system call for each.
+    #[must_use]
+    pub fn fifo(self, characters: usize) -> Self {
+        Self { fifo: Fifo(characters.max(1)), ..self }
+    }
 }
 
 /// What every handle shares.
@@ -66,6 +86,12 @@ pub(crate) struct Shared {
     pub(crate) name: String,
     units: Vec<u8>,
     world: Mutex<World>,
+    /// After how many characters a served port hands them over.
+    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
+    pub(crate) fifo: usize,
+    /// How late a served port may do what nobody waits for: half a character.
+    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
+    pub(crate) leeway: Duration,
     pub(crate) outlets: Outlets,
 }
 
@@ -124,6 +150,8 @@ impl Simulator {
             name: format!("sim:{}", named.join(",")),
             units: drives.keys().copied().collect(),
             world: Mutex::new(World::new(options.format, options.strict_silence, options.seed, drives)),
+            fifo: options.fifo.0,
+            leeway: options.format.chars(1) / 2,
             outlets: Outlets::default(),
         };
         Ok(Self { shared: Arc::new(shared) })

@@ -231,6 +231,35 @@ impl Wire {
         [frame, echo, character].into_iter().flatten().min_by_key(|wakeup| wakeup.at)
     }
 
+    /// Whether more characters follow those that have come, without a pause.
+    #[cfg(unix)]
+    pub(crate) fn is_amid_run(&self) -> bool {
+        !self.echoes.is_empty() || self.talking.as_ref().is_some_and(|talking| talking.delivered > talking.from)
+    }
+
+    /// When to call [`step`](Self::step) next, if it is enough to have `count` more characters at once, or as many as
+    /// there are before a pause.
+    #[cfg(unix)]
+    pub(crate) fn next_lump(&self, count: usize) -> Option<Wakeup> {
+        let answer = match (&self.talking, self.waiting.front()) {
+            (Some(talking), _) => {
+                let upto = talking.until().min(talking.delivered + count);
+                let at = talking.begin + self.chars(upto - talking.from);
+                Some(Wakeup { at, exact: upto == talking.until() })
+            }
+            (None, Some(waiting)) => {
+                let run = waiting.pauses.front().map_or(waiting.bytes.len(), |&(before, _)| before);
+                let at = self.earliest(waiting) + self.chars(run.min(count));
+                Some(Wakeup { at, exact: run <= count })
+            }
+            (None, None) => None,
+        };
+        let frame = self.heard_until().map(|at| Wakeup { at, exact: false });
+        let echo = self.echoes.get(count - 1).or(self.echoes.back());
+        let echo = echo.map(|echo| Wakeup { at: echo.span.end, exact: false });
+        [frame, echo, answer].into_iter().flatten().min_by_key(|wakeup| wakeup.at)
+    }
+
     /// The end of the last character from either side; in the future while one is under way.
     fn last_bit(&self) -> Option<Instant> {
         self.master.map(|span| span.end).max(self.answers.back().map(|span| span.end))

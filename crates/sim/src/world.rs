@@ -153,6 +153,24 @@ impl World {
         count
     }
 
+    /// As [`take`](Self::take), but of a run of characters that still goes on only when there are `fifo` of them.
+    #[cfg(unix)]
+    pub(crate) fn hand_over(&mut self, listener: Listener, buffer: &mut [u8], fifo: usize) -> usize {
+        if self.wire.is_amid_run() && self.held(listener) < fifo { 0 } else { self.take(listener, buffer) }
+    }
+
+    /// When to [`advance`](Self::advance) next for the sake of [`hand_over`](Self::hand_over).
+    #[cfg(unix)]
+    pub(crate) fn next_hand_over(&self, listener: Listener, fifo: usize) -> Option<Wakeup> {
+        self.wire.next_lump(fifo.saturating_sub(self.held(listener)).max(1))
+    }
+
+    /// How much `listener` has not taken.
+    #[cfg(unix)]
+    fn held(&self, listener: Listener) -> usize {
+        self.inboxes.get(&listener).map_or(0, VecDeque::len)
+    }
+
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.
     fn hear(&mut self, bytes: &[u8], silent: Instant) {
         let Ok(frame) = Frame::parse(bytes) else { return };
@@ -190,4 +208,79 @@ fn put(inbox: &mut VecDeque<u8>, byte: u8) {
         inbox.pop_front();
     }
     inbox.push_back(byte);
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use drivebus_rtu::{Adu, Request};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::drive::Map;
+
+    /// Reads of `counts` words, one a second; what a port with `fifo` hands over, and when.
+    fn handed_over(fifo: usize, faults: &[(u64, FaultKind)], echo: bool, counts: &[u16]) -> Vec<(Instant, Vec<u8>)> {
+        let unit = UnitAddress::MIN;
+        let drive = Drive::new(unit, Arc::new(Map::builtin("gd350").unwrap()), Instant::ZERO);
+        let mut world = World::new(SerialFormat::default(), false, 7, BTreeMap::from([(1, drive)]));
+        world.wire.faults.script(faults);
+        world.wire.echo = echo;
+        let port = world.attach();
+        let mut handed = Vec::new();
+        let mut buffer = [0; 512];
+        for (count, second) in counts.iter().zip(1..) {
+            let sent = Instant::ZERO + Duration::from_secs(second);
+            world.transmit(port, sent, Adu::request(unit.into(), &Request::read(0x3000, *count).unwrap()).as_bytes());
+            let until = if second == counts.len() as u64 { 100 } else { second + 1 };
+            let until = Instant::ZERO + Duration::from_secs(until);
+            while let Some(next) = world.next_hand_over(port, fifo).filter(|next| next.at < until) {
+                assert!(next.at > world.now(), "a wake-up for nothing");
+                world.advance(next.at);
+                let taken = world.hand_over(port, &mut buffer, fifo);
+                if taken > 0 {
+                    handed.push((next.at, buffer[..taken].to_vec()));
+                }
+            }
+        }
+        handed
+    }
+
+    fn kind() -> impl Strategy<Value = FaultKind> {
+        // An unplugged port hands over nothing at all.
+        prop::sample::select(&FaultKind::ALL[..16])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_fifo_changes_neither_the_characters_nor_the_end_of_a_run(
+            fifo in 2_usize..20,
+            faults in prop::collection::vec((1..5_u64, kind()), 0..4),
+            echo: bool,
+            counts in prop::collection::vec(1..17_u16, 1..5),
+        ) {
+            let single: Vec<(Instant, u8)> = handed_over(1, &faults, echo, &counts)
+                .into_iter()
+                .map(|(at, bytes)| { assert_eq!(bytes.len(), 1, "one at a time"); (at, bytes[0]) })
+                .collect();
+            let mut place = 0;
+            for (at, lump) in handed_over(fifo, &faults, echo, &counts) {
+                let next = place + lump.len();
+                let bytes: Vec<u8> = single[place..next].iter().map(|&(_, byte)| byte).collect();
+                prop_assert_eq!(&lump, &bytes);
+                prop_assert_eq!(at, single[next - 1].0, "at the moment of its last character");
+                // 572 917 ns are 11 bits at 19 200 bit/s, rounded up.
+                let runs_on = single.get(next).is_some_and(|&(after, _)| after <= at + Duration::from_nanos(572_917));
+                prop_assert!(lump.len() == fifo || lump.len() < fifo && !runs_on, "{} of {fifo}", lump.len());
+                place = next;
+            }
+            prop_assert_eq!(place, single.len());
+        }
+    }
 }

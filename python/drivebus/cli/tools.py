@@ -81,6 +81,7 @@ def _show_frame(session: Session, what: str, frame: bytes) -> None:
 @click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind, such as late=0.02.")
 @click.option("--echo", is_flag=True, help="As an adapter that hands back what it sends.")
 @click.option("--link", type=click.Path(), help="A symbolic link to keep leading to the pseudo-terminal.")
+@click.option("--fifo", type=click.IntRange(1, 256), default=8, show_default=True, help="Characters read at once.")
 @pass_session
 def sim(
     session: Session,
@@ -91,6 +92,7 @@ def sim(
     single: tuple[str, ...],
     echo: bool,
     link: str | None,
+    fifo: int,
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other."""
     bits, parity, stop = session.line_format
@@ -105,6 +107,7 @@ def sim(
         faults=({} if faults is None else {"all": faults}) | dict(map(_rate, single)),
         echo=echo,
         link=link,
+        fifo=fifo,
     )
     # Whoever ends it, the link goes with it.
     for name in ("SIGTERM", "SIGHUP"):

@@ -1,0 +1,94 @@
+//! The simulated line behind one file descriptor, in real time.
+//!
+//! What arrives is laid on the wire from the moment of its arrival. Answers are written as a UART hands them over: when
+//! its FIFO has filled so far that it interrupts, and when a run of characters is over.
+
+use std::os::fd::{AsFd, OwnedFd};
+use std::sync::Arc;
+
+use drivebus_rtu::Instant;
+use rustix::io::Errno;
+
+use crate::pacer::{Due, Next};
+use crate::simulator::Shared;
+use crate::watch::{Key, Watch};
+use crate::world::Listener;
+
+/// A master behind a descriptor.
+#[derive(Debug)]
+pub(crate) struct Port {
+    shared: Arc<Shared>,
+    /// Does not block.
+    descriptor: OwnedFd,
+    listener: Listener,
+}
+
+/// The other side is gone.
+struct Disconnected;
+
+impl Port {
+    /// `descriptor` must not block.
+    pub(crate) fn new(shared: Arc<Shared>, descriptor: OwnedFd, watch: &Watch, key: Key) -> std::io::Result<Self> {
+        watch.add(descriptor.as_fd(), key)?;
+        let listener = shared.lock().attach();
+        Ok(Self { shared, descriptor, listener })
+    }
+
+    pub(crate) fn leave(&self, watch: &Watch) {
+        watch.remove(self.descriptor.as_fd());
+    }
+
+    /// Takes what has arrived, hands over what is due.
+    pub(crate) fn serve(&self, readable: bool) -> Next {
+        let mut buffer = [0; 4_096];
+        if readable && self.read(&mut buffer).is_err() {
+            return Next::Gone;
+        }
+        loop {
+            let (count, next) = {
+                let mut world = self.shared.present();
+                let count = world.hand_over(self.listener, &mut buffer, self.shared.fifo);
+                (count, world.next_hand_over(self.listener, self.shared.fifo))
+            };
+            if count > 0 && self.write(&buffer[..count]).is_err() {
+                return Next::Gone;
+            }
+            if count < buffer.len() {
+                let due = next.and_then(|wakeup| {
+                    let at = self.shared.clock.system(wakeup.at)?;
+                    let latest = if wakeup.exact { at } else { at + self.shared.leeway };
+                    Some(Due { at, latest })
+                });
+                return due.map_or(Next::Readable, Next::At);
+            }
+        }
+    }
+
+    /// Lays what arrived on the wire.
+    fn read(&self, buffer: &mut [u8]) -> Result<(), Disconnected> {
+        let arrived = self.shared.clock.now(Instant::ZERO);
+        match rustix::io::read(self.descriptor.as_fd(), &mut *buffer) {
+            Ok(0) => Err(Disconnected),
+            Ok(count) => {
+                self.shared.lock().transmit(self.listener, arrived, &buffer[..count]);
+                Ok(())
+            }
+            Err(Errno::AGAIN | Errno::INTR) => Ok(()),
+            Err(_) => Err(Disconnected),
+        }
+    }
+
+    /// Hands `bytes` to the other side. What it has no room for is lost, as on a wire.
+    fn write(&self, bytes: &[u8]) -> Result<(), Disconnected> {
+        match rustix::io::write(self.descriptor.as_fd(), bytes) {
+            Ok(_) | Err(Errno::AGAIN | Errno::INTR) => Ok(()),
+            Err(_) => Err(Disconnected),
+        }
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        self.shared.lock().detach(self.listener);
+    }
+}
