@@ -1,4 +1,4 @@
-//! CRC, encode, decode, framer and master, at sizes that occur on the line.
+//! Encode, decode, framer and master, at sizes that occur on the line.
 //!
 //! Bodies: 6 bytes are a request, 8 the longest short frame, 11 an answer with 4 registers, 37 one with 16, 254 the
 //! longest there is; 64 KiB is a capture.
@@ -7,38 +7,10 @@
 
 use std::hint::black_box;
 
-use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use drivebus_rtu::crc::{START, crc16, update_bitwise};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use drivebus_rtu::{Adu, Answer, Duration, Event, Frame, Framer, Instant, Master, Request, SerialFormat, UnitAddress};
 
 const SILENCE: Duration = Duration::from_micros(1_750);
-
-/// What a CRC is computed with.
-type Engine = fn(&[u8]) -> u16;
-
-fn bitwise(data: &[u8]) -> u16 {
-    data.iter().fold(START, |crc, &byte| update_bitwise(crc, byte))
-}
-
-fn by_crc_crate(data: &[u8]) -> u16 {
-    const MODBUS: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
-    MODBUS.checksum(data)
-}
-
-fn checksum(c: &mut Criterion) {
-    let engines: [(&str, Engine); 3] =
-        [("drivebus", crc16), ("crc crate", by_crc_crate), ("bit by bit, as compiled", bitwise)];
-    let data: Vec<u8> = (0..65_536_u32).map(|n| n.wrapping_mul(0x9E37_79B9).to_le_bytes()[3]).collect();
-    let mut group = c.benchmark_group("crc");
-    for len in [6, 8, 11, 37, 254, 65_536] {
-        group.throughput(Throughput::Bytes(len as u64));
-        for (name, engine) in engines {
-            group.bench_with_input(BenchmarkId::new(name, len), &data[..len], |b, data| {
-                b.iter(|| engine(black_box(data)));
-            });
-        }
-    }
-}
 
 fn frames(c: &mut Criterion) {
     let unit = UnitAddress::MIN;
@@ -121,5 +93,5 @@ fn master(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, checksum, frames, framer, master);
+criterion_group!(benches, frames, framer, master);
 criterion_main!(benches);
