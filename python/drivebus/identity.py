@@ -8,7 +8,7 @@ out that moves a motor or changes a value. A stop does not wait for it.
 from __future__ import annotations
 
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.protocols import BusProtocol
+from drivebus.protocols import AwaitableBus
 
 __all__ = ["Identity"]
 
@@ -17,21 +17,20 @@ class Identity:
     """What one unit says it is, and since when that is known.
 
     Args:
-        bus: The line it hangs on.
+        bus: The line it hangs on; only for how often that was opened again.
         unit: Its address, 1..247.
         address: Where it says what it is.
         code: What it said, if it was asked before.
     """
 
-    def __init__(self, bus: BusProtocol, unit: int, address: int, code: int | None = None) -> None:
-        self._bus = bus
+    def __init__(self, bus: AwaitableBus, unit: int, address: int, code: int | None = None) -> None:
         self._unit = unit
         self._address = address
         self._known = None if code is None else _named(code)
         self._opened = bus.reconnects
 
-    def check(self) -> int:
-        """Asks the unit what it is, if the port was opened again or nobody has asked yet; at other times does nothing.
+    async def check(self, bus: AwaitableBus) -> int:
+        """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time.
 
@@ -42,11 +41,11 @@ class Identity:
             NotAllowed: Another unit answers at this address now.
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
-        opened = self._bus.reconnects
+        opened = bus.reconnects
         if self._known is not None and opened == self._opened:
             return opened
         try:
-            told = self._ask()
+            told = await self._ask(bus)
         except (NoAnswer, BadAnswer, PortError) as error:
             if self._known is None:
                 return opened
@@ -69,9 +68,9 @@ class Identity:
         self._opened = opened
         return opened
 
-    def _ask(self) -> str:
+    async def _ask(self, bus: AwaitableBus) -> str:
         try:
-            [code] = self._bus.read(self._unit, self._address)
+            [code] = await bus.read(self._unit, self._address)
         except Refused as error:
             return f"refused with exception {error.code:02X}H"
         return _named(code)

@@ -6,7 +6,7 @@ never repeated. Success is what the drive's own state says afterwards; if that c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import NamedTuple
 
 from drivebus import checks
@@ -65,7 +65,9 @@ class Seen(NamedTuple):
 class Motion(Registers):
     """Starts, stops and resets one drive. Times are seconds of the line's clock, real or simulated."""
 
-    def run(self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
+    async def run(
+        self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False
+    ) -> None:
         """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
 
         Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`.
@@ -86,29 +88,29 @@ class Motion(Registers):
             Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        self._prove_link(force)
-        raw = None if hz is None else self._setpoint_word(hz)
-        before = self._ready_to_start()
-        self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
+        await self._prove_link(force)
+        raw = None if hz is None else await self._setpoint_word(hz)
+        before = await self._ready_to_start()
+        await self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
 
-    def jog(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
+    async def jog(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
         """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
 
         A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
         not end it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        self._prove_link(force)
-        before = self._ready_to_start()
+        await self._prove_link(force)
+        before = await self._ready_to_start()
         if before.state.running:
             raise NotAllowed(
                 f"unit {self.unit} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
                 "wait_until_stopped(), before a jog",
                 unit=self.unit,
             )
-        self._start("jog_reverse" if reverse else "jog_forward", None, reverse, before, confirm)
+        await self._start("jog_reverse" if reverse else "jog_forward", None, reverse, before, confirm)
 
-    def stop(self, *, confirm: float = 1.0) -> None:
+    async def stop(self, *, confirm: float = 1.0) -> None:
         """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
 
         Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end.
@@ -121,17 +123,17 @@ class Motion(Registers):
             PortError: It could not be sent; the drive goes on as it was.
             Unconfirmed: It was sent, and the drive does not show it: the motor may still turn.
         """
-        self._halt("stop", confirm)
+        await self._halt("stop", confirm)
 
-    def coast(self, *, confirm: float = 1.0) -> None:
+    async def coast(self, *, confirm: float = 1.0) -> None:
         """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`."""
-        self._halt("coast", confirm)
+        await self._halt("coast", confirm)
 
-    def jog_stop(self, *, confirm: float = 1.0) -> None:
+    async def jog_stop(self, *, confirm: float = 1.0) -> None:
         """Ends a jog by the jog's own ramp. Errors as for `stop`."""
-        self._halt("jog_stop", confirm)
+        await self._halt("jog_stop", confirm)
 
-    def reset_fault(self, *, confirm: float = 1.0) -> None:
+    async def reset_fault(self, *, confirm: float = 1.0) -> None:
         """Resets a fault whose cause is gone. Sends nothing where there is none.
 
         Raises:
@@ -142,16 +144,23 @@ class Motion(Registers):
                 known of it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        if self.look().state is not State.FAULT:
+        if (await self.look()).state is not State.FAULT:
             return
-        self._command("reset_fault")
-        self._confirm("reset_fault", lambda seen: seen.state not in (State.FAULT, State.UNKNOWN), confirm)
 
-    @property
-    def setpoint(self) -> float:
-        """The setpoint last given over the bus, in Hz. Setting it changes the speed of a motor that runs.
+        async def shows(seen: Seen) -> bool:
+            return seen.state not in (State.FAULT, State.UNKNOWN)
 
-        Raises, when set:
+        await self._command("reset_fault")
+        await self._confirm("reset_fault", shows, confirm)
+
+    async def setpoint(self) -> float:
+        """The setpoint last given over the bus, in Hz."""
+        return float(await self.read("set_frequency"))
+
+    async def set_setpoint(self, hz: float) -> None:
+        """Gives a setpoint in Hz: changes the speed of a motor that runs.
+
+        Raises:
             NotAllowed: Above the drive's own maximum or out of range, or another drive answers at this address since
                 the port was opened again; nothing was sent.
             NoAnswer, BadAnswer, PortError: The drive may have taken it all the same, unless the error's `started` is
@@ -159,21 +168,19 @@ class Motion(Registers):
             Unconfirmed: The drive shows another setpoint, however often it was written.
             Refused: The drive kept the old one.
         """
-        return float(self.read("set_frequency"))
+        await self._write_setpoint(await self._setpoint_word(hz))
 
-    @setpoint.setter
-    def setpoint(self, hz: float) -> None:
-        self._write_setpoint(self._setpoint_word(hz))
+    async def _write_setpoint(self, word: int) -> None:
+        await self._write(
+            self.profile.address("set_frequency"), word, read_back=self.profile.read_back("set_frequency")
+        )
 
-    def _write_setpoint(self, word: int) -> None:
-        self._write(self.profile.address("set_frequency"), word, read_back=self.profile.read_back("set_frequency"))
-
-    def look(self, *, urgent: bool = False) -> Seen:
+    async def look(self, *, urgent: bool = False) -> Seen:
         """The status words, in one read."""
         names = ("status_word_1", "status_word_2", "fault_code")
         first, *_ = places = [self.profile.address(name) for name in names]
         with self._explained():
-            words, time, _ = self.bus.read_stamped(self.unit, first, max(places) - first + 1, urgent=urgent)
+            words, time, _ = await self.bus.read_stamped(self.unit, first, max(places) - first + 1, urgent=urgent)
         state, fields, fault = (words[place - first] for place in places)
         seen = Seen(
             self._state_of(state),
@@ -184,21 +191,21 @@ class Motion(Registers):
         self._remember(str(seen))
         return seen
 
-    def _prove_link(self, force: bool) -> None:
+    async def _prove_link(self, force: bool) -> None:
         """No motor starts on a link that may not carry its stop. Sends nothing where the last exchanges went well."""
-        link = self.bus.link(self.unit)
+        link = await self.bus.link(self.unit)
         if force or link.failed <= _FAILURES_ALLOWED:
             return
         lost = looks = 0
         while looks < _LOOKS_TO_PROVE and lost <= _FAILURES_ALLOWED:
             looks += 1
             try:
-                self.state()
+                await self.state()
             except Refused:
                 pass
             except (NoAnswer, BadAnswer):
                 lost += 1
-        link = self.bus.link(self.unit)
+        link = await self.bus.link(self.unit)
         if lost > _FAILURES_ALLOWED or link.failed > _FAILURES_ALLOWED:
             raise NotAllowed(
                 f"the link to unit {self.unit} is bad: {link}, and {lost} of {looks} looks at its state failed; "
@@ -207,12 +214,12 @@ class Motion(Registers):
                 unit=self.unit,
             )
 
-    def _setpoint_word(self, hz: float) -> int:
+    async def _setpoint_word(self, hz: float) -> int:
         hz = checks.number("setpoint", hz, 0.0)
         raw = self.profile.encode("set_frequency", hz)
         limit = self.profile.maximum_frequency
         if limit is not None:
-            highest: Value = self.read(limit)
+            highest: Value = await self.read(limit)
             if hz > highest:
                 raise NotAllowed(
                     f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
@@ -221,8 +228,8 @@ class Motion(Registers):
                 )
         return raw
 
-    def _ready_to_start(self) -> Seen:
-        seen = self.look()
+    async def _ready_to_start(self) -> Seen:
+        seen = await self.look()
         if seen.state is State.FAULT:
             raise NotAllowed(
                 f"unit {self.unit} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
@@ -241,38 +248,38 @@ class Motion(Registers):
             )
         return seen
 
-    def _start(self, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
+    async def _start(self, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
         wanted = State.REVERSE if reverse else State.FORWARD
         turning_round = before.state.running and before.state is not wanted
-        frequency = self._running_frequency() if turning_round else 0.0
-        self._command(command, setpoint)
+        frequency = await self._running_frequency() if turning_round else 0.0
+        await self._command(command, setpoint)
 
-        def shows(seen: Seen) -> bool:
+        async def shows(seen: Seen) -> bool:
             # A motor that turns the other way must slow down first; its state word follows at zero.
-            return seen.state is wanted or (turning_round and self._running_frequency() < frequency)
+            return seen.state is wanted or (turning_round and await self._running_frequency() < frequency)
 
-        self._confirm(command, shows, confirm)
+        await self._confirm(command, shows, confirm)
 
-    def _halt(self, command: str, confirm: float) -> None:
+    async def _halt(self, command: str, confirm: float) -> None:
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        self._command(command)
+        await self._command(command)
         first: list[float] = []
 
-        def shows(seen: Seen) -> bool:
+        async def shows(seen: Seen) -> bool:
             if seen.state is State.UNKNOWN:
                 return False
             if not seen.state.running:
                 return True
-            first.append(self._running_frequency(urgent=True))
+            first.append(await self._running_frequency(urgent=True))
             return first[-1] < first[0]
 
-        self._confirm(command, shows, confirm)
+        await self._confirm(command, shows, confirm)
 
-    def _running_frequency(self, *, urgent: bool = False) -> float:
-        [word] = self.read_words(self.profile.address("running_frequency"), urgent=urgent)
+    async def _running_frequency(self, *, urgent: bool = False) -> float:
+        [word] = await self.read_words(self.profile.address("running_frequency"), urgent=urgent)
         return float(self.value("running_frequency", word))
 
-    def _command(self, name: str, setpoint: int | None = None) -> None:
+    async def _command(self, name: str, setpoint: int | None = None) -> None:
         """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
         urgent = name in _HALTS
         address, code = self.profile.command(name)
@@ -282,12 +289,12 @@ class Motion(Registers):
             if place == address + 1:
                 words = [code, setpoint]
             else:
-                self._write_setpoint(setpoint)
+                await self._write_setpoint(setpoint)
         try:
             if urgent:
-                self._send(address, words, urgent=True)
+                await self._send(address, words, urgent=True)
             else:
-                self._write(address, words)
+                await self._write(address, words)
         except _LINE_ERRORS as error:
             if error.started is None:
                 if not urgent:
@@ -300,7 +307,7 @@ class Motion(Registers):
                 ) from error
             raise Unconfirmed(
                 f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
-                f"{self._state_afterwards(urgent)}. It was not repeated",
+                f"{await self._state_afterwards(urgent)}. It was not repeated",
                 unit=self.unit,
                 request=error.request,
                 raw=error.raw,
@@ -308,20 +315,20 @@ class Motion(Registers):
                 ended=error.ended,
             ) from error
 
-    def _state_afterwards(self, urgent: bool) -> str:
+    async def _state_afterwards(self, urgent: bool) -> str:
         try:
-            return f"State seen afterwards: {self.look(urgent=urgent)}"
+            return f"State seen afterwards: {await self.look(urgent=urgent)}"
         except (*_LINE_ERRORS, Refused) as error:
             return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
 
-    def _confirm(self, command: str, shows: Callable[[Seen], bool], within: float) -> None:
+    async def _confirm(self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float) -> None:
         if within == 0:
             return
         deadline = self.bus.now() + within
         while True:
             try:
-                seen = self.look(urgent=command in _HALTS)
-                if shows(seen):
+                seen = await self.look(urgent=command in _HALTS)
+                if await shows(seen):
                     return
                 last = f"state seen last: {seen}"
                 source = seen.source
@@ -340,7 +347,7 @@ class Motion(Registers):
                 ) from error
             if self.bus.now() >= deadline:
                 break
-            self.bus.sleep(POLL_INTERVAL)
+            await self.bus.sleep(POLL_INTERVAL)
         raise Unconfirmed(
             f"{command} was sent to unit {self.unit}, and its state does not show it: {_MAY[command]}; {last}. "
             "It was not repeated",

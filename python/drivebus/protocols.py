@@ -1,16 +1,17 @@
 """What a drive needs from the line it hangs on and from the profile of its family.
 
-`Drive` is written against these two protocols: it runs on a bus, on a stand-in, on anything that behaves like one.
+`Drive` is written against these protocols: it runs on a bus, on a stand-in, on anything that behaves like one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from drivebus.values import Description, Fault, Link, Value, WatchdogSettings
 
-__all__ = ["BusProtocol", "PlanProtocol", "ProfileProtocol"]
+__all__ = ["AwaitableBus", "BusProtocol", "PlanProtocol", "ProfileProtocol"]
 
 
 class BusProtocol(Protocol):
@@ -60,6 +61,59 @@ class BusProtocol(Protocol):
     @property
     def closed(self) -> bool:
         """Whether the line was closed for good."""
+
+
+class AwaitableBus(Protocol):
+    """A bus as the operations know it: the same calls, to be awaited.
+
+    Whatever else an operation awaits is made of them, so that over a bus that blocks nothing is left to wait for.
+    """
+
+    def now(self) -> float:
+        """See `BusProtocol`, as of all else here."""
+
+    async def sleep(self, seconds: float, /) -> None:
+        """See `BusProtocol`."""
+
+    async def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """See `BusProtocol`."""
+
+    async def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """See `BusProtocol`."""
+
+    async def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+    ) -> None:
+        """See `BusProtocol`."""
+
+    async def link(self, unit: int, /) -> Link:
+        """See `BusProtocol`."""
+
+    @property
+    def reconnects(self) -> int:
+        """See `BusProtocol`."""
+
+    @property
+    def closed(self) -> bool:
+        """See `BusProtocol`."""
+
+    def undisturbed(self) -> AbstractContextManager[AwaitableBus]:
+        """The same line for a block in which nothing is given up: a cancellation is raised when the block has ended."""
+
+    def blocking(self) -> AwaitableBus:
+        """The same line for who has no event loop: it blocks."""
 
 
 class PlanProtocol(Protocol):

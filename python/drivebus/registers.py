@@ -2,19 +2,26 @@
 
 Names become addresses, words become values, and back. What may be written, and where it is kept, is decided here;
 what makes a motor turn is not: commands are refused, `Drive` has methods for them.
+
+Written once, to be awaited: `drivebus.aio.Drive` is awaited, and `drivebus.Drive` carries the same out at once.
 """
 
 from __future__ import annotations
 
+import copy
+import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 from drivebus.errors import DrivebusError, NotAllowed, PortError, Refused, StoreWarning
 from drivebus.identity import Identity
-from drivebus.protocols import BusProtocol, ProfileProtocol
+from drivebus.protocols import AwaitableBus, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 __all__ = ["Registers"]
 
@@ -40,15 +47,21 @@ class Registers:
     """
 
     def __init__(
-        self, bus: BusProtocol, unit: int, profile: ProfileProtocol, identification: int | None = None
+        self, bus: AwaitableBus, unit: int, profile: ProfileProtocol, identification: int | None = None
     ) -> None:
         self.bus = bus
         self.unit = unit
         self.profile = profile
         self._identity = Identity(bus, unit, profile.identification_address, identification)
-        self._seen: tuple[str, float] | None = None
+        self._seen: list[tuple[str, float]] = []
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
+
+    def over(self, bus: AwaitableBus) -> Self:
+        """The same unit over another face of the same line; what is known of it is shared."""
+        other = copy.copy(self)
+        other.bus = bus
+        return other
 
     def describe(self, name: str) -> Description:
         """All that is known of a register or parameter. Nothing is sent.
@@ -59,10 +72,10 @@ class Registers:
         return self.profile.describe(name)
 
     @overload
-    def read(self, name: str, /, *, verify: bool = False) -> Value: ...
+    async def read(self, name: str, /, *, verify: bool = False) -> Value: ...
     @overload
-    def read(self, first: str, second: str, /, *more: str, verify: bool = False) -> dict[str, Value]: ...
-    def read(self, *names: str, verify: bool = False) -> Value | dict[str, Value]:
+    async def read(self, first: str, second: str, /, *more: str, verify: bool = False) -> dict[str, Value]: ...
+    async def read(self, *names: str, verify: bool = False) -> Value | dict[str, Value]:
         """Reads registers or parameters in the fewest requests.
 
         One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
@@ -77,26 +90,28 @@ class Registers:
         """
         if not names:
             raise NotAllowed("read() needs at least one name, such as 'output_current' or 'P00.11'")
-        values = self.snapshot(*names, verify=verify)
+        values = await self.snapshot(*names, verify=verify)
         return values[names[0]] if len(names) == 1 else dict(values)
 
-    def snapshot(self, *names: str, verify: bool = False) -> Snapshot:
+    async def snapshot(self, *names: str, verify: bool = False) -> Snapshot:
         """Reads *names* in the fewest requests, under one time stamp. With *verify* as `read` does."""
         plan = self.profile.compile(names)
         answers: list[list[int]] = []
         started = ended = 0.0
         for address, count in plan.reads:
             with self._explained():
-                words, sent, ended = self.bus.read_stamped(self.unit, address, count, verify=verify)
+                words, sent, ended = await self.bus.read_stamped(self.unit, address, count, verify=verify)
             started = started if answers else sent
             answers.append(words)
         values = dict(zip(plan.names, plan.values(answers), strict=True))
         return Snapshot(values, plan.units, started, ended - started)
 
-    def read_words(self, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
+    async def read_words(
+        self, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
         """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""
         with self._explained():
-            return self.bus.read(self.unit, address, count, urgent=urgent, verify=verify)
+            return await self.bus.read(self.unit, address, count, urgent=urgent, verify=verify)
 
     def value(self, name: str, raw: int) -> Value:
         """The word *raw* of *name* in engineering units."""
@@ -107,10 +122,10 @@ class Registers:
         return value
 
     @overload
-    def write(self, name: str, value: object, store: bool = False) -> None: ...
+    async def write(self, name: str, value: object, store: bool = False) -> None: ...
     @overload
-    def write(self, name: Mapping[str, object], *, store: bool = False) -> None: ...
-    def write(self, name: str | Mapping[str, object], value: object = None, store: bool = False) -> None:
+    async def write(self, name: Mapping[str, object], *, store: bool = False) -> None: ...
+    async def write(self, name: str | Mapping[str, object], value: object = None, store: bool = False) -> None:
         """Writes one value, or several from a mapping, each by its own request.
 
         A confirmation that was lost is cleared up by reading the value. Only where the drive shows another one is the
@@ -142,11 +157,11 @@ class Registers:
         if not isinstance(name, Mapping) and value is None:
             raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
         planned = [self._plan_write(key, asked, store) for key, asked in wanted.items()]
-        self._check_state(planned)
+        await self._check_state(planned)
         done: list[str] = []
         for item in planned:
             try:
-                self._write_one(item, store)
+                await self._write_one(item, store)
             except DrivebusError as error:
                 if done and hasattr(error, "add_note"):
                     error.add_note(f"written before it: {', '.join(done)}")
@@ -165,11 +180,11 @@ class Registers:
             )
         return _Planned(name, self.profile.address(name, store=store), self.profile.encode(name, value))
 
-    def _check_state(self, planned: Sequence[_Planned]) -> None:
+    async def _check_state(self, planned: Sequence[_Planned]) -> None:
         only_stopped = [item.name for item in planned if self.profile.describe(item.name).access == "stop"]
         if not only_stopped:
             return
-        state = self.state()
+        state = await self.state()
         if state.running:
             raise NotAllowed(
                 f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {self.unit} runs "
@@ -177,21 +192,21 @@ class Registers:
                 unit=self.unit,
             )
 
-    def _write_one(self, item: _Planned, store: bool) -> None:
+    async def _write_one(self, item: _Planned, store: bool) -> None:
         read_back = self.profile.read_back(item.name)
         is_parameter = self.profile.describe(item.name).kind == "parameter"
         if not is_parameter or not store:
             if is_parameter:
                 # Before it is sent: the drive may take it although its answer is lost.
                 self._in_ram.add(item.name)
-            self._write(item.address, item.raw, read_back=read_back)
+            await self._write(item.address, item.raw, read_back=read_back)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-        in_force = self.read_words(self.profile.address(item.name))[0]
+        [in_force] = await self.read_words(self.profile.address(item.name))
         if in_force == item.raw and item.name not in self._in_ram:
             return
         # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
-        self._write(item.address, item.raw, read_back=None if in_force == item.raw else read_back)
+        await self._write(item.address, item.raw, read_back=None if in_force == item.raw else read_back)
         self._in_ram.discard(item.name)
         self._count_store(item.name)
 
@@ -202,7 +217,7 @@ class Registers:
                 f"{name} of unit {self.unit} was stored in EEPROM {times} times by this program; "
                 "its write life is limited: write to RAM (store=False) in a loop",
                 StoreWarning,
-                stacklevel=4,
+                stacklevel=_level_of_the_program(),
             )
 
     @contextmanager
@@ -224,18 +239,18 @@ class Registers:
                 ended=error.ended,
             ) from None
 
-    def _write(self, address: int, value: int | Sequence[int], *, read_back: int | None = None) -> None:
+    async def _write(self, address: int, value: int | Sequence[int], *, read_back: int | None = None) -> None:
         """Writes to the unit, if it still is the one it was."""
-        connection = self._identity.check()
+        connection = await self._identity.check(self.bus)
         try:
-            self._send(address, value, read_back=read_back, connection=connection)
+            await self._send(address, value, read_back=read_back, connection=connection)
         except PortError as error:
             if error.started is not None or self.bus.reconnects == connection:
                 raise
             # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
-            self._send(address, value, read_back=read_back, connection=self._identity.check())
+            await self._send(address, value, read_back=read_back, connection=await self._identity.check(self.bus))
 
-    def _send(
+    async def _send(
         self,
         address: int,
         value: int | Sequence[int],
@@ -245,11 +260,12 @@ class Registers:
         connection: int | None = None,
     ) -> None:
         with self._explained():
-            self.bus.write(self.unit, address, value, urgent=urgent, read_back=read_back, connection=connection)
+            await self.bus.write(self.unit, address, value, urgent=urgent, read_back=read_back, connection=connection)
 
-    def state(self) -> State:
+    async def state(self) -> State:
         """What the drive is doing: one read of its first status word."""
-        state = self._state_of(self.read_words(self.profile.address("status_word_1"))[0])
+        [word] = await self.read_words(self.profile.address("status_word_1"))
+        state = self._state_of(word)
         self._remember(str(state))
         return state
 
@@ -261,16 +277,24 @@ class Registers:
 
     def _remember(self, state: str) -> None:
         """Keeps the last state that was seen, for errors after which none can be read."""
-        self._seen = state, self.bus.now()
+        self._seen[:] = [(state, self.bus.now())]
 
     def _seen_last(self) -> str:
         """The last state that was seen, and how long ago on the line's clock."""
-        if self._seen is None:
+        if not self._seen:
             return "no state was ever seen"
-        state, at = self._seen
+        [(state, at)] = self._seen
         # A line that is lost may have no clock.
         age = max(self.bus.now() - at, 0.0)
         return f"state seen last, {age:.1f} s ago: {state}"
+
+
+def _level_of_the_program() -> int:
+    """Where the program stands above the caller, for `warnings.warn`: how deep depends on who carries the work out."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "drivebus":
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _asked(request: bytes) -> str:

@@ -56,10 +56,10 @@ class Guard:
         if self.in_main_thread:
             _listen()
 
-    def end(self) -> BaseException | None:
-        """Ends it, unless the end of the program already did. A signal meanwhile waits until that is done."""
+    def begin_to_end(self) -> bool:
+        """Whether its owner is to end it now: not where the end of the program did. A signal meanwhile waits."""
         self.ending = True
-        return None if self._ended or sys.is_finalizing() else self._end()
+        return not (self._ended or sys.is_finalizing())
 
     def leave_alone(self) -> None:
         """Nothing is to be ended here, because somebody else will."""

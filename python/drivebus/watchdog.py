@@ -1,7 +1,8 @@
 """A drive that acts by itself when it hears nothing: what helps when the program is killed or the cable is cut.
 
-The drive has a communication time-out and an action of its own. They are set in RAM, a thread keeps the line busy, and
-when that ends for whatever reason, the drive does what it was told.
+The drive has a communication time-out and an action of its own. They are set in RAM, the line is kept busy, and when
+that ends for whatever reason, the drive does what it was told. What is asked of the drive stands in `Settings`; what
+keeps the line busy is a thread here, and a task in `drivebus.aio`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from contextlib import suppress
 from types import TracebackType
 
 from drivebus import checks
+from drivebus.at_once import at_once
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
 from drivebus.motion import POLL_INTERVAL, Motion
 from drivebus.values import State, Value
 
-__all__ = ["Watchdog"]
+__all__ = ["Settings", "Watchdog"]
 
 _READS_PER_TIMEOUT = 4
 """How often the drive is asked within its time-out: three answers may be lost before it acts."""
@@ -29,10 +31,8 @@ a hundredth of a hertz in that time."""
 _AT_REST = (State.STOPPED, State.FAULT, State.POWER_OFF)
 
 
-class Watchdog:
-    """The drive's own time-out, set and kept from running out until `close`.
-
-    `Drive.watchdog` makes one. Its parameters are in force when it has been made.
+class Settings:
+    """What is set in the drive, and what it had before.
 
     Attributes:
         timeout: Seconds of silence after which the drive acts.
@@ -63,10 +63,90 @@ class Watchdog:
         }
         for name, value in self._wanted.items():
             drive.profile.encode(name, value)
-        former = drive.snapshot(settings.timeout, settings.action)
         # The time-out goes back first, for the same reason.
-        self._former = {name: former[name] for name in (settings.timeout, settings.action)}
-        self._set()
+        self._former: dict[str, Value] = dict.fromkeys((settings.timeout, settings.action), 0)
+
+    @property
+    def interval(self) -> float:
+        """Seconds between two questions that keep the line busy."""
+        return self.timeout / _READS_PER_TIMEOUT
+
+    async def set(self) -> None:
+        """Sets them, and reads them back."""
+        former = await self._drive.snapshot(*self._former)
+        self._former = {name: former[name] for name in self._former}
+        try:
+            await self._drive.write(self._wanted)
+            shown = await self._drive.snapshot(*self._wanted)
+        except BaseException:
+            # Ctrl-C as well. It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the
+            # line busy.
+            with suppress(DrivebusError):
+                await self._put_back()
+            raise
+        encode = self._drive.profile.encode
+        if any(encode(name, shown[name]) != encode(name, value) for name, value in self._wanted.items()):
+            await self._put_back()
+            raise Unconfirmed(
+                f"unit {self._drive.unit} took {self._wanted} for its watchdog and shows {shown!r}; it has back what "
+                "it had",
+                unit=self._drive.unit,
+            )
+        self.armed = True
+
+    async def give_back(self) -> None:
+        """Waits for a motor that slows down, and gives the drive the settings it had. A failure is kept in `error`."""
+        try:
+            if await self._comes_to_rest():
+                await self._put_back()
+        except DrivebusError as error:
+            self.error = error
+
+    async def ask(self) -> bool:
+        """Keeps the drive from acting for now. Whether that makes sense again: not on a line that was closed."""
+        try:
+            await self._drive.state()
+        except DrivebusError as error:
+            self.error = error
+            return not self._drive.bus.closed
+        return True
+
+    async def _put_back(self) -> None:
+        with self._drive.bus.undisturbed() as bus:
+            await self._drive.over(bus).write(self._former)
+            self.armed = False
+
+    async def _comes_to_rest(self) -> bool:
+        """Whether the motor is stopped, once it no longer slows down."""
+        bus = self._drive.bus
+        lowest, deadline = math.inf, bus.now()
+        while await self._drive.state() not in _AT_REST:
+            frequency = float(await self._drive.read("running_frequency"))
+            now = bus.now()
+            if frequency < lowest:
+                lowest, deadline = frequency, now + _PATIENCE
+            elif now >= deadline:
+                return False
+            await bus.sleep(POLL_INTERVAL)
+        return True
+
+    def __repr__(self) -> str:
+        state = "armed" if self.armed else "off"
+        unverified = "" if self.verified else ", its parameters unverified"
+        failed = f", failed last with: {self.error}" if self.error else ""
+        what = f"{self.action} after {self.timeout:g} s"
+        return f"<Watchdog of unit {self._drive.unit}: {what}, {state}{unverified}{failed}>"
+
+
+class Watchdog(Settings):
+    """The drive's own time-out, set and kept from running out until `close`.
+
+    `Drive.watchdog` makes one. Its parameters are in force when it has been made. Attributes as in `Settings`.
+    """
+
+    def __init__(self, drive: Motion, timeout: float, action: str) -> None:
+        super().__init__(drive, timeout, action)
+        at_once(self.set())
         self._closed = False
         self._over = threading.Event()
         self._thread = threading.Thread(
@@ -85,10 +165,7 @@ class Watchdog:
             return
         self._closed = True
         try:
-            if self._comes_to_rest():
-                self._put_back()
-        except DrivebusError as error:
-            self.error = error
+            at_once(self.give_back())
         finally:
             self._rest()
             atexit.unregister(self._rest)
@@ -101,59 +178,10 @@ class Watchdog:
     ) -> None:
         self.close()
 
-    def __repr__(self) -> str:
-        state = "armed" if self.armed else "off"
-        unverified = "" if self.verified else ", its parameters unverified"
-        failed = f", failed last with: {self.error}" if self.error else ""
-        what = f"{self.action} after {self.timeout:g} s"
-        return f"<Watchdog of unit {self._drive.unit}: {what}, {state}{unverified}{failed}>"
-
-    def _set(self) -> None:
-        try:
-            self._drive.write(self._wanted)
-            shown = self._drive.snapshot(*self._wanted)
-        except BaseException:
-            # Ctrl-C as well. It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the
-            # line busy.
-            with suppress(DrivebusError):
-                self._put_back()
-            raise
-        encode = self._drive.profile.encode
-        if any(encode(name, shown[name]) != encode(name, value) for name, value in self._wanted.items()):
-            self._put_back()
-            raise Unconfirmed(
-                f"unit {self._drive.unit} took {self._wanted} for its watchdog and shows {shown!r}; it has back what "
-                "it had",
-                unit=self._drive.unit,
-            )
-        self.armed = True
-
-    def _put_back(self) -> None:
-        self._drive.write(self._former)
-        self.armed = False
-
-    def _comes_to_rest(self) -> bool:
-        """Whether the motor is stopped, once it no longer slows down."""
-        bus = self._drive.bus
-        lowest, deadline = math.inf, bus.now()
-        while self._drive.state() not in _AT_REST:
-            frequency = float(self._drive.read("running_frequency"))
-            now = bus.now()
-            if frequency < lowest:
-                lowest, deadline = frequency, now + _PATIENCE
-            elif now >= deadline:
-                return False
-            bus.sleep(POLL_INTERVAL)
-        return True
-
     def _keep_busy(self) -> None:
-        while not self._over.wait(self.timeout / _READS_PER_TIMEOUT):
-            try:
-                self._drive.state()
-            except DrivebusError as error:
-                self.error = error
-                if self._drive.bus.closed:
-                    return
+        while not self._over.wait(self.interval):
+            if not at_once(self.ask()):
+                return
 
     def _rest(self) -> None:
         """Lets the line fall silent. Also at the end of the program, where no thread may be left inside the core."""

@@ -40,7 +40,7 @@ def test_another_drive_is_not(
 ) -> None:
     read = virtual_bus.read
     other = {IDENTIFICATION: [0x010A]}
-    monkeypatch.setattr(virtual_bus, "read", lambda unit, address: other.get(address) or read(unit, address))
+    monkeypatch.setattr(virtual_bus, "read", lambda *what, **how: other.get(what[1]) or read(*what, **how))
     with pytest.raises(drivebus.NotAllowed, match="another drive"):
         virtual_drive.write("P00.11", 2.0)
     assert line.drive(1).writes() == []

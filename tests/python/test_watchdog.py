@@ -15,6 +15,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator
+from drivebus.operations import Operations
 
 RAM, ACTION, TIMEOUT = 0x8000, 0x0E05, 0x0E04
 CE = 18
@@ -137,9 +138,12 @@ def test_a_drive_that_refuses_keeps_what_it_had(virtual: Simulator, virtual_driv
 def test_a_drive_that_shows_something_else_gets_back_what_it_had(
     virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    snapshot = virtual_drive.snapshot
     shown = iter([{"P14.04": 0.0, "P14.05": 2}, {"P14.04": 1.0, "P14.05": 2}])
-    monkeypatch.setattr(virtual_drive, "snapshot", lambda *names: next(shown, None) or snapshot(*names))
+
+    async def snapshot(*_: object) -> object:
+        return next(shown)
+
+    monkeypatch.setattr(Operations, "snapshot", snapshot)
     with pytest.raises(drivebus.Unconfirmed, match=r"unit 1 took .* and shows"):
         virtual_drive.watchdog(1.0)
     assert settings(virtual) == (0, 2)
@@ -148,16 +152,16 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
 def test_one_that_is_interrupted_gives_back_what_the_drive_had(
     virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    snapshot = virtual_drive.snapshot
-    calls = iter([snapshot])
+    snapshot = Operations.snapshot
+    asked: list[str] = []
 
-    def interrupted(*names: str) -> drivebus.Snapshot:
-        try:
-            return next(calls)(*names)
-        except StopIteration:
-            raise KeyboardInterrupt from None
+    async def interrupted(operations: Operations, *names: str) -> drivebus.Snapshot:
+        asked.extend(names)
+        if len(asked) > len(names):
+            raise KeyboardInterrupt
+        return await snapshot(operations, *names)
 
-    monkeypatch.setattr(virtual_drive, "snapshot", interrupted)
+    monkeypatch.setattr(Operations, "snapshot", interrupted)
     with pytest.raises(KeyboardInterrupt):
         virtual_drive.watchdog(1.0)
     assert written(virtual)[:2] == [(ACTION, 0), (TIMEOUT, 10)]

@@ -1,0 +1,124 @@
+"""Operations that are written to be awaited, carried out at once: for a line whose calls block by themselves.
+
+Each operation stands once, as a coroutine. Over a bus that blocks it waits for nothing else, so one step takes it from
+its beginning to its end, in the caller's own thread.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+
+from drivebus.protocols import BusProtocol
+from drivebus.values import Link
+
+__all__ = ["BlockingBus", "at_once", "blocking", "documented_by"]
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_F = TypeVar("_F", bound=Callable[..., object])
+_O = TypeVar("_O")
+_O_co = TypeVar("_O_co", covariant=True)
+
+
+class BlockingBus:
+    """A bus that blocks, for operations that await: whatever they await is there when they ask."""
+
+    def __init__(self, bus: BusProtocol) -> None:
+        self._bus = bus
+
+    @property
+    def reconnects(self) -> int:
+        """See `BusProtocol`, as of all else here."""
+        return self._bus.reconnects
+
+    @property
+    def closed(self) -> bool:
+        """See `BusProtocol`."""
+        return self._bus.closed
+
+    def now(self) -> float:
+        """See `BusProtocol`."""
+        return self._bus.now()
+
+    async def sleep(self, seconds: float, /) -> None:
+        """See `BusProtocol`."""
+        self._bus.sleep(seconds)
+
+    async def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """See `BusProtocol`."""
+        return self._bus.read(unit, address, count, urgent=urgent, verify=verify)
+
+    async def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """See `BusProtocol`."""
+        return self._bus.read_stamped(unit, address, count, urgent=urgent, verify=verify)
+
+    async def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+    ) -> None:
+        """See `BusProtocol`."""
+        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection)
+
+    async def link(self, unit: int, /) -> Link:
+        """See `BusProtocol`."""
+        return self._bus.link(unit)
+
+    def undisturbed(self) -> AbstractContextManager[BlockingBus]:
+        """Itself: no caller can take back what blocks it."""
+        return nullcontext(self)
+
+    def blocking(self) -> BlockingBus:
+        """Itself."""
+        return self
+
+
+class _Face(Protocol[_O_co]):
+    """What people call, with the operations behind it."""
+
+    @property
+    def _operations(self) -> _O_co: ...
+
+
+def at_once(work: Coroutine[Any, Any, _R]) -> _R:
+    """Carries *work* out. It must not wait for anything but a `BlockingBus`."""
+    try:
+        work.send(None)
+    except StopIteration as done:
+        result: _R = done.value
+        return result
+    work.close()
+    raise RuntimeError(f"{work!r} waits for an event loop, and there is none")
+
+
+def blocking(operation: Callable[Concatenate[_O, _P], Coroutine[Any, Any, _R]]) -> Callable[Concatenate[Any, _P], _R]:
+    """The method that carries *operation* out at once, with its name, its signature and its docstring."""
+
+    @functools.wraps(operation)
+    def method(face: _Face[_O], /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        return at_once(operation(face._operations, *args, **kwargs))
+
+    return method
+
+
+def documented_by(other: Callable[..., object]) -> Callable[[_F], _F]:
+    """Gives a method the docstring of the operation that it carries out."""
+
+    def document(method: _F) -> _F:
+        method.__doc__ = other.__doc__
+        return method
+
+    return document

@@ -1,0 +1,82 @@
+"""A motor that turns for as long as a block of the program lasts, and is stopped whatever happens there."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+
+from drivebus.at_once import at_once
+from drivebus.errors import DrivebusError, Unconfirmed
+from drivebus.operations import Operations
+from drivebus.protocols import AwaitableBus
+from drivebus.safeguard import Guard
+
+__all__ = ["Moving"]
+
+_END_ATTEMPTS = 3
+"""How often a stop is sent that is not confirmed, before the drive is told to coast."""
+
+
+class Moving:
+    """One such block. Who makes it calls `begin`, and then, whatever comes of that, either `fail` or `finish`.
+
+    Args:
+        drive: What turns.
+        start: Starts it.
+        end: Ends it, on the operations that it is given: they may be those of another thread.
+    """
+
+    def __init__(
+        self, drive: Operations, start: Callable[[], Awaitable[None]], end: Callable[[Operations], Awaitable[None]]
+    ) -> None:
+        self._drive = drive
+        self._start = start
+        self._end = end
+        # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
+        elsewhere = drive.over(drive.bus.blocking())
+        self._guard = Guard(lambda: at_once(self._end_by_all_means(elsewhere)))
+        self._started = False
+
+    async def begin(self) -> None:
+        """Starts the motor."""
+        self._guard.arm()
+        await self._start()
+        self._started = True
+        self._guard.check()
+
+    async def fail(self, reason: BaseException) -> None:
+        """The block, or its beginning, ended with *reason*, which is to be raised after this."""
+        with self._drive.bus.undisturbed() as bus:
+            # Of this package's errors, only Unconfirmed comes from a start once its command was sent.
+            if self._started or isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError):
+                failure = await self._stop(bus)
+                if failure is not None and hasattr(reason, "add_note"):
+                    reason.add_note(f"and unit {self._drive.unit} could not be stopped: {failure}")
+            self._guard.disarm()
+
+    async def finish(self) -> None:
+        """The block went well. Raises what came of stopping the motor."""
+        with self._drive.bus.undisturbed() as bus:
+            failure = await self._stop(bus)
+            self._guard.disarm()
+            if failure is not None:
+                raise failure
+
+    async def _stop(self, bus: AwaitableBus) -> BaseException | None:
+        return await self._end_by_all_means(self._drive.over(bus)) if self._guard.begin_to_end() else None
+
+    async def _end_by_all_means(self, drive: Operations) -> BaseException | None:
+        """Ends it, or coasts where that fails. Returns what is left to raise: a failure, or a Ctrl-C that came."""
+        interrupted: KeyboardInterrupt | None = None
+        failure: BaseException | None = None
+        for attempt in range(_END_ATTEMPTS + 1):
+            try:
+                await (self._end(drive) if attempt < _END_ATTEMPTS else drive.coast())
+            except DrivebusError as error:
+                failure = error
+            except KeyboardInterrupt as error:
+                # A second Ctrl-C must not leave the motor running: it is raised once the drive was told to stop.
+                interrupted = error
+            else:
+                failure = None
+                break
+        return failure or interrupted
