@@ -5,14 +5,10 @@
 use std::time::Duration;
 
 use drivebus_line::{AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Failure, Line, Priority};
-use drivebus_rtu::{
-    Adu, Answer, DataBits, Destination, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits,
-    UnitAddress,
-};
+use drivebus_rtu::{Adu, Answer, Destination, FIRST_CONTACT, Instant, Request, SerialFormat, UnitAddress};
 use drivebus_sim::{FaultKind, Options, Side, Simulator};
 
 const STATE: u16 = 0x2100;
-const RESPONSE_DELAY: u16 = 0x0E03; // P14.03
 
 fn unit(raw: u8) -> UnitAddress {
     UnitAddress::new(raw).unwrap()
@@ -54,31 +50,6 @@ fn ask(bus: &Bus, unit_address: u8, request: &Request<'_>) -> Result<(Vec<u16>, 
 
 fn read(bus: &Bus, address: u16, count: u16) -> Result<Vec<u16>, Box<CallError>> {
     Ok(ask(bus, 1, &Request::read(address, count).unwrap())?.0)
-}
-
-/// The shortest cycle the protocol allows: request, silence, answer, silence. Nothing on top of it, and never less.
-#[test]
-fn the_line_is_idle_only_when_the_protocol_says_so() {
-    for baud_rate in [9_600, 19_200, 115_200] {
-        for count in [1, 16] {
-            let format =
-                SerialFormat::new(baud_rate, DataBits::Eight, Parity::Even, StopBits::One, Silence::Spec).unwrap();
-            let simulator = simulator(format);
-            let bus = bus(&simulator, BusOptions::new(format));
-            ask(&bus, 1, &Request::write(RESPONSE_DELAY, 0)).unwrap();
-            let request = Request::read(0x3000, count).unwrap();
-            let first = ask(&bus, 1, &request).unwrap().1;
-            let mut last = first;
-            for _ in 0..100 {
-                last = ask(&bus, 1, &request).unwrap().1;
-            }
-            let cycle = last.sent.saturating_duration_since(first.sent) / 100;
-            let answer = 5 + 2 * u32::from(count);
-            let shortest = format.chars(8) + format.t35() + format.chars(answer) + format.t35();
-            assert_eq!(cycle, shortest, "{count} words at {format}");
-            assert_eq!(simulator.wire().silence_violations(), 0);
-        }
-    }
 }
 
 #[test]
