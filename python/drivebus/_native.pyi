@@ -113,6 +113,8 @@ class Bus:
         read_only: bool = False,
         rs485: Mapping[str, object] | None = None,
         echo: str = "auto",
+        turnaround: float = 0.1,
+        learn_timeout: bool = False,
     ) -> Bus:
         """Opens *port*.
 
@@ -168,6 +170,8 @@ class Bus:
         write is repeated only while the unit shows other words. With *connection*, the `reconnects` that the caller
         knows, nothing is sent where the port was opened again since: PortError.
         """
+    def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None:
+        """What *unit* needs otherwise than the bus, in seconds; None keeps what the bus has."""
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
     @property

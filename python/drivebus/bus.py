@@ -43,6 +43,10 @@ class Bus:
         read_only: Refuse every write before it is sent.
         rs485: Kernel RS-485 settings, for ports whose driver switches direction.
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.
+        turnaround: Seconds that units are given to act on a broadcast; nothing is sent meanwhile.
+        learn_timeout: Give a unit that is read no longer than its answers have taught: four times the longest delay of
+            its last 32 answers, at least 50 ms, beside the time the characters take; never longer than *timeout*. The
+            next read after silence waits the whole *timeout* again. What `poll` asks waits so in any case.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.
@@ -70,7 +74,10 @@ class Bus:
         read_only: bool = False,
         rs485: Mapping[str, object] | None = None,
         echo: str = "auto",
+        turnaround: float = 0.1,
+        learn_timeout: bool = False,
     ) -> None:
+        turnaround = checks.number("turnaround", turnaround, 0.0, 3600.0)
         timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         retries = checks.whole("retries", retries, 0, 100)
         asked = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
@@ -81,7 +88,15 @@ class Bus:
         if isinstance(target, Simulator):
             target = target._native if target.transport == "process" else target.port
         self._native = _native.Bus(
-            target, self.format, timeout=timeout, retries=retries, read_only=read_only, rs485=rs485, echo=echo
+            target,
+            self.format,
+            timeout=timeout,
+            retries=retries,
+            read_only=read_only,
+            rs485=rs485,
+            echo=echo,
+            turnaround=turnaround,
+            learn_timeout=learn_timeout,
         )
         self._timeout = timeout
 
@@ -195,6 +210,21 @@ class Bus:
             connection = checks.whole("connection", connection, 0, 2**63)
         unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
         self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
+
+    def configure(self, unit: int, *, timeout: float | None = None, gap: float | None = None) -> None:
+        """Sets what *unit* needs otherwise than the bus, for every call from now on. None keeps what the bus has.
+
+        Args:
+            unit: Its address, 1..247.
+            timeout: Seconds it is given to answer.
+            gap: Seconds of silence before a request to it, where it needs more than the silence between frames: some
+                units are deaf for a while after they answered.
+        """
+        if timeout is not None:
+            timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        if gap is not None:
+            gap = checks.number("gap", gap, 0.0, 3600.0)
+        self._native.configure(checks.unit(unit), timeout=timeout, gap=gap)
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""

@@ -1,10 +1,11 @@
 //! The bus as its callers see it: safe from any thread, one exchange at a time, retries by kind.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::Line;
 use crate::call::{Call, CallOptions};
@@ -19,6 +20,7 @@ use crate::punctual;
 use crate::queue::{LOOK_UP, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
+use crate::units::UnitOptions;
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]
@@ -33,12 +35,27 @@ pub struct BusOptions {
     pub read_only: bool,
     /// What is known about the adapter sending our own bytes back.
     pub echo: AdapterEcho,
+    /// How long units are given to act on a broadcast, in which nothing is sent.
+    pub turnaround: Duration,
+    /// Whether a read waits no longer than its unit's answers have taught: four times the longest delay of the last 32,
+    /// at least 50 ms, beside the time that the answer's characters take, and never longer than the time-out. What is
+    /// polled waits so in any case.
+    pub learn_timeout: bool,
 }
 
 impl BusOptions {
-    /// Half a second, two retries of reads, writing allowed, the adapter's echo found out.
+    /// Half a second, two retries of reads, writing allowed, the adapter's echo found out, the turnaround delay of the
+    /// specification, no time-outs that learn.
     pub const fn new(format: SerialFormat) -> Self {
-        Self { format, timeout: Duration::from_millis(500), retries: 2, read_only: false, echo: AdapterEcho::Auto }
+        Self {
+            format,
+            timeout: Duration::from_millis(500),
+            retries: 2,
+            read_only: false,
+            echo: AdapterEcho::Auto,
+            turnaround: TURNAROUND,
+            learn_timeout: false,
+        }
     }
 }
 
@@ -57,6 +74,7 @@ pub struct Bus {
     /// What the system refused to the threads of the bus's own.
     priority_refused: OnceLock<String>,
     options: BusOptions,
+    units: Mutex<BTreeMap<UnitAddress, UnitOptions>>,
     name: String,
     closed: AtomicBool,
     opened_by: Process,
@@ -112,6 +130,7 @@ impl Bus {
             priority_refused: OnceLock::new(),
             owner: Mutex::new(owner),
             options,
+            units: Mutex::default(),
             name,
             closed: AtomicBool::new(false),
             opened_by: Process::current(),
@@ -181,8 +200,7 @@ impl Bus {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let timeout = options.timeout.unwrap_or(self.options.timeout);
-        let ask = Ask { destination, request, timeout, in_doubt: options.in_doubt };
+        let ask = self.ask(destination, request, &options);
         if !self.opened_by.is_current() {
             return Err(ask.failed(Failure::Forked, None, Instant::ZERO, &[]));
         }
@@ -199,6 +217,36 @@ impl Bus {
             self.close();
         }
         result
+    }
+
+    /// Sets what `unit` needs otherwise than the bus, for every call from now on.
+    pub fn configure(&self, unit: UnitAddress, options: UnitOptions) {
+        self.units().insert(unit, options);
+    }
+
+    /// What one call asks, with the times that hold for it.
+    fn ask<'a>(&self, destination: Destination, request: &'a Request<'a>, options: &CallOptions) -> Ask<'a> {
+        let (timeout, gap) = match destination {
+            Destination::Broadcast => (self.options.turnaround, Duration::ZERO),
+            Destination::Unit(unit) => {
+                let set = self.units().get(&unit).copied().unwrap_or_default();
+                (set.timeout.unwrap_or(self.options.timeout), set.gap.unwrap_or_default())
+            }
+        };
+        let learns = self.options.learn_timeout || options.priority == Some(Priority::Poll);
+        Ask {
+            destination,
+            request,
+            timeout: options.timeout.unwrap_or(timeout),
+            learns: learns && options.timeout.is_none(),
+            gap,
+            in_doubt: options.in_doubt,
+        }
+    }
+
+    /// A thread that panicked cannot have left them half set.
+    fn units(&self) -> MutexGuard<'_, BTreeMap<UnitAddress, UnitOptions>> {
+        self.units.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Of the last ten exchanges with `unit`, how many brought an answer.

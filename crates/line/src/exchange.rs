@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request, TURNAROUND};
+use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request};
 
 use crate::Line;
 use crate::error::{CallError, Failure};
@@ -15,7 +15,12 @@ use crate::queue::LOOK_UP;
 pub(crate) struct Ask<'a> {
     pub(crate) destination: Destination,
     pub(crate) request: &'a Request<'a>,
+    /// How long to wait after the request: for the answer, or for the units to act on a broadcast.
     pub(crate) timeout: Duration,
+    /// Whether a read waits no longer than its unit's answers have taught.
+    pub(crate) learns: bool,
+    /// The least silence before it, if that is more than every request keeps.
+    pub(crate) gap: Duration,
     /// Whether it goes out at once, even to a unit that may still answer something else.
     pub(crate) in_doubt: bool,
 }
@@ -41,14 +46,6 @@ impl Ask<'_> {
         let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
         Box::new(CallError { failure, destination, request, raw, sent, ended })
     }
-
-    /// How long to wait after the request: for the answer, or for the units to act on a broadcast.
-    fn patience(&self) -> Duration {
-        match self.destination {
-            Destination::Unit(_) => self.timeout,
-            Destination::Broadcast => TURNAROUND,
-        }
-    }
 }
 
 /// Sends one request over `line` and gives its answer to `take`.
@@ -62,8 +59,9 @@ pub(crate) fn exchange(
     let mut sent = None;
     let mut now = line.now();
     let mut looked_up = now;
+    master.keep_gap(ask.gap);
     let begin = if ask.in_doubt { Master::begin_in_doubt } else { Master::begin };
-    begin(master, now, ask.destination, ask.request, ask.patience())
+    begin(master, now, ask.destination, ask.request, ask.timeout)
         .map_err(|error| ask.failed(Failure::NotBegun(error), sent, now, &[]))?;
 
     let mut pace = line.char_time().map(Pace::new);
@@ -155,7 +153,7 @@ fn conclude(
     ended: Instant,
     take: &mut dyn FnMut(Answer<'_>),
 ) -> Result<Done, Box<CallError>> {
-    let timeout = ask.patience();
+    let timeout = ask.timeout;
     let (failure, raw) = match (event, sent) {
         (Event::Answer(answer @ Answer::Exception { function, code, .. }), _) => {
             // An exception is known by its two bytes: the frame that came is the one that is made here.

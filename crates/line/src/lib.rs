@@ -30,6 +30,7 @@ pub mod rs485;
 mod stats;
 pub mod tcp;
 pub mod tty;
+mod units;
 
 pub use bus::{Bus, BusOptions};
 pub use call::CallOptions;
@@ -43,3 +44,4 @@ pub use owner::AdapterEcho;
 pub use port::{Line, PortError, PortErrorKind};
 pub use queue::Priority;
 pub use stats::{Counters, Latency, Stats};
+pub use units::UnitOptions;

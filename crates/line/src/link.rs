@@ -91,7 +91,14 @@ mod tests {
 
     fn failed(failure: Failure) -> Result<Done, Box<CallError>> {
         let request = Request::read(0x2100, 1).unwrap();
-        let ask = Ask { destination: unit(1).into(), request: &request, timeout: Duration::ZERO, in_doubt: false };
+        let ask = Ask {
+            destination: unit(1).into(),
+            request: &request,
+            timeout: Duration::ZERO,
+            learns: false,
+            gap: Duration::ZERO,
+            in_doubt: false,
+        };
         Err(ask.failed(failure, None, Instant::ZERO, &[]))
     }
 

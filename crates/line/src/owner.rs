@@ -13,6 +13,7 @@ use crate::link::{Link, Links};
 use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
+use crate::units::Delays;
 
 /// What is known about the adapter sending our own bytes back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +58,8 @@ pub(crate) struct Owner {
     echo: AdapterEcho,
     resync: Resync,
     links: Links,
+    delays: Delays,
+    format: SerialFormat,
     /// Units that do not answer.
     pub(crate) dead: DeadUnits,
     words: Arc<FreshWords>,
@@ -87,6 +90,8 @@ impl Owner {
             echo,
             resync: Resync::default(),
             links: Links::default(),
+            delays: Delays::default(),
+            format,
             dead: DeadUnits::default(),
             words,
             stats: Arc::default(),
@@ -299,14 +304,23 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let result = match self.line.as_deref_mut() {
-            Some(line) => exchange(line, &mut self.master, ask, give_up, take),
-            None => Err(ask.failed(Failure::Closed, None, Instant::ZERO, &[])),
-        };
         let unit = match ask.destination {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
         };
+        let ask = &self.within_patience(ask);
+        let result = match self.line.as_deref_mut() {
+            Some(line) => exchange(line, &mut self.master, ask, give_up, take),
+            None => Err(ask.failed(Failure::Closed, None, Instant::ZERO, &[])),
+        };
+        let delay = result.as_ref().ok().map(|done| self.delay(ask, done));
+        if let (Some(unit), Some(delay), Request::ReadHolding { .. }) = (unit, delay, ask.request) {
+            self.delays.answered(unit, delay);
+        } else if let (Some(unit), true, Err(error)) = (unit, ask.learns, &result)
+            && matches!(error.failure, Failure::NoAnswer { .. })
+        {
+            self.delays.silent(unit);
+        }
         if result.is_ok() && unit.is_some() {
             self.opener.answered();
         }
@@ -330,7 +344,9 @@ impl Owner {
             counters.requests += u64::from(sent);
             counters.add(tally);
             match &result {
-                Ok(done) => counters.answered(done.ended.saturating_duration_since(done.sent)),
+                Ok(done) => {
+                    counters.answered(done.ended.saturating_duration_since(done.sent), delay.unwrap_or_default());
+                }
                 Err(error) => match error.failure {
                     Failure::NoAnswer { .. } => counters.timeouts += 1,
                     Failure::Corrupt(_) => counters.crc_errors += 1,
@@ -346,6 +362,29 @@ impl Owner {
             self.line = None;
         }
         result
+    }
+
+    /// `ask`, with the time-out that its unit's answers have taught, if that is to hold for it and is shorter.
+    fn within_patience<'a>(&self, ask: &Ask<'a>) -> Ask<'a> {
+        match (ask.destination, ask.request) {
+            (Destination::Unit(unit), Request::ReadHolding { .. }) if ask.learns => {
+                let learned = self.delays.patience(unit).map(|patience| patience + self.answer_time(ask));
+                Ask { timeout: learned.map_or(ask.timeout, |learned| learned.min(ask.timeout)), ..*ask }
+            }
+            _ => *ask,
+        }
+    }
+
+    /// How long the characters of the right answer take, where its length is known.
+    fn answer_time(&self, ask: &Ask<'_>) -> Duration {
+        self.format.chars(ask.request.expected().adu_len().map_or(0, |len| u32::try_from(len).unwrap_or(0)))
+    }
+
+    /// How long the unit took: from the last character of the request to the first of the answer.
+    fn delay(&self, ask: &Ask<'_>, done: &Done) -> Duration {
+        let request = Adu::request(ask.destination, ask.request).as_bytes().len();
+        let on_the_wire = self.format.chars(u32::try_from(request).unwrap_or(u32::MAX)) + self.answer_time(ask);
+        done.ended.saturating_duration_since(done.sent).saturating_sub(on_the_wire)
     }
 
     /// Keeps what the exchange has shown about the adapter and the line.

@@ -53,6 +53,9 @@ pub struct Counters {
     pub own_echoes: u64,
     /// From the first bit of the request to the last byte of the answer.
     pub round_trip: Latency,
+    /// From the last character of the request to the first of the answer, as the times of characters are computed: how
+    /// long the unit, the adapter and this machine took.
+    pub delay: Latency,
 }
 
 /// Shortest, longest and mean of a time.
@@ -100,9 +103,10 @@ impl Counters {
         self.own_echoes += u64::from(tally.own_echo);
     }
 
-    pub(crate) fn answered(&mut self, round_trip: Duration) {
+    pub(crate) fn answered(&mut self, round_trip: Duration, delay: Duration) {
         self.answers += 1;
         self.round_trip.add(round_trip);
+        self.delay.add(delay);
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
     AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, PortError, PortErrorKind, Priority,
+    UnitOptions,
 };
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 use pyo3::prelude::*;
@@ -28,7 +29,8 @@ pub(crate) struct Bus {
 #[pymethods]
 impl Bus {
     #[new]
-    #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto"))]
+    #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
+        turnaround = 0.1, learn_timeout = false))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
         py: Python<'_>,
@@ -39,6 +41,8 @@ impl Bus {
         read_only: bool,
         rs485: Option<&Bound<'_, PyDict>>,
         echo: &str,
+        turnaround: f64,
+        learn_timeout: bool,
     ) -> PyResult<Self> {
         let echo = match echo {
             "auto" => AdapterEcho::Auto,
@@ -47,8 +51,9 @@ impl Bus {
             other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
         };
         let (opener, format) = open::opener(port, format.0, rs485)?;
-        let options =
-            BusOptions { timeout: duration("timeout", timeout)?, retries, read_only, echo, ..BusOptions::new(format) };
+        let timeout = duration("timeout", timeout)?;
+        let turnaround = duration("turnaround", turnaround)?;
+        let options = BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout };
         let core =
             with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(|failure| match failure {
                 Failure::Port(error) => port_error(&error),
@@ -188,6 +193,14 @@ impl Bus {
             },
         )?;
         Ok(PyBytes::new(py, &reply))
+    }
+
+    #[pyo3(signature = (unit, /, *, timeout = None, gap = None))]
+    fn configure(&self, unit: &Bound<'_, PyAny>, timeout: Option<f64>, gap: Option<f64>) -> PyResult<()> {
+        let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
+        let gap = gap.map(|time| duration("gap", time)).transpose()?;
+        self.core.configure(unit_address(unit)?, UnitOptions { timeout, gap });
+        Ok(())
     }
 
     #[pyo3(signature = (unit, /))]
@@ -347,11 +360,13 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
     all.set_item("noise_bytes", figures.noise_bytes)?;
     all.set_item("noise_idle", figures.noise_idle)?;
     all.set_item("own_echoes", figures.own_echoes)?;
-    let latency = PyDict::new(py);
-    latency.set_item("min", figures.round_trip.min.as_secs_f64())?;
-    latency.set_item("mean", figures.round_trip.mean().as_secs_f64())?;
-    latency.set_item("max", figures.round_trip.max.as_secs_f64())?;
-    all.set_item("round_trip", latency)?;
+    for (name, latency) in [("round_trip", &figures.round_trip), ("delay", &figures.delay)] {
+        let times = PyDict::new(py);
+        times.set_item("min", latency.min.as_secs_f64())?;
+        times.set_item("mean", latency.mean().as_secs_f64())?;
+        times.set_item("max", latency.max.as_secs_f64())?;
+        all.set_item(name, times)?;
+    }
     Ok(all)
 }
 

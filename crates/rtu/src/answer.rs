@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::frame::Frame;
+use crate::frame::{AROUND_PDU, Frame};
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::request::{AnswerLength, MAX_PDU, MAX_READ, Request, RequestError, put_words};
 use crate::{UnitAddress, Words};
@@ -236,6 +236,14 @@ impl Expected {
             Kind::Read { count } => AnswerLength::Bytes(2 + 2 * count as u8),
             Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => AnswerLength::Bytes(5),
             Kind::Custom { answer, .. } => answer,
+        }
+    }
+
+    /// How many bytes the answer has on the wire, unless the unit refuses; `None` where only silence tells.
+    pub const fn adu_len(&self) -> Option<usize> {
+        match self.length() {
+            AnswerLength::Bytes(pdu) => Some(AROUND_PDU + pdu as usize),
+            AnswerLength::BySilence => None,
         }
     }
 

@@ -11,6 +11,8 @@ use crate::{Destination, UnitAddress};
 pub const MAX_ADU: usize = 256;
 /// Fewest bytes of a frame: address, function code and CRC.
 pub const MIN_ADU: usize = 4;
+/// Address and CRC.
+pub(crate) const AROUND_PDU: usize = 1 + CRC_LEN;
 const CRC_LEN: usize = 2;
 
 /// A frame whose CRC is good, borrowed from where it was received.

@@ -13,15 +13,12 @@ use core::time::Duration;
 
 use crate::answer::Expected;
 use crate::frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
-use crate::request::AnswerLength;
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::{Instant, UnitAddress};
 
 /// Twice the longest frame: one that is being received, and whatever came before it.
 const CAPACITY: usize = 2 * MAX_ADU;
 const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
-/// Address, CRC.
-const AROUND_PDU: usize = 3;
 /// Address, function code, exception code or byte count, CRC.
 const EXCEPTION_ADU: usize = 5;
 /// Address, function code, two words, CRC.
@@ -341,10 +338,7 @@ impl Framer {
 
     /// How long the answer looked for is; `None` where only silence tells, or none is looked for.
     fn answer_len(&self) -> Option<usize> {
-        match self.expect?.1.length() {
-            AnswerLength::Bytes(len) => Some(AROUND_PDU + usize::from(len)),
-            AnswerLength::BySilence => None,
-        }
+        self.expect?.1.adu_len()
     }
 
     /// Whether `here`, which begins as the answer looked for, only lacks its end.

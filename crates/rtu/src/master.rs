@@ -29,6 +29,8 @@ pub const TURNAROUND: Duration = Duration::from_millis(100);
 #[derive(Debug, Clone)]
 pub struct Master {
     silence: Duration,
+    /// The least silence before the next request, if that is more.
+    gap: Duration,
     framer: Framer,
     state: State,
     request: Adu,
@@ -82,6 +84,7 @@ impl Master {
     pub const fn with_silence(silence: Duration) -> Self {
         Self {
             silence,
+            gap: Duration::ZERO,
             framer: Framer::new(silence),
             state: State::Idle,
             request: Adu::new(),
@@ -144,8 +147,14 @@ impl Master {
         // Nothing is known of a line that was never watched: it may be busy now.
         self.busy.get_or_insert(now);
         let job = Job { destination, expected: request.expected(), timeout };
-        self.state = State::Quiet { job, give_up: now + self.silence + timeout };
+        self.state = State::Quiet { job, give_up: now + self.quiet_time() + timeout };
         Ok(())
+    }
+
+    /// From the next request on keeps the line silent for at least `gap` before each, where that is more than the
+    /// silence between frames: some units need longer until they listen again.
+    pub const fn keep_gap(&mut self, gap: Duration) {
+        self.gap = gap;
     }
 
     /// Says that the bytes of [`Event::Transmit`] are on their way and that the last will have left at `end`.
@@ -317,7 +326,11 @@ impl Master {
     }
 
     fn silent_at(&self) -> Instant {
-        self.busy.map_or(Instant::ZERO, |busy| busy + self.silence)
+        self.busy.map_or(Instant::ZERO, |busy| busy + self.quiet_time())
+    }
+
+    fn quiet_time(&self) -> Duration {
+        self.silence.max(self.gap)
     }
 
     fn await_answer(

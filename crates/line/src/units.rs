@@ -1,0 +1,109 @@
+//! What is set for single units, and what their answers have taught about how long to wait for them.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use drivebus_rtu::UnitAddress;
+
+/// What one unit needs otherwise than the bus; `None` keeps what the bus has.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct UnitOptions {
+    /// The longest wait from the end of a request to the end of its answer.
+    pub timeout: Option<Duration>,
+    /// The least silence before a request to the unit, where it needs more than the 3.5 characters of every other.
+    pub gap: Option<Duration>,
+}
+
+/// How many answers are remembered: a few seconds of polling.
+const REMEMBERED: usize = 32;
+
+/// How many must be known before they say what is usual.
+const ENOUGH: usize = 8;
+
+/// So many times the longest usual delay is waited.
+const MARGIN: u32 = 4;
+
+/// Never less than this, in addition to the time the answer's own characters take: an adapter holds bytes back for 16 ms,
+/// and a busy machine looks at them later still.
+const FLOOR: Duration = Duration::from_millis(50);
+
+/// The delays of the units of a line: from the end of a request to the first character of its answer.
+#[derive(Debug, Default)]
+pub(crate) struct Delays(BTreeMap<UnitAddress, Delay>);
+
+#[derive(Debug, Default)]
+struct Delay {
+    /// The last ones; the oldest is at `next` once all are there.
+    last: Vec<Duration>,
+    next: usize,
+}
+
+impl Delays {
+    /// `unit` took `delay` before it answered.
+    pub(crate) fn answered(&mut self, unit: UnitAddress, delay: Duration) {
+        let known = self.0.entry(unit).or_default();
+        if known.last.len() < REMEMBERED {
+            known.last.push(delay);
+        } else {
+            known.last[known.next] = delay;
+            known.next = (known.next + 1) % REMEMBERED;
+        }
+    }
+
+    /// `unit` did not answer in the time that was learned: what was usual is not any more.
+    pub(crate) fn silent(&mut self, unit: UnitAddress) {
+        self.0.remove(&unit);
+    }
+
+    /// How long to wait for the first character of an answer of `unit`; `None` while too little is known.
+    pub(crate) fn patience(&self, unit: UnitAddress) -> Option<Duration> {
+        let known = self.0.get(&unit).filter(|known| known.last.len() >= ENOUGH)?;
+        let longest = known.last.iter().max()?;
+        Some(longest.saturating_mul(MARGIN).max(FLOOR))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit(raw: u8) -> UnitAddress {
+        UnitAddress::new(raw).unwrap()
+    }
+
+    const fn millis(millis: u64) -> Duration {
+        Duration::from_millis(millis)
+    }
+
+    #[test]
+    fn nothing_is_known_before_enough_answers() {
+        let mut delays = Delays::default();
+        for _ in 1..ENOUGH {
+            delays.answered(unit(1), millis(30));
+            assert_eq!(delays.patience(unit(1)), None);
+        }
+        delays.answered(unit(1), millis(20));
+        assert_eq!(delays.patience(unit(1)), Some(millis(120)), "four times the longest");
+        assert_eq!(delays.patience(unit(2)), None, "each unit has its own");
+    }
+
+    #[test]
+    fn old_answers_are_forgotten_and_the_floor_holds() {
+        let mut delays = Delays::default();
+        delays.answered(unit(1), millis(100));
+        for _ in 1..REMEMBERED {
+            delays.answered(unit(1), millis(1));
+        }
+        assert_eq!(delays.patience(unit(1)), Some(millis(400)));
+        delays.answered(unit(1), millis(1));
+        assert_eq!(delays.patience(unit(1)), Some(FLOOR));
+    }
+
+    #[test]
+    fn a_time_out_forgets_what_was_usual() {
+        let mut delays = Delays::default();
+        (0..ENOUGH).for_each(|_| delays.answered(unit(1), millis(1)));
+        delays.silent(unit(1));
+        assert_eq!(delays.patience(unit(1)), None);
+    }
+}
