@@ -19,7 +19,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual soak-realtime wheel clean \
-        machine format types layers rust-lint rust-test python-test interop-parts examples wheel-smoke
+        machine format types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -32,13 +32,13 @@ help: ## what can be made
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
-	@echo "Parts: format types layers rust-lint rust-test python-test examples wheel-smoke"
+	@echo "Parts: format types layers rust-lint rust-test counts python-test examples wheel-smoke"
 	@echo "       make format changes files, the others only look. Another interpreter: make PYTHON=python3.13 …"
 
 demo: $(VENV)/.wheel
 	$(BIN)/drivebus demo
 
-test: lint rust-test python-test examples wheel-smoke
+test: lint rust-test counts python-test examples wheel-smoke
 	@echo "make test: every check passed"
 
 lint: layers rust-lint types
@@ -94,6 +94,13 @@ rust-test: $(VENV)/.created
 	else \
 	    set -x; $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED); \
 	fi
+
+# What does not depend on the machine's mood: instructions of the hot path, counted by valgrind.
+counts: $(VENV)/.created dist/.wheel interop-parts
+	$(BIN)/python tools/count_instructions.py
+
+counts-update: $(VENV)/.created interop-parts ## after a change of the hot path
+	$(BIN)/python tools/count_instructions.py --update
 
 interop-parts:
 	@sh tools/debian_parts.sh

@@ -1,8 +1,9 @@
 #!/bin/sh
-# Brings mbpoll and libmodbus, which the interop tests talk to, into .tools/ without touching the system.
+# Brings mbpoll and libmodbus, which the interop tests talk to, and valgrind, which counts instructions, into .tools/
+# without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
-# and the tests that need it are skipped (with CI=true they fail).
+# and the checks that need it are skipped (with CI=true they fail).
 set -u
 cd "$(dirname "$0")/.." || exit 1
 tools=$PWD/.tools
@@ -11,14 +12,23 @@ have_program() { command -v mbpoll >/dev/null 2>&1 || [ -x "$tools/usr/bin/mbpol
 have_library() {
     ldconfig -p 2>/dev/null | grep -q 'libmodbus\.so\.5' || ls "$tools"/usr/lib/*/libmodbus.so.5 >/dev/null 2>&1
 }
+# Nothing is counted on other systems.
+have_valgrind() {
+    [ "$(uname -sm)" != "Linux x86_64" ] || command -v valgrind >/dev/null 2>&1 ||
+        [ -x "$tools/usr/libexec/valgrind/callgrind-amd64-linux" ]
+}
+have_all() { have_program && have_library && have_valgrind; }
 lacking() {
-    echo "interop: mbpoll and libmodbus are missing ($1); their tests will be skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5" >&2
+    echo "of mbpoll, libmodbus and valgrind some are missing ($1); the checks that need them will be skipped." >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 valgrind" >&2
     echo "    macOS:           brew install libmodbus, and mbpoll from its source" >&2
     exit 0
 }
 
-have_program && have_library && exit 0
+have_all && exit 0
+packages=
+have_program && have_library || packages="mbpoll libmodbus5"
+have_valgrind || packages="$packages valgrind"
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"
 
 mkdir -p "$tools/apt/lists/partial" "$tools/apt/cache/archives/partial" "$tools/apt/debs"
@@ -28,10 +38,10 @@ as_is="-q -o APT::Sandbox::User=root"
 # Where the system's package lists are empty or old: lists of our own.
 own="$as_is -o Dir::State::lists=$tools/apt/lists -o Dir::Cache=$tools/apt/cache"
 # shellcheck disable=SC2086  # options, to be split
-apt-get $as_is download mbpoll libmodbus5 ||
-    { apt-get $own update && apt-get $own download mbpoll libmodbus5; } ||
+apt-get $as_is download $packages ||
+    { apt-get $own update && apt-get $own download $packages; } ||
     lacking "apt-get could not download them"
 for deb in ./*.deb; do
     dpkg -x "$deb" "$tools" || lacking "$deb could not be unpacked"
 done
-have_program && have_library || lacking "the packages do not hold them"
+have_all || lacking "the packages do not hold them"
