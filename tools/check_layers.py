@@ -37,8 +37,12 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
         r"\bstd::(?:net|thread|process)\b|\bstd::time::(?!Duration\b)|\bInstant::now\b|\bSystemTime\b|\bunsafe\b"
     ),
     "line": re.compile(r"\bunsafe\b"),
+    "python": re.compile(r"\bunsafe\b"),
     "sim": re.compile(r"\bunsafe\b"),
 }
+
+# The one file with `unsafe`, which says why: two ioctls that no crate offers.
+UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
 
 # Modules of ours that each Python module may import. `drivebus` is the public package itself; `__init__` makes it.
 # What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
@@ -96,12 +100,14 @@ def crate_findings(root: Path) -> Iterator[str]:
 
     for crate, pattern in FORBIDDEN_IN_CRATE.items():
         for path in sorted((root / "crates" / crate / "src").rglob("*.rs")):
+            if path == root / UNSAFE_ALLOWED:
+                continue
             for match in pattern.finditer(code_of(path)):
                 yield f"{path.relative_to(root)}: must not use `{match[0]}`"
     if "#![no_std]" not in (root / "crates/rtu/src/lib.rs").read_text(encoding="utf-8"):
         yield "crates/rtu/src/lib.rs: lacks #![no_std]"
-    if 'unsafe_code = "forbid"' not in (root / "Cargo.toml").read_text(encoding="utf-8"):
-        yield 'Cargo.toml: [workspace.lints.rust] lacks unsafe_code = "forbid"'
+    if 'unsafe_code = "deny"' not in (root / "Cargo.toml").read_text(encoding="utf-8"):
+        yield 'Cargo.toml: [workspace.lints.rust] lacks unsafe_code = "deny"'
     for crate in CRATES:
         if not re.search(r"\[lints\]\s+workspace = true", (root / "crates" / crate / "Cargo.toml").read_text("utf-8")):
             yield f"crates/{crate}/Cargo.toml: lacks [lints] workspace = true"
@@ -168,7 +174,8 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ("crates/rtu/src/crc.rs", "//!", "use std::time::Instant;\n//!", "rtu/src/crc.rs: must not use `std::`"),
     ("crates/rtu/src/crc.rs", "//!", "unsafe fn f() {}\n//!", "rtu/src/crc.rs: must not use `unsafe`"),
     ("crates/rtu/Cargo.toml", "[lints]\nworkspace = true", "", "crates/rtu/Cargo.toml: lacks [lints]"),
-    ("Cargo.toml", 'unsafe_code = "forbid"', 'unsafe_code = "warn"', "Cargo.toml: [workspace.lints.rust] lacks"),
+    ("Cargo.toml", 'unsafe_code = "deny"', 'unsafe_code = "warn"', "Cargo.toml: [workspace.lints.rust] lacks"),
+    ("crates/line/src/tty.rs", "//!", "unsafe fn f() {}\n//!", "line/src/tty.rs: must not use `unsafe`"),
     (
         "crates/drives/Cargo.toml",
         HEAD,

@@ -27,6 +27,7 @@ __all__ = [
     "encode_read",
     "encode_write",
     "fault_kinds",
+    "port_facts",
 ]
 
 def crc16(data: Buffer, /) -> int:
@@ -55,6 +56,18 @@ def decode(frame: Buffer) -> dict[str, Any]:
 
     `kind` is `"read"`, `"write"`, `"write_many"`, `"echo"` (requests and answers that look alike),
     `"read_answer"`, `"write_many_answer"`, `"exception"`, `"other"`. Raises CrcError, BadAnswer.
+    """
+
+def port_facts(
+    path: str | os.PathLike[str],
+    *,
+    by_id: str | os.PathLike[str] | None = None,
+    tty_class: str | os.PathLike[str] | None = None,
+) -> dict[str, Any]:
+    """What the system tells of the port at *path* without opening it.
+
+    `driver`, `adapter`, `latency_timer_ms`, `latency_rule` (each may be None), `holders`. *by_id* and *tty_class* are
+    other folders than this machine's.
     """
 
 @final
@@ -115,6 +128,7 @@ class Bus:
         echo: str = "auto",
         turnaround: float = 0.1,
         learn_timeout: bool = False,
+        low_latency: bool = True,
     ) -> Bus:
         """Opens *port*.
 
@@ -133,6 +147,8 @@ class Bus:
         """Seconds on the line's clock: real time, or the simulation's."""
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock; a signal ends it at once."""
+    def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
+        """What comes while nothing is asked: pieces, each with its moment on the line's clock."""
     def read(
         self,
         unit: int,
@@ -184,7 +200,10 @@ class Bus:
     def transact(self, unit: int, pdu: Buffer, reply_length: int | None = None, /) -> bytes:
         """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known."""
     def stats(self) -> dict[str, Any]:
-        """`{"requests": …, …, "hints": ["…"], "units": {1: {…}}}`; counters are ints, latencies seconds."""
+        """`{"requests": …, …, "hints": ["…"], "hint_names": ["no_bias"], "units": {1: {…}}}`.
+
+        Counters are ints, latencies seconds.
+        """
 
 @final
 class Profile:

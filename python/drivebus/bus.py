@@ -41,12 +41,14 @@ class Bus:
         retries: How often a *read* is repeated after silence; a damaged answer, which took no time-out, counts half.
             Writes are never repeated, unless they can be read back: see `write`.
         read_only: Refuse every write before it is sent.
-        rs485: Kernel RS-485 settings, for ports whose driver switches direction.
+        rs485: Direction control, for ports wired to a bare transceiver: `{"mode": "kernel"}` by the driver, `"rts"` by
+            this program, `"auto"` by whichever can; with `rts_on_send`, `delay_before_ms`, `delay_after_ms`.
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.
         turnaround: Seconds that units are given to act on a broadcast; nothing is sent meanwhile.
         learn_timeout: Give a unit that is read no longer than its answers have taught: four times the longest delay of
             its last 32 answers, at least 50 ms, beside the time the characters take; never longer than *timeout*. The
             next read after silence waits the whole *timeout* again. What `poll` asks waits so in any case.
+        low_latency: Whether an adapter that keeps what it receives (FTDI: 16 ms) is told to hurry while it is open.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.
@@ -76,10 +78,13 @@ class Bus:
         echo: str = "auto",
         turnaround: float = 0.1,
         learn_timeout: bool = False,
+        low_latency: bool = True,
     ) -> None:
         turnaround = checks.number("turnaround", turnaround, 0.0, 3600.0)
         timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         retries = checks.whole("retries", retries, 0, 100)
+        if rs485 is not None and not isinstance(rs485, Mapping):
+            raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
         asked = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
         target = ports.resolve(port, asked)
         self.format = ports.format_of(target, asked)
@@ -93,10 +98,11 @@ class Bus:
             timeout=timeout,
             retries=retries,
             read_only=read_only,
-            rs485=rs485,
+            rs485=None if rs485 is None else dict(rs485),
             echo=echo,
             turnaround=turnaround,
             learn_timeout=learn_timeout,
+            low_latency=low_latency,
         )
         self._timeout = timeout
 
@@ -147,6 +153,13 @@ class Bus:
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock. Ctrl-C ends it at once."""
         self._native.sleep(checks.number("seconds", seconds, 0.0))
+
+    def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
+        """What comes within *seconds* while nothing is asked: pieces, each with its moment on the line's clock.
+
+        On a sound line of one's own that is nothing. Requests of other threads go before, and their answers are theirs.
+        """
+        return self._native.listen(checks.number("seconds", seconds, 0.0))
 
     def read(self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
         """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.

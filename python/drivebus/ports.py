@@ -7,22 +7,55 @@ URLs are opened by pyserial. What is already open is taken as it is.
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl
 
 import serial
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed, PortError
 from drivebus.profile import profiles
 from drivebus.sim import FAULT_KINDS, Simulator
 
-__all__ = ["format_of", "open_simulator", "resolve"]
+__all__ = ["PortFacts", "facts", "format_of", "open_simulator", "resolve"]
 
 _CORE_SCHEMES = ("socket", "tcp")
 _PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
 _SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence", "echo", "faults")
+
+
+@dataclass(frozen=True)
+class PortFacts:
+    """What the system tells of a port without opening it: on Linux, and for ports with a path.
+
+    Attributes:
+        driver: The kernel's driver, such as `"ftdi_sio"`, or None.
+        adapter: What the adapter says of itself over USB, or None.
+        latency_timer_ms: How long the adapter keeps what it receives, in milliseconds; None if that is not known.
+        latency_rule: The udev rule that sets that to its least, where it is more; else None.
+        holders: Programs that have the port open.
+    """
+
+    driver: str | None
+    adapter: str | None
+    latency_timer_ms: int | None
+    latency_rule: str | None
+    holders: list[str]
+
+
+def facts(
+    port: str | os.PathLike[str],
+    *,
+    by_id: str | os.PathLike[str] | None = None,
+    tty_class: str | os.PathLike[str] | None = None,
+) -> PortFacts:
+    """What the system tells of *port*; nothing is opened or sent.
+
+    *by_id* and *tty_class* stand for `/dev/serial/by-id` and `/sys/class/tty`.
+    """
+    return PortFacts(**_native.port_facts(port, by_id=by_id, tty_class=tty_class))
 
 
 def resolve(port: object, line: SerialFormat) -> Any:

@@ -75,6 +75,21 @@ pub enum Hint {
 }
 
 impl Hint {
+    /// What it is called, for programs.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NoBias { .. } => "no_bias",
+            Self::Interference { .. } => "interference",
+            Self::WrongFormat { .. } => "wrong_format",
+            Self::NobodyAnswers { .. } => "nobody_answers",
+            Self::Damaged { .. } => "damaged",
+            Self::AdapterEcho { .. } => "adapter_echo",
+            Self::OtherMaster { .. } => "other_master",
+            Self::TimeoutTooShort { .. } => "timeout_too_short",
+            Self::SilentUnit { .. } => "silent_unit",
+        }
+    }
+
     /// The unit it is about; `None`: the whole line.
     pub fn unit(&self) -> Option<UnitAddress> {
         match *self {

@@ -40,7 +40,7 @@ pub(crate) fn advice(path: &Path) -> String {
 
 /// Those that have locked the port, or else those that have it open.
 #[cfg(target_os = "linux")]
-fn holders(path: &Path) -> Vec<Holder> {
+pub(crate) fn holders(path: &Path) -> Vec<Holder> {
     let Ok(port) = std::fs::metadata(path) else { return Vec::new() };
     let mut processes = linux::lockers(&port);
     if processes.is_empty() {
@@ -53,7 +53,7 @@ fn holders(path: &Path) -> Vec<Holder> {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn holders(_path: &Path) -> Vec<Holder> {
+pub(crate) fn holders(_path: &Path) -> Vec<Holder> {
     Vec::new()
 }
 

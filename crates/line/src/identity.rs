@@ -141,7 +141,7 @@ impl Places {
     /// What is known of the port with this number.
     pub(crate) fn identify(&self, number: DeviceNumber) -> Option<Identity> {
         let link = self.link_to(number);
-        let usb = self.entries().into_iter().find(|entry| number_of_entry(entry) == Some(number)).and_then(|entry| {
+        let usb = self.entry_of(number).and_then(|entry| {
             let mut usb = usb_of(&entry)?;
             usb.alone = !self.plugged_in().iter().any(|(_, other)| usb.is_alike(other) && usb.socket != other.socket);
             Some(usb)
@@ -171,6 +171,11 @@ impl Places {
             Ok(path) if leads_to_it => Found::At(path),
             _ => Found::Nowhere,
         }
+    }
+
+    /// The folder of the port with this number.
+    pub(crate) fn entry_of(&self, number: DeviceNumber) -> Option<PathBuf> {
+        self.entries().into_iter().find(|entry| number_of_entry(entry) == Some(number))
     }
 
     /// The name of the link to the port with this number.

@@ -135,6 +135,19 @@ impl Owner {
         self.line.as_deref_mut()
     }
 
+    /// Counts what came while nothing was asked.
+    pub(crate) fn stray(&mut self, now: Instant, mut bytes: &[u8]) {
+        loop {
+            bytes = &bytes[self.master.receive(now, bytes)..];
+            let _ = self.master.poll(now); // nothing is in flight: it only counts
+            if bytes.is_empty() {
+                break;
+            }
+        }
+        let tally = self.master.take_tally();
+        self.stats().count(None, |counters| counters.add(tally));
+    }
+
     /// Makes ready for a request: opens the line again if it was lost, unless `give_up` says so first.
     pub(crate) fn prepare(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {

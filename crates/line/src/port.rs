@@ -18,7 +18,7 @@ pub trait Line: Send + fmt::Debug {
     /// Hands all of `bytes` to the wire in one piece.
     ///
     /// Returns when the last character will have left the wire, computed from the character time because drivers
-    /// and adapters report it too early. Does not wait for it.
+    /// and adapters report it too early. Does not wait for it, but where it has to switch the direction afterwards.
     ///
     /// # Errors
     ///
@@ -66,6 +66,13 @@ pub trait Line: Send + fmt::Debug {
     /// Whether it leads over a gateway, which may hand on answers in another order than they were asked for.
     fn may_overtake(&self) -> bool {
         false
+    }
+
+    /// How late a character may be handed over after it was on the wire, because an adapter collects what it receives.
+    ///
+    /// A time-out shorter than the unit's own time and this hears no answer. A silence is seen this much late, never early.
+    fn latency(&self) -> Duration {
+        Duration::ZERO
     }
 
     /// What the user should know about this line, such as a setting that did not reach the wire.

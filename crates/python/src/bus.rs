@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
-    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, PortError, PortErrorKind, Priority,
-    UnitOptions,
+    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind,
+    Priority, UnitOptions,
 };
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 use pyo3::prelude::*;
@@ -30,7 +30,7 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-        turnaround = 0.1, learn_timeout = false))]
+        turnaround = 0.1, learn_timeout = false, low_latency = true))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
         py: Python<'_>,
@@ -43,6 +43,7 @@ impl Bus {
         echo: &str,
         turnaround: f64,
         learn_timeout: bool,
+        low_latency: bool,
     ) -> PyResult<Self> {
         let echo = match echo {
             "auto" => AdapterEcho::Auto,
@@ -50,7 +51,7 @@ impl Bus {
             "no" => AdapterEcho::Absent,
             other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
         };
-        let (opener, format) = open::opener(port, format.0, rs485)?;
+        let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
         let timeout = duration("timeout", timeout)?;
         let turnaround = duration("turnaround", turnaround)?;
         let options = BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout };
@@ -90,6 +91,20 @@ impl Bus {
     fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = duration("seconds", seconds)?;
         with_signals(py, |give_up| self.core.sleep(time, give_up))
+    }
+
+    #[pyo3(signature = (seconds, /))]
+    fn listen<'py>(&self, py: Python<'py>, seconds: f64) -> PyResult<Vec<(f64, Bound<'py, PyBytes>)>> {
+        let time = duration("seconds", seconds)?;
+        let mut heard = Vec::new();
+        with_signals(py, |give_up| {
+            self.core.listen(time, give_up, &mut |moment, bytes| heard.push((to_seconds(moment), bytes.to_vec())))
+        })?
+        .map_err(|failure| match failure {
+            Failure::Port(error) => port_error(&error),
+            other => port_error(&PortError::new(PortErrorKind::Closed, self.core.name(), other.to_string())),
+        })?;
+        Ok(heard.into_iter().map(|(moment, bytes)| (moment, PyBytes::new(py, &bytes))).collect())
     }
 
     #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
@@ -221,6 +236,7 @@ impl Bus {
         all.set_item("reconnects", stats.reconnects)?;
         all.set_item("notes", notes)?;
         all.set_item("hints", stats.hints().iter().map(ToString::to_string).collect::<Vec<_>>())?;
+        all.set_item("hint_names", stats.hints().iter().map(Hint::name).collect::<Vec<_>>())?;
         let units = PyDict::new(py);
         for (unit, figures) in &stats.units {
             units.set_item(unit.get(), counters(py, figures)?)?;

@@ -29,6 +29,8 @@ mod _native {
     #[pymodule_export]
     use crate::frames::{crc16, decode, decode_answer, encode_echo, encode_read, encode_write};
     #[pymodule_export]
+    use crate::open::port_facts;
+    #[pymodule_export]
     use crate::plan::Plan;
     #[pymodule_export]
     use crate::profile::Profile;

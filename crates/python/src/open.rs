@@ -1,12 +1,13 @@
 //! From what the Python package hands over as a port to a line of the core.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
-use drivebus_line::rs485::Rs485;
+use drivebus_line::rs485::{RTS_MARGIN_MS, Rs485, Switch};
 use drivebus_line::tcp::RtuOverTcp;
 use drivebus_line::tty::{Adapter, TtyOptions};
-use drivebus_line::{Line, Opener};
+use drivebus_line::{Line, Opener, Places};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -24,10 +25,12 @@ pub(crate) fn opener(
     port: &Bound<'_, PyAny>,
     format: SerialFormat,
     rs485: Option<&Bound<'_, PyDict>>,
+    low_latency: bool,
 ) -> PyResult<(Opener, SerialFormat)> {
     let rs485 = rs485.map(rs485_options).transpose()?;
     if let Ok(text) = port.cast::<PyString>() {
-        return Ok((named(text.to_str()?, format, rs485)?, format));
+        let options = TtyOptions { rs485, low_latency, ..TtyOptions::default() };
+        return Ok((named(text.to_str()?, format, options)?, format));
     }
     if rs485.is_some() {
         return Err(not_allowed(String::from("rs485 is for a serial port given by its path")));
@@ -47,12 +50,11 @@ pub(crate) fn opener(
     Ok((Box::new(opener), format))
 }
 
-fn named(port: &str, format: SerialFormat, rs485: Option<Rs485>) -> PyResult<Opener> {
+fn named(port: &str, format: SerialFormat, options: TtyOptions) -> PyResult<Opener> {
     let port = port.to_owned();
     let (scheme, rest) = port.split_once("://").unwrap_or(("", &port));
     match scheme {
         "" => {
-            let options = TtyOptions { rs485, ..TtyOptions::default() };
             let mut adapter = Adapter::new(port, format, options);
             Ok(Box::new(move || Ok(Box::new(adapter.open()?))))
         }
@@ -84,20 +86,59 @@ fn host_and_port(url: &str, rest: &str, usual: Option<u16>) -> PyResult<(String,
 
 fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
     let mut options = Rs485::default();
+    // First, because what is not given depends on it.
+    if let Some(mode) = given.get_item("mode")? {
+        options.switch = match mode.extract::<String>().as_deref() {
+            Ok("kernel") => Switch::Driver,
+            Ok("rts") => Switch::Program,
+            Ok("auto") => Switch::Either,
+            _ => {
+                let mode = mode.repr()?;
+                return Err(not_allowed(format!("rs485: mode {mode} is not \"kernel\", \"rts\" or \"auto\"")));
+            }
+        };
+        if options.switch == Switch::Program {
+            options.delay_after_ms = RTS_MARGIN_MS;
+        }
+    }
     for (key, value) in given {
         let key: String = key.extract()?;
         let bad = |_| not_allowed(format!("rs485: {key} cannot be {value}"));
         match key.as_str() {
+            "mode" => {}
             "enabled" => options.enabled = value.extract().map_err(bad)?,
             "rts_on_send" => options.rts_on_send = value.extract().map_err(bad)?,
             "delay_before_ms" => options.delay_before_ms = value.extract().map_err(bad)?,
             "delay_after_ms" => options.delay_after_ms = value.extract().map_err(bad)?,
             _ => {
                 return Err(not_allowed(format!(
-                    "rs485: {key:?} is not known; known are enabled, rts_on_send, delay_before_ms, delay_after_ms"
+                    "rs485: {key:?} is not known; known are mode, enabled, rts_on_send, delay_before_ms, delay_after_ms"
                 )));
             }
         }
     }
     Ok(options)
+}
+
+/// What the system tells of the port at `path`; `by_id` and `tty_class` are other folders than this machine's, for tests.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "what a function of Python is given, it owns")]
+#[pyo3(signature = (path, *, by_id = None, tty_class = None))]
+pub(crate) fn port_facts(
+    py: Python<'_>,
+    path: PathBuf,
+    by_id: Option<PathBuf>,
+    tty_class: Option<PathBuf>,
+) -> PyResult<Bound<'_, PyDict>> {
+    let mut places = Places::default();
+    places.by_id = by_id.unwrap_or(places.by_id);
+    places.tty_class = tty_class.unwrap_or(places.tty_class);
+    let facts = py.detach(|| places.facts(&path));
+    let all = PyDict::new(py);
+    all.set_item("driver", facts.driver)?;
+    all.set_item("adapter", facts.adapter)?;
+    all.set_item("latency_timer_ms", facts.latency_timer_ms)?;
+    all.set_item("latency_rule", facts.latency_rule)?;
+    all.set_item("holders", facts.holders)?;
+    Ok(all)
 }

@@ -47,7 +47,7 @@ impl Adapter {
             Some(known) => self.whereabouts(known)?,
             None => self.name.clone(),
         };
-        let tty = Tty::open(&name, &self.format, &self.options)
+        let tty = Tty::open_within(&name, &self.format, &self.options, &self.places)
             .map_err(|error| if self.known.is_some() { just_back(error) } else { error })?;
         // Asked of what is open, whose number is given to nothing else meanwhile; the name may lead elsewhere by now.
         let found = tty.device_number().and_then(|number| self.places.identify(number));

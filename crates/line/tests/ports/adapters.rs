@@ -1,7 +1,10 @@
 //! An adapter that was unplugged is found again as the same one, whatever its name is now, and no other is taken for it.
 
+use std::fs;
+use std::path::Path;
+
 use drivebus_line::PortError;
-use drivebus_line::tty::Adapter;
+use drivebus_line::tty::{Adapter, Tty, TtyOptions};
 
 use super::machine::{FTDI, Machine, Usb, point};
 use super::pty::pair;
@@ -101,7 +104,7 @@ fn where_nothing_is_known_the_name_counts() {
     let mut adapter = machine.adapter(&name);
     adapter.open().unwrap();
     drop(first_far);
-    std::fs::remove_file(&name).unwrap();
+    fs::remove_file(&name).unwrap();
     refused(&mut adapter, &["there is no such port"]);
     point(&name, &second);
     let mut line = adapter.open().unwrap();
@@ -182,9 +185,58 @@ fn what_is_no_port_is_no_adapter() {
     refused(&mut adapter, &["there is no such port"]);
     let (_far, path) = pair();
     machine.link("usb-broken", "/nowhere");
-    std::fs::write(machine.places().by_id.join("usb-a-file"), "").unwrap();
-    std::fs::create_dir(machine.places().tty_class.join("ttyEmpty")).unwrap();
+    fs::write(machine.places().by_id.join("usb-a-file"), "").unwrap();
+    fs::create_dir(machine.places().tty_class.join("ttyEmpty")).unwrap();
     let mut adapter = machine.adapter(&path);
     adapter.open().unwrap();
     adapter.open().unwrap();
+}
+
+#[test]
+fn its_latency_timer_is_short_while_it_is_open() {
+    let machine = Machine::new();
+    let (_far, port) = pair();
+    machine.plug("ttyUSB0", &port, FTDI);
+    let timer = machine.latency_timer("ttyUSB0");
+    let shown = || fs::read_to_string(&timer).unwrap().trim().to_owned();
+    fs::write(&timer, "16\n").unwrap();
+
+    let line = machine.adapter(&port).open().unwrap();
+    assert_eq!((shown().as_str(), line.latency()), ("1", Duration::from_millis(1)));
+    assert_eq!(line.char_time(), None, "it hands over lumps");
+    assert!(line.notes()[0].contains("it was 16 ms"), "{:?}", line.notes());
+    drop(line);
+    assert_eq!(shown(), "16");
+
+    let options = TtyOptions { low_latency: false, ..TtyOptions::default() };
+    let line = Tty::open_within(&port, &format(Parity::None), &options, &machine.places()).unwrap();
+    assert_eq!((shown().as_str(), line.notes().len()), ("16", 0));
+    drop(line);
+
+    fs::remove_file(&timer).unwrap();
+    let line = machine.adapter(&port).open().unwrap();
+    assert_eq!((line.latency(), line.notes().len()), (Duration::ZERO, 0));
+    assert!(line.char_time().is_some());
+}
+
+#[test]
+fn the_system_tells_of_a_port_without_opening_it() {
+    let machine = Machine::new();
+    let (_far, port) = pair();
+    machine.plug("ttyUSB0", &port, FTDI);
+    fs::write(machine.latency_timer("ttyUSB0"), "16\n").unwrap();
+    let driver = machine.path("ftdi_sio");
+    fs::create_dir(&driver).unwrap();
+    point(&machine.latency_timer("ttyUSB0").with_file_name("driver"), driver);
+
+    let facts = machine.places().facts(Path::new(&port));
+    assert_eq!((facts.driver.as_deref(), facts.latency_timer_ms), (Some("ftdi_sio"), Some(16)));
+    assert!(facts.adapter.unwrap().contains("serial number A50285BI"));
+    assert!(facts.latency_rule.unwrap().contains("latency_timer"));
+    assert!(facts.holders.is_empty());
+
+    let _line = machine.adapter(&port).open().unwrap();
+    let facts = machine.places().facts(Path::new(&port));
+    assert_eq!((facts.latency_timer_ms, facts.latency_rule), (Some(1), None));
+    assert_eq!(facts.holders.len(), 1);
 }

@@ -85,6 +85,11 @@ impl Machine {
         point(&self.root.join("class").join(tty), entry);
     }
 
+    /// The latency timer of a port that is plugged in, as the driver of FTDI's chips shows it.
+    pub(crate) fn latency_timer(&self, tty: &str) -> PathBuf {
+        self.root.join("class").join(tty).join("device/latency_timer")
+    }
+
     pub(crate) fn unplug(&self, tty: &str) {
         let entry = fs::canonicalize(self.root.join("class").join(tty)).unwrap();
         fs::remove_file(self.root.join("class").join(tty)).unwrap();

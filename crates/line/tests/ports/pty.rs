@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 
-use drivebus_line::rs485::Rs485;
+use drivebus_line::rs485::{Rs485, Switch};
 use drivebus_line::tty::{Tty, TtyOptions};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{ControlModes, tcgetattr};
@@ -221,5 +221,13 @@ fn rs485_mode_is_refused_where_there_is_none() {
     assert!(error.to_string().contains("RS-485"), "{error}");
     let error = refused(Rs485 { delay_after_ms: 101, ..Rs485::default() });
     assert!(error.to_string().contains("101 ms") && error.to_string().contains("0..=100 ms"), "{error}");
+    // A pseudo-terminal has no modem lines either.
+    for switch in [Switch::Program, Switch::Either] {
+        let error = refused(Rs485 { switch, ..Rs485::default() });
+        assert_eq!(error.kind, PortErrorKind::Unsupported);
+        assert!(error.to_string().contains("RTS cannot be moved"), "{error}");
+    }
     open(&path, Parity::Even); // the refusals left nothing locked
+    let off = TtyOptions { rs485: Some(Rs485 { enabled: false, ..Rs485::default() }), ..TtyOptions::default() };
+    Tty::open(&path, &format(Parity::Even), &off).unwrap(); // a driver without the mode has it off
 }
