@@ -12,7 +12,7 @@
 This is not a safety function. An emergency stop is a wire.
 """
 
-from drivebus import rtu, sim
+from drivebus import doctor, rtu, sim
 from drivebus._native import SerialFormat, __version__, crc16
 from drivebus.bus import Bus
 from drivebus.drive import Drive
@@ -75,6 +75,7 @@ __all__ = [
     "Unconfirmed",
     "__version__",
     "crc16",
+    "doctor",
     "profiles",
     "rtu",
     "sim",

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus.cli import look, move, tools
+from drivebus.cli import doctor, look, move, tools
 from drivebus.cli.names import complete_profile
 from drivebus.cli.output import Output
 from drivebus.cli.session import Session, exit_code, parse_format
@@ -103,7 +103,7 @@ def cli(
     context.obj = Session(port, baud, line_format, unit, profile, Output(as_json))
 
 
-for command in (*look.COMMANDS, *move.COMMANDS, *tools.COMMANDS):
+for command in (*look.COMMANDS, *doctor.COMMANDS, *move.COMMANDS, *tools.COMMANDS):
     cli.add_command(command)
 
 

@@ -1,0 +1,109 @@
+"""`drivebus doctor`: what `drivebus.doctor` finds, as it finds it, and an exit code by the worst of it."""
+
+from __future__ import annotations
+
+from contextlib import closing, nullcontext
+from typing import Any
+
+import click
+from click.core import ParameterSource
+from rich.status import Status
+
+import drivebus
+from drivebus.cli.output import Output
+from drivebus.cli.session import EXIT_CODES, Session, parse_format, pass_session
+
+__all__ = ["COMMANDS"]
+
+_SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
+
+
+@click.command()
+@click.argument("port", required=False)
+@click.option("--unit", "-u", type=click.IntRange(1, 247), help="Only this one.  [default: whoever answers]")
+@click.option("--baud", "-b", type=click.IntRange(1), help="Bits per second it should be.  [default: 19200]")
+@click.option(
+    "--format",
+    "line_format",
+    "-f",
+    metavar="8E1",
+    callback=lambda context, parameter, value: value and parse_format(context, parameter, value),
+    help="Data bits, parity and stop bits it should be.  [default: 8E1]",
+)
+@click.option("--full", is_flag=True, help="Every address, baud rate and format, and ten times the echoes; minutes.")
+@click.option("--listen", type=click.FloatRange(0), default=1.0, show_default=True, help="Seconds before asking.")
+@pass_session
+@click.pass_context
+def doctor(
+    context: click.Context,
+    session: Session,
+    port: str | None,
+    unit: int | None,
+    baud: int | None,
+    line_format: tuple[str, str, str] | None,
+    full: bool,
+    listen: float,
+) -> None:
+    """Find what is wrong with an adapter, a line and its units, and say what to do. Reads only.
+
+    Without --unit, addresses 1 to 32 are asked. Where nobody answers, other baud rates and parities are tried.
+    """
+    port = port or session.port
+    if port is None:
+        raise click.UsageError("no port: give it, as in `drivebus doctor /dev/ttyUSB0`; `drivebus ports` lists them")
+    if unit is None and context.find_root().get_parameter_source("unit") is not ParameterSource.DEFAULT:
+        unit = session.unit
+    bits, parity, stop = line_format or session.line_format
+    out = session.out
+    worst: drivebus.doctor.Finding | None = None
+    with Status("", console=out.console) if out.live else nullcontext() as status:
+        findings = drivebus.doctor.examine(
+            port,
+            unit,
+            baudrate=baud or session.baud,
+            bytesize=int(bits),
+            parity=parity,
+            stopbits=int(stop),
+            full=full,
+            listen=listen,
+            tell=status.update if status is not None else None,
+        )
+        # Closing it closes the port, also where Ctrl-C or a full pipe ends this.
+        with closing(findings):
+            for finding in findings:
+                _show(out, finding)
+                if worst is None or finding.severity.rank > worst.severity.rank:
+                    worst = finding
+    if worst is None or not worst.wrong:
+        out.say("Nothing is wrong.")
+        return
+    context.exit(_exit_code(worst))
+
+
+def _show(out: Output, finding: drivebus.doctor.Finding) -> None:
+    if out.as_json:
+        fields: dict[str, Any] = {
+            "step": finding.step,
+            "name": finding.name,
+            "severity": finding.severity,
+            "unit": finding.unit,
+            "text": finding.text,
+            "advice": finding.advice,
+            "values": finding.values,
+            "exit_code": _exit_code(finding),
+        }
+        out.record(fields)
+        return
+    out.say(f"{_SIGNS[finding.severity.value]:<8} {finding.text}")
+    if finding.advice:
+        out.say(f"{'':<8} -> {finding.advice}")
+
+
+def _exit_code(finding: drivebus.doctor.Finding) -> int:
+    """What the process ends with if *finding* is the worst: that of the error which calls end with because of it."""
+    if not finding.wrong or finding.error is None:
+        return 0
+    return next((code for kind, code in EXIT_CODES if issubclass(finding.error, kind)), 1)
+
+
+COMMANDS = [doctor]

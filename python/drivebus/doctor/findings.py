@@ -1,0 +1,62 @@
+"""What an examination says: one finding at a time, in words a technician can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from drivebus.errors import DrivebusError
+
+__all__ = ["Finding", "Severity"]
+
+
+class Severity(Enum):
+    """How bad a finding is."""
+
+    OK = "ok"
+    NOTE = "note"
+    WARNING = "warning"
+    FAULT = "fault"
+
+    @property
+    def rank(self) -> int:
+        """0 for what is well, more for worse."""
+        return list(Severity).index(self)
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        step: `"adapter"`, `"line"` or `"unit"`.
+        name: What was found, such as `"latency_timer"`; the same finding has the same name.
+        severity: Whether that is well, worth knowing, costs something, or keeps the line from working.
+        text: What was seen.
+        advice: What to do about it; empty if nothing.
+        unit: The unit it is about, or None.
+        values: What was measured; times in seconds.
+        error: The kind of error that calls end with because of it; None where none does.
+    """
+
+    step: str
+    name: str
+    severity: Severity
+    text: str
+    advice: str = ""
+    unit: int | None = None
+    values: Mapping[str, Any] = field(default_factory=dict)
+    error: type[DrivebusError] | None = None
+
+    @property
+    def wrong(self) -> bool:
+        """Whether something should be done about it."""
+        return self.severity in (Severity.WARNING, Severity.FAULT)
+
+    def __str__(self) -> str:
+        return f"{self.text}. {self.advice}" if self.advice else self.text

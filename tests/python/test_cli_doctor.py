@@ -1,0 +1,97 @@
+"""`drivebus doctor`: what it prints, what it exits with, and that an interrupt leaves the port free."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import drivebus
+from drivebus.cli import cli
+
+SIM = "sim://1=gd350,2=gd350?clock=virtual&seed=1"
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(cli, words, prog_name="drivebus")
+
+
+def rows(result: Result) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def test_a_sound_line_exits_0_and_says_so() -> None:
+    result = run("doctor", SIM)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.splitlines()[-1] == "Nothing is wrong."
+    assert "WARNING" not in result.stdout
+
+
+def test_each_finding_is_one_object() -> None:
+    found = rows(run("--json", "doctor", SIM, "--unit", "2"))
+    assert all(
+        row.keys() == {"step", "name", "severity", "unit", "text", "advice", "values", "exit_code"} for row in found
+    )
+    assert {row["unit"] for row in found} == {None, 2}
+    assert {row["severity"] for row in found} == {"ok", "note"}
+    [turnaround] = [row for row in found if row["name"] == "turnaround"]
+    assert turnaround["values"].keys() == {"turnaround_min", "turnaround_median", "turnaround_max"}
+
+
+@pytest.mark.parametrize(
+    ("port", "words", "code", "name"),
+    [
+        (SIM, ["--unit", "9"], 3, "nobody_answers"),
+        (f"{SIM}&flip_bit=0.3", ["--unit", "1"], 6, "damaged"),
+        (f"{SIM}&flip_bit=1", ["--unit", "1"], 6, "two_units"),
+        (f"{SIM}&silence=0.3", ["--unit", "1"], 3, "lost_answers"),
+        ("/dev/ttyNoSuchPort", [], 5, "port"),
+    ],
+)
+def test_it_exits_with_the_code_of_the_worst(port: str, words: list[str], code: int, name: str) -> None:
+    result = run("--json", "doctor", port, *words)
+    assert result.exit_code == code
+    [worst] = [row for row in rows(result) if row["name"] == name]
+    assert worst["exit_code"] == code
+    assert worst["advice"] or name == "port"
+    assert "Traceback" not in result.output
+
+
+def test_the_options_before_the_command_count() -> None:
+    found = rows(run("--json", "--port", SIM, "--unit", "2", "--baud", "9600", "--format", "8N1", "doctor"))
+    assert "at 9600 8N1" in found[0]["text"]
+    assert {row["unit"] for row in found} == {None, 2}
+    behind = rows(run("--json", "--port", SIM, "--unit", "2", "doctor", "-u", "1", "-b", "38400", "-f", "8O1"))
+    assert "at 38400 8O1" in behind[0]["text"]
+    assert {row["unit"] for row in behind} == {None, 1}
+
+
+def test_usage_errors_exit_2() -> None:
+    for words in (
+        ["doctor"],
+        ["doctor", SIM, "--format", "9E1"],
+        ["doctor", SIM, "--unit", "0"],
+        ["doctor", "sim://x"],
+    ):
+        assert run(*words).exit_code == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+def test_an_interrupt_leaves_the_port_free() -> None:
+    with drivebus.Simulator({1: "gd350"}) as simulator:
+        command = [sys.executable, "-m", "drivebus", "--json", "doctor", simulator.port, "--listen", "600"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert "opened at" in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=30)
+        assert process.returncode != 0
+        assert "Traceback" not in said
+        with drivebus.Bus(simulator.port) as bus:
+            assert bus.echo(1) > 0
