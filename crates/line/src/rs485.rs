@@ -170,6 +170,15 @@ impl Rs485 {
     }
 }
 
+/// What the driver does unasked, because another program or the board's description said so; `port` is left as it is.
+pub(crate) fn found(port: &dyn Transceiver) -> InForce {
+    let Ok(Some(Taken { before_ms, after_ms, .. })) = port.taken() else { return InForce::default() };
+    let note = format!(
+        "RS-485: the driver switches the direction unasked, {before_ms} ms before and {after_ms} ms after sending"
+    );
+    InForce { by_program: None, driver_before: Duration::from_millis(before_ms.into()), note: Some(note) }
+}
+
 /// Direction control by this program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ByProgram {
@@ -317,6 +326,18 @@ mod tests {
         for has_mode in [true, false] {
             assert_eq!(off.apply(&Driver::new(has_mode, true, Some), "port").unwrap(), InForce::default());
         }
+    }
+
+    #[test]
+    fn a_mode_that_nobody_here_asked_for_is_left_and_counted() {
+        let driver = Driver::new(true, true, Some);
+        assert_eq!(found(&driver), InForce::default());
+        driver.ask(Some(Taken { rts_on_send: true, before_ms: 4, after_ms: 1 })).unwrap();
+        let in_force = found(&driver);
+        assert_eq!(in_force.driver_before, Duration::from_millis(4));
+        assert!(in_force.note.unwrap().contains("4 ms before and 1 ms after"));
+        assert!(driver.mode.borrow().is_some());
+        assert_eq!(found(&Driver::new(false, true, Some)), InForce::default());
     }
 
     /// A wire that takes a millisecond for a byte, and a diary.

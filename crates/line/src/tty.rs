@@ -32,7 +32,7 @@ use crate::holder;
 use crate::identity::{DeviceNumber, Places};
 use crate::latency::LatencyTimer;
 use crate::process::Process;
-use crate::rs485::{InForce, Rs485, Wire};
+use crate::rs485::{self, InForce, Rs485, Wire};
 use crate::{Line, PortError, PortErrorKind};
 use transceiver::Transmission;
 
@@ -134,10 +134,11 @@ impl Tty {
         let made = speed::made(&tty.port);
         configured.map_err(|error| format_error(path, format, made, &error))?;
         tty.notes.extend(made.and_then(|made| speed::note(format.baud_rate(), made)));
-        if let Some(rs485) = options.rs485 {
-            tty.direction = rs485.apply(&tty.port, path)?;
-            tty.notes.extend(tty.direction.note.take());
-        }
+        tty.direction = match options.rs485 {
+            Some(rs485) => rs485.apply(&tty.port, path)?,
+            None => rs485::found(&tty.port),
+        };
+        tty.notes.extend(tty.direction.note.take());
         if options.low_latency
             && let Some(entry) = tty.device_number().and_then(|number| places.entry_of(number))
         {
