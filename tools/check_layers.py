@@ -65,7 +65,7 @@ PYTHON: dict[str, set[str]] = {
     "sim": {"_native", "checks", "errors", "profile"},
     "ports": {"_native", "checks", "errors", "profile", "sim"},
     "bus": {"_native", "checks", "drive", "errors", "ports", "profile", "sim", "values"},
-    "doctor": {"_native", "bus", "checks", "drive", "errors", "ports", "rtu", "values"},
+    "doctor": {"_native", "bus", "checks", "drive", "errors", "ports", "rtu", "sim", "values"},
     "__main__": {"cli"},
     "__init__": {"_native", "bus", "doctor", "drive", "errors", "profile", "rtu", "sim", "values"},
     "cli": {"drivebus", "protocols", "rtu", "sim"},

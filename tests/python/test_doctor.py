@@ -157,6 +157,13 @@ class TestOtherSettings:
 
         assert "wrong_parity" in wrong(list(examine("sim://", 1, open=only_one_speed)))
 
+    @pytest.mark.parametrize("transport", ["tcp", "wire"])
+    def test_nothing_else_is_tried_where_no_speed_can_be_set(self, transport: str) -> None:
+        with Simulator({1: "gd350"}, transport="tcp") as simulator:
+            port: object = simulator.port if transport == "tcp" else Wire(b"")
+            found = named(list(examine(port, 9, listen=0.01)), "nobody_answers")
+        assert "other settings" not in found.text
+
     def test_candidates_are_all_that_drives_can_be_set_to(self) -> None:
         given = Settings(19200)
         short, full = list(candidates(given, full=False)), list(candidates(given, full=True))
@@ -174,12 +181,14 @@ class Wire:
 
     def __init__(self, heard: bytes) -> None:
         self.heard = heard
+        self.sent = b""
 
     def read(self, size: int = 1) -> bytes:
         came, self.heard = self.heard[:size], self.heard[size:]
         return came
 
     def write(self, data: bytes) -> int:
+        self.sent += data
         return len(data)
 
 
@@ -208,6 +217,24 @@ class TestListening:
         assert "01 03 00 04 00 02 85 CA" in text
         assert "address 4" in text
         assert "count 2" in text
+
+    def test_another_master_is_not_disturbed(self) -> None:
+        wire = Wire(READ + ANSWER)
+        assert [finding.name for finding in examine(wire, listen=0.05)] == ["port", "other_master"]
+        assert wire.sent == b""
+
+    def test_another_master_is_found_at_its_own_speed_before_anything_is_asked(self) -> None:
+        wires = []
+
+        def opened(_: object, **options: Any) -> Bus:
+            at_its_speed = (options["baudrate"], options["parity"]) == (38400, "E")
+            wires.append(Wire(READ + ANSWER if at_its_speed else bytes.fromhex("5A 93 41 E6 7C")))
+            return Bus(wires[-1], read_only=True)
+
+        findings = list(examine("/dev/ttyX", listen=0.02, open=opened))
+        assert [finding.name for finding in findings] == ["port", "unknown_traffic", "other_master"]
+        assert findings[-1].values["frames"] == ["01 03 00 04 00 02 85 CA", "01 03 04 13 88 00 00 7E 9D"]
+        assert {wire.sent for wire in wires} == {b""}
 
     @pytest.mark.parametrize("before", [b"", b"\x00", b"\x01\x03", b"\x01\x10\x02"])
     @pytest.mark.parametrize("after", [b"", b"\x00", b"\x01\x03\x00"])

@@ -8,7 +8,9 @@ Sends reads and echoes, never a write: every bus is opened read-only. Each findi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from drivebus import checks
@@ -16,15 +18,19 @@ from drivebus.bus import Bus
 from drivebus.doctor.adapter import adapter_findings, port_finding
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.doctor.search import Settings, candidates, found_elsewhere, look, nobody, units_to_ask
-from drivebus.doctor.traffic import heard_findings
+from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard_findings, overheard
 from drivebus.doctor.unit import unit_findings
 from drivebus.errors import BadAnswer, NoAnswer, PortError
+from drivebus.sim import Simulator
 from drivebus.values import Found
 
 __all__ = ["Finding", "Severity", "examine"]
 
 _MOST_UNITS = 8
 """Units that are looked at one by one, unless everything is."""
+
+_EACH = 0.5
+"""Seconds to listen for another master at each of the settings where one may be."""
 
 _TIMES = 5
 """How often somebody is asked before it counts that no whole answer comes: a bad line is not a wrong setting."""
@@ -87,7 +93,15 @@ def examine(
         options: dict[str, Any] = {**vars(settings), "rs485": rs485, "read_only": True}
         return open(port, **options)
 
-    return _examine(port, unit, Settings(baudrate, bytesize, parity, stopbits), full, listen, echoes, say, opened)
+    given = Settings(baudrate, bytesize, parity, stopbits)
+    return _examine(port, unit, given, full, listen, echoes, say, opened, _has_settings(port))
+
+
+def _has_settings(port: object) -> bool:
+    """Whether another baud rate can be tried on *port*: not behind a server, nor on what is open already."""
+    if isinstance(port, str):
+        return not port.startswith(("socket://", "tcp://"))
+    return isinstance(port, (os.PathLike, Simulator))
 
 
 def _examine(
@@ -99,6 +113,7 @@ def _examine(
     echoes: int,
     tell: Callable[[str], None],
     opened: Callable[[Settings], Bus],
+    tries_settings: bool,
 ) -> Generator[Finding, None, None]:
     tell(f"opening at {given}")
     try:
@@ -106,17 +121,30 @@ def _examine(
     except PortError as error:
         yield port_finding(error)
         return
-    with bus:
+    with ExitStack() as held:
+        held.enter_context(bus)
         yield from adapter_findings(bus, port)
         tell(f"listening for {listen:g} s")
-        yield from heard_findings(bus, listen)
+        heard = ""
+        for finding in heard_findings(bus, listen):
+            heard = finding.name
+            yield finding
+        if heard == UNKNOWN and tries_settings:
+            held.close()
+            other = _another_master(opened, given, full, listen, tell)
+            if other is not None:
+                yield other
+                return
+            bus = held.enter_context(opened(given))
+        if heard == OTHER_MASTER:
+            return
         asked = units_to_ask(unit, full)
         found = look(bus, asked, tell, _TIMES)
         noise = _noise(bus)
     settings = given
     if not _whole(found):
         tried = 0
-        for settings in candidates(given, full):
+        for settings in candidates(given, full) if tries_settings else ():
             try:
                 bus = opened(settings)
             except PortError:  # its driver does not make this speed, or not this format
@@ -141,6 +169,19 @@ def _examine(
         for each in found if full else found[:_MOST_UNITS]:
             yield from unit_findings(bus, each, echoes, tell)
         yield from _hints(bus)
+
+
+def _another_master(
+    opened: Callable[[Settings], Bus], given: Settings, full: bool, listen: float, tell: Callable[[str], None]
+) -> Finding | None:
+    """What makes no frame may be a master at other settings, whose frames must not be spoilt by asking."""
+    for settings in candidates(given, full):
+        tell(f"listening at {settings}")
+        with suppress(PortError), opened(settings) as bus:
+            other = overheard(bus, min(listen, _EACH))
+            if other is not None:
+                return other
+    return None
 
 
 def _whole(found: list[Found]) -> list[Found]:

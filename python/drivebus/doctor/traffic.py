@@ -8,9 +8,13 @@ from drivebus import rtu
 from drivebus._native import crc16
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
+from drivebus.doctor.search import describe
 from drivebus.errors import BadAnswer
 
-__all__ = ["frames_in", "heard_findings", "is_frame"]
+__all__ = ["OTHER_MASTER", "UNKNOWN", "frames_in", "heard_findings", "is_frame", "overheard"]
+
+OTHER_MASTER = "other_master"
+UNKNOWN = "unknown_traffic"
 
 _LONGEST = 2048
 """Bytes that are looked at: over a second of a line at 19200 bit/s."""
@@ -31,16 +35,7 @@ def heard_findings(bus: Bus, seconds: float) -> Iterator[Finding]:
         return
     frames = frames_in(heard[:_LONGEST])
     if frames:
-        shown = "; ".join(f"{frame.hex(' ').upper()} = {_said(frame)}" for frame in frames[:_SHOWN])
-        yield Finding(
-            "line",
-            "other_master",
-            Severity.FAULT,
-            f"{len(frames)} whole frames came in {seconds:g} s while nothing was asked: {shown}",
-            "another master uses the line; a line has one: stop it, or listen only",
-            values={**values, "frames": [frame.hex(" ").upper() for frame in frames[:_SHOWN]]},
-            error=BadAnswer,
-        )
+        yield _other_master(frames, seconds, bus)
         return
     idle = sum(byte in _IDLE for byte in heard)
     if 2 * idle >= len(heard):
@@ -58,13 +53,37 @@ def heard_findings(bus: Bus, seconds: float) -> Iterator[Finding]:
         return
     yield Finding(
         "line",
-        "unknown_traffic",
+        UNKNOWN,
         Severity.WARNING,
         f"{len(heard)} bytes that make no frame came in {seconds:g} s while nothing was asked: "
         f"{heard[:16].hex(' ').upper()}",
         "another master at another baud rate or parity, or interference: stop it; keep the cable away from motor "
         "cables, earth its shield",
         values=values,
+        error=BadAnswer,
+    )
+
+
+def overheard(bus: Bus, seconds: float) -> Finding | None:
+    """Another master, if one is heard within *seconds* at the settings of *bus*."""
+    frames = frames_in(b"".join(piece for _, piece in bus.listen(seconds))[:_LONGEST])
+    return _other_master(frames, seconds, bus) if frames else None
+
+
+def _other_master(frames: list[bytes], seconds: float, bus: Bus) -> Finding:
+    shown = "; ".join(f"{frame.hex(' ').upper()} = {_said(frame)}" for frame in frames[:_SHOWN])
+    return Finding(
+        "line",
+        OTHER_MASTER,
+        Severity.FAULT,
+        f"{len(frames)} whole frames came in {seconds:g} s at {describe(bus)} while nothing was asked: {shown}",
+        "another master uses the line, and a line has one: nothing was asked, so as not to spoil its frames. Stop "
+        "it, and call the doctor again",
+        values={
+            "seconds": seconds,
+            "settings": describe(bus),
+            "frames": [frame.hex(" ").upper() for frame in frames[:_SHOWN]],
+        },
         error=BadAnswer,
     )
 
