@@ -72,6 +72,15 @@ def test_the_options_before_the_command_count() -> None:
     assert {row["unit"] for row in behind} == {None, 1}
 
 
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+@pytest.mark.parametrize("command", ["doctor", "status"])
+def test_the_direction_is_asked_for(command: str) -> None:
+    with drivebus.Simulator({1: "gd350"}) as simulator:
+        result = run("--port", simulator.port, "--rs485", "rts", command)
+    assert result.exit_code == 5
+    assert "RTS cannot be moved" in result.output
+
+
 def test_usage_errors_exit_2() -> None:
     for words in (
         ["doctor"],

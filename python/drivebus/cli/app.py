@@ -39,7 +39,8 @@ class _Commands(click.Group):
     },
     epilog="Exit codes: 0 done, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, 6 bad answer, 7 unconfirmed. "
     "Each option before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
-    "DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
+    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an "
+    "emergency stop is a wire.",
 )
 @click.option(
     "--port",
@@ -69,6 +70,12 @@ class _Commands(click.Group):
     help="Data bits, parity, stop bits.",
 )
 @click.option(
+    "--rs485",
+    type=click.Choice(["kernel", "rts", "auto"]),
+    envvar="DRIVEBUS_RS485",
+    help="Who switches the direction of a bare transceiver: the driver, this program, whichever can.",
+)
+@click.option(
     "--unit",
     "-u",
     type=click.IntRange(1, 247),
@@ -92,6 +99,7 @@ def cli(
     port: str | None,
     baud: int,
     line_format: tuple[str, str, str],
+    rs485: str | None,
     unit: int,
     profile: str | None,
     as_json: bool,
@@ -100,7 +108,7 @@ def cli(
 
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
-    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json))
+    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485)
 
 
 for command in (*look.COMMANDS, *doctor.COMMANDS, *move.COMMANDS, *tools.COMMANDS):

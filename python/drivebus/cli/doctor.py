@@ -66,6 +66,7 @@ def doctor(
             stopbits=int(stop),
             full=full,
             listen=listen,
+            rs485=session.direction,
             tell=status.update if status is not None else None,
         )
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.

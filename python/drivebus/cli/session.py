@@ -44,6 +44,7 @@ class Session:
         unit: Unit address.
         profile: Name or folder of a profile; None asks the drive.
         out: Where results go.
+        rs485: Who switches the direction, as `drivebus.Bus` has it: `"kernel"`, `"rts"`, `"auto"`; None: the adapter.
     """
 
     port: str | None
@@ -52,6 +53,12 @@ class Session:
     unit: int
     profile: str | None
     out: Output
+    rs485: str | None = None
+
+    @property
+    def direction(self) -> dict[str, object] | None:
+        """What `drivebus.Bus` is given for that."""
+        return None if self.rs485 is None else {"mode": self.rs485}
 
     @contextmanager
     def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
@@ -64,6 +71,7 @@ class Session:
             "bytesize": int(bits),
             "parity": parity,
             "stopbits": int(stop),
+            "rs485": self.direction,
             **options,
         }
         with drivebus.Bus(self.port, **settings) as bus:

@@ -135,7 +135,9 @@ def nobody(given: Settings, unit: int | None, asked: Sequence[int], tried: int, 
         Severity.FAULT,
         f"{who} said nothing {where}",
         "check the unit's power, that + goes to + and - to -, the common wire, its address (INVT: P14.00), its baud "
-        "rate and format (P14.01, P14.02)" + ("" if unit is None else "; leave --unit out to look for others"),
+        "rate and format (P14.01, P14.02)"
+        + ("" if unit is None else "; leave --unit out to look for others")
+        + "; a port on a board, wired to a bare transceiver, needs --rs485",
         unit=unit,
         error=NoAnswer,
     )
