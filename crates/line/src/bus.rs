@@ -10,11 +10,12 @@ use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialForm
 use crate::Line;
 use crate::call::{Call, CallOptions};
 use crate::clock::{monotonic, sleep_until};
+use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
 use crate::link::Link;
 use crate::opener::Opener;
-use crate::owner::{AdapterEcho, Owner};
+use crate::owner::Owner;
 use crate::process::Process;
 use crate::punctual;
 use crate::queue::{LOOK_UP, Priority, Queue};

@@ -8,16 +8,14 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::backoff::Verdict;
 use crate::bus::Bus;
 use crate::course::{Course, is_unanswered};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::owner::Next;
 use crate::queue::{Priority, Turn};
-use crate::resync::Tried;
 
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
@@ -44,14 +42,14 @@ pub struct CallOptions {
 
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
-    bus: &'b Bus,
-    ask: Ask<'r>,
-    unit: Option<UnitAddress>,
+    pub(crate) bus: &'b Bus,
+    pub(crate) ask: Ask<'r>,
+    pub(crate) unit: Option<UnitAddress>,
     priority: Priority,
     retries: u32,
-    verify: bool,
+    pub(crate) verify: bool,
     read_back: Option<u16>,
-    connection: Option<u64>,
+    pub(crate) connection: Option<u64>,
 }
 
 impl<'b, 'r> Call<'b, 'r> {
@@ -112,7 +110,7 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     /// An error of a request that was not sent.
-    fn failed(&self, failure: Failure) -> Box<CallError> {
+    pub(crate) fn failed(&self, failure: Failure) -> Box<CallError> {
         self.ask.failed(failure, None, self.bus.now(), &[])
     }
 
@@ -148,7 +146,7 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     /// Leaves the line to others until `until`.
-    fn stand_by(
+    pub(crate) fn stand_by(
         &self,
         turn: &mut Turn<'b>,
         until: Instant,
@@ -176,8 +174,7 @@ impl<'b, 'r> Call<'b, 'r> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut lost = None;
-        let now = self.bus.now_of(&self.bus.lock());
-        let mut course = Course::new(now, self.ask.timeout, retries);
+        let mut course = Course::new(self.ask.timeout, retries);
         loop {
             let asked = course.asked();
             let error = match self.attempt(turn, &mut course, give_up, take) {
@@ -251,107 +248,6 @@ impl<'b, 'r> Call<'b, 'r> {
                 Ok(_) => {}
                 // It is still not known whether the write was taken.
                 Err(_) => return Err(error),
-            }
-        }
-    }
-
-    /// Asks once, beyond doubt: with what has to come before, and as often as it takes to be sure.
-    ///
-    /// A read that only this call left open is asked again as it is: whichever of the two is answered, it is this
-    /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
-    fn attempt(
-        &self,
-        turn: &mut Turn<'b>,
-        course: &mut Course,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        let mut tried = Tried::default();
-        let mut agreement: Option<Agreement> = None;
-        let (mut asked, mut known) = (0, None);
-        loop {
-            if !turn.let_pass(give_up) {
-                return Err(self.failed(self.bus.given_up()));
-            }
-            let mut owner = self.bus.lock();
-            if self.bus.is_shut() {
-                owner.close();
-                return Err(self.ask.failed(Failure::Closed, None, self.bus.now_of(&owner), &[]));
-            }
-            if let Err(failure) = owner.prepare(give_up) {
-                return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
-            }
-            if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
-                return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
-            }
-            let in_time = course.is_in_time(self.bus.now_of(&owner));
-            if self.unit.is_some_and(|unit| course.owes_only_this(&owner, unit)) {
-                let ask = Ask { in_doubt: true, ..self.ask };
-                return course.ask(&mut owner, &ask, give_up, take);
-            }
-            let sure = match owner.next(&self.ask, &tried, in_time) {
-                Next::Ask(sure) => sure,
-                Next::LookForEcho => {
-                    owner.look_for_echo(&self.ask, &mut tried, give_up)?;
-                    continue;
-                }
-                Next::Probe(unit, probe) => {
-                    owner.probe(unit, probe, &self.ask, &mut tried, give_up)?;
-                    continue;
-                }
-                Next::Wait(until) => {
-                    drop(owner);
-                    self.stand_by(turn, until, give_up)?;
-                    continue;
-                }
-                Next::GiveUp => {
-                    let now = self.bus.now_of(&owner);
-                    return Err(match tried.failure {
-                        Some(error) if !matches!(error.failure, Failure::Refused { .. }) => error,
-                        _ => self.ask.failed(Failure::Doubtful, None, now, &[]),
-                    });
-                }
-            };
-            if agreement.is_some() && self.unit.map(|unit| owner.asked(unit)) != known {
-                agreement = None; // what somebody else asked in between may be open now
-            }
-            // Whatever else is repeated would be done twice.
-            let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
-            let agreement = agreement.get_or_insert_with(|| Agreement::new(sure, 1 + u8::from(twice)));
-            let Some(unit) = self.unit.filter(|_| !agreement.is_immediate()) else {
-                let result = course.ask(&mut owner, &self.ask, give_up, take);
-                return owner.unless_echoed(&self.ask, result, give_up);
-            };
-            if asked == 0 {
-                course.asks(owner.now());
-            }
-            if asked == 1 {
-                owner.stats().count(Some(unit), |counters| counters.verified += 1);
-            }
-            asked += 1;
-            let mut agreed = false;
-            let result = owner.exchange(&self.ask, give_up, &mut |answer| {
-                agreed = agreement.hear(unit, &answer);
-                if agreed {
-                    take(answer);
-                }
-            });
-            known = Some(owner.asked(unit));
-            match result {
-                Ok(done) if agreed => return Ok(done),
-                Ok(done) if asked >= u32::from(agreement.longest()) => {
-                    return Err(self.ask.failed(Failure::Disagreeing { asked }, Some(done.sent), done.ended, &[]));
-                }
-                Ok(_) => {}
-                Err(error) => match error.failure {
-                    Failure::Refused { function, code } => {
-                        let enough = agreement.hear(unit, &Answer::exception(function, code));
-                        if enough || asked >= u32::from(agreement.longest()) {
-                            return Err(error);
-                        }
-                    }
-                    _ => return Err(error),
-                },
             }
         }
     }

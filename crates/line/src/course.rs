@@ -16,8 +16,8 @@ const PROBED_IN_VAIN: u32 = 4;
 pub(crate) struct Course {
     /// How long the caller allowed them to take.
     allowed: Duration,
-    /// When that is over: from the beginning, and then from the first question on.
-    until: Instant,
+    /// When that is over: from the first look on, and then from the first question on.
+    until: Option<Instant>,
     attempts: u32,
     /// How often it was asked; a question that is repeated to be sure of its answer counts once.
     asked: u32,
@@ -28,25 +28,25 @@ pub(crate) struct Course {
 }
 
 impl Course {
-    /// Beginning at `now`, with `retries` more questions than one, each with a wait of `timeout`.
+    /// With `retries` more questions than one, each with a wait of `timeout`.
     ///
     /// The time that the caller allowed, the time-out for each of these times, is allowed once for making sure of the
     /// unit and once, from the first question on, for asking.
-    pub(crate) fn new(now: Instant, timeout: Duration, retries: u32) -> Self {
+    pub(crate) fn new(timeout: Duration, retries: u32) -> Self {
         let allowed = timeout.saturating_mul(retries.saturating_add(1));
         let left = retries.saturating_mul(2);
-        Self { allowed, until: now + allowed, attempts: 0, asked: 0, left, left_open: None }
+        Self { allowed, until: None, attempts: 0, asked: 0, left, left_open: None }
     }
 
     /// Whether there is time left at `now`.
-    pub(crate) fn is_in_time(&self, now: Instant) -> bool {
-        now < self.until
+    pub(crate) fn is_in_time(&mut self, now: Instant) -> bool {
+        now < *self.until.get_or_insert(now + self.allowed)
     }
 
     /// It is asked at `now`.
     pub(crate) fn asks(&mut self, now: Instant) {
         if self.asked == 0 {
-            self.until = now + self.allowed;
+            self.until = Some(now + self.allowed);
         }
         self.asked += 1;
     }

@@ -5,11 +5,13 @@
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
 //! over at its last byte.
 
+mod attempt;
 mod backoff;
 mod bus;
 mod call;
 pub mod clock;
 mod course;
+mod echo;
 mod error;
 mod exchange;
 mod facts;
@@ -37,6 +39,7 @@ mod units;
 
 pub use bus::{Bus, BusOptions};
 pub use call::CallOptions;
+pub use echo::AdapterEcho;
 pub use error::{CallError, Failure};
 pub use exchange::Done;
 pub use facts::PortFacts;
@@ -44,7 +47,6 @@ pub use hint::Hint;
 pub use identity::Places;
 pub use link::Link;
 pub use opener::Opener;
-pub use owner::AdapterEcho;
 pub use port::{Line, PortError, PortErrorKind};
 pub use queue::Priority;
 pub use stats::{Counters, Latency, Stats};

@@ -3,10 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
+use drivebus_rtu::{Adu, Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, UnitAddress};
 
 use crate::Line;
 use crate::backoff::DeadUnits;
+use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
 use crate::link::{Link, Links};
@@ -14,20 +15,6 @@ use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
 use crate::units::Delays;
-
-/// What is known about the adapter sending our own bytes back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AdapterEcho {
-    /// Find out.
-    Auto,
-    /// It does: the request is taken off before every answer.
-    Present,
-    /// It does not.
-    Absent,
-}
-
-/// How often one attempt looks whether the adapter echoes, where noise hides it.
-const LOOKS: u32 = 3;
 
 /// What to do next for a request.
 #[derive(Debug, Clone, Copy)]
@@ -51,11 +38,11 @@ pub(crate) type Asked = (u64, u64);
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
     opener: LineOpener,
-    master: Master,
+    pub(crate) master: Master,
     /// What the user knows about the adapter.
-    given_echo: AdapterEcho,
+    pub(crate) given_echo: AdapterEcho,
     /// What is known by now about the one that is plugged in.
-    echo: AdapterEcho,
+    pub(crate) echo: AdapterEcho,
     resync: Resync,
     links: Links,
     delays: Delays,
@@ -209,69 +196,6 @@ impl Owner {
         }
     }
 
-    /// Reads one word to see whether the request comes back; what is answered does not matter.
-    ///
-    /// # Errors
-    ///
-    /// The port was lost, the caller gave up, or nothing was shown however often it was tried: the next request's echo
-    /// could be taken for its answer.
-    pub(crate) fn look_for_echo(
-        &mut self,
-        ask: &Ask<'_>,
-        tried: &mut Tried,
-        give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<(), Box<CallError>> {
-        let address = match *ask.request {
-            Request::ReadHolding { address, .. } => address,
-            _ => 0,
-        };
-        let Ok(read) = Request::read(address, 1) else {
-            return Ok(());
-        };
-        tried.looks += 1;
-        let result = self.exchange(&Ask { request: &read, in_doubt: true, ..*ask }, give_up, &mut |_| ());
-        if self.echo != AdapterEcho::Auto {
-            return Ok(());
-        }
-        match result {
-            Err(error) if !is_line_trouble(&error.failure) => Err(Box::new(CallError { sent: None, ..*error })),
-            Err(error) if tried.looks >= LOOKS && !matches!(error.failure, Failure::Refused { .. }) => {
-                Err(Box::new(CallError { sent: None, ..*error }))
-            }
-            _ if tried.looks >= LOOKS => Err(ask.failed(Failure::Doubtful, None, self.now(), &[])),
-            _ => Ok(()),
-        }
-    }
-
-    /// `result` of a request that did not wait until it was known whether the adapter echoes: if it does, it may have been
-    /// its echo that came. Only the confirmation waits for that, not the stop.
-    ///
-    /// # Errors
-    ///
-    /// The request went out, and it is not known whether the unit took it.
-    pub(crate) fn unless_echoed(
-        &mut self,
-        ask: &Ask<'_>,
-        result: Result<Done, Box<CallError>>,
-        give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Done, Box<CallError>> {
-        let done = result?;
-        let Destination::Unit(unit) = ask.destination else {
-            return Ok(done);
-        };
-        if self.echo != AdapterEcho::Auto || !ask.request.expected().may_repeat_request() {
-            return Ok(done);
-        }
-        // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.
-        let _ = self.look_for_echo(ask, &mut Tried::default(), give_up);
-        if self.echo == AdapterEcho::Absent {
-            return Ok(done);
-        }
-        self.master.still_owed(done.ended, unit, ask.request);
-        let failure = Failure::NoAnswer { timeout: ask.timeout, attempts: 1 };
-        Err(ask.failed(failure, Some(done.sent), done.ended, &[]))
-    }
-
     /// Sends `probe` to `unit`; what it brought, `tried` and the master know.
     ///
     /// # Errors
@@ -399,45 +323,9 @@ impl Owner {
         let on_the_wire = self.format.chars(u32::try_from(request).unwrap_or(u32::MAX)) + self.answer_time(ask);
         done.ended.saturating_duration_since(done.sent).saturating_sub(on_the_wire)
     }
-
-    /// Keeps what the exchange has shown about the adapter and the line.
-    fn learn(&mut self, ask: &Ask<'_>, result: &Result<Done, Box<CallError>>, tally: Tally) {
-        if self.given_echo != AdapterEcho::Auto {
-            return;
-        }
-        let is_broadcast = ask.destination == Destination::Broadcast;
-        if tally.own_echo > 0 && (self.echo == AdapterEcho::Auto || !is_broadcast) {
-            self.echo = AdapterEcho::Present;
-            self.master.strip_echo(true);
-            return;
-        }
-        if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
-            return;
-        }
-        let length = Adu::request(ask.destination, ask.request).as_bytes().len();
-        // Bytes that are no frame might be what is left of an echo.
-        let clean = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= length)
-            && match result {
-                Ok(_) => true,
-                Err(error) => match error.failure {
-                    Failure::Refused { .. } => true,
-                    Failure::NoAnswer { .. } => error.raw.is_empty(),
-                    _ => false,
-                },
-            };
-        match self.echo {
-            AdapterEcho::Auto if clean => self.echo = AdapterEcho::Absent,
-            // It did not echo this time: to be looked at again before anything depends on it.
-            AdapterEcho::Present if clean && result.is_ok() => {
-                self.echo = AdapterEcho::Auto;
-                self.master.strip_echo(false);
-            }
-            _ => {}
-        }
-    }
 }
 
 /// Whether `failure` is of a kind that another request over the same line may not have.
-fn is_line_trouble(failure: &Failure) -> bool {
+pub(crate) fn is_line_trouble(failure: &Failure) -> bool {
     matches!(failure, Failure::NoAnswer { .. } | Failure::Corrupt(_) | Failure::Wrong(_) | Failure::Refused { .. })
 }
