@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::Line;
 use crate::call::{Call, CallOptions};
@@ -205,12 +205,8 @@ impl Bus {
         if !self.opened_by.is_current() {
             return Err(ask.failed(Failure::Forked, None, Instant::ZERO, &[]));
         }
-        if self.queue.has_this_thread() {
-            let now = self.clock.now().unwrap_or_default();
-            return Err(ask.failed(Failure::NotBegun(BeginError::OutOfTurn), None, now, &[]));
-        }
         if self.options.read_only && request.is_write() {
-            return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now(), &[]));
+            return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now_at_hand(), &[]));
         }
         let mut give_up = || self.is_shut() || give_up();
         let result = Call::new(self, ask, options).run(&mut give_up, take);
@@ -314,6 +310,11 @@ impl Bus {
         {
             self.priority_refused.get_or_init(|| refused);
         }
+    }
+
+    /// As [`now`](Self::now), without waiting for anybody; the start of time where only the line knows.
+    pub(crate) fn now_at_hand(&self) -> Instant {
+        self.clock.now().unwrap_or_default()
     }
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.

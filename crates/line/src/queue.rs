@@ -2,7 +2,7 @@
 //! [`Order`] at the last moment, so that a stop that comes while the next one wakes up still goes first.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::thread::{self, Thread};
+use std::thread::{self, Thread, ThreadId};
 use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
@@ -45,6 +45,15 @@ struct State {
     order: Order<Thread>,
 }
 
+/// Why there is no turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NoTurn {
+    /// The caller does not want to wait any longer.
+    GivenUp,
+    /// This thread stands in the queue already.
+    OwnThread,
+}
+
 /// The right to use the line, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Turn<'a> {
@@ -53,36 +62,41 @@ pub(crate) struct Turn<'a> {
 }
 
 impl Queue {
-    /// Waits for a turn to ask `unit`; `None` when `give_up` says so before it comes.
+    /// Waits for a turn to ask `unit`.
     ///
     /// `unit` is `None` for a broadcast and for what concerns the whole line.
+    ///
+    /// # Errors
+    ///
+    /// [`NoTurn`]: `give_up` said so before it came, or this thread would wait for itself.
     pub(crate) fn turn(
         &self,
         priority: Priority,
         unit: Option<UnitAddress>,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Option<Turn<'_>> {
+    ) -> Result<Turn<'_>, NoTurn> {
         let thread = thread::current();
         let mut state = self.lock();
+        let is_free = state.owner.is_none() && state.order.is_empty();
+        if !is_free && state.has(thread.id()) {
+            return Err(NoTurn::OwnThread);
+        }
         let ticket = state.order.ticket(priority, unit);
-        let turn = Turn { queue: self, ticket };
-        if state.owner.is_none() && state.order.is_empty() {
+        if is_free {
             state.order.begin(ticket);
             state.owner = Some((ticket, thread));
-            return Some(turn);
+            return Ok(Turn { queue: self, ticket });
         }
         state.order.wait(ticket, thread);
         drop(state);
-        turn.comes(give_up).then_some(turn)
+        let turn = Turn { queue: self, ticket };
+        if turn.comes(give_up) { Ok(turn) } else { Err(NoTurn::GivenUp) }
     }
 
     /// Whether this thread stands in the queue already, and would wait for itself: inside a question of [`turn`](Self::turn)
     /// or of the owner's, which may run a signal handler of the caller's.
     pub(crate) fn has_this_thread(&self) -> bool {
-        let this = thread::current().id();
-        let state = self.lock();
-        state.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this)
-            || state.order.waiting().any(|thread| thread.id() == this)
+        self.lock().has(thread::current().id())
     }
 
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
@@ -152,6 +166,12 @@ impl Drop for Turn<'_> {
 }
 
 impl State {
+    /// Whether `this` thread has the line or waits for it.
+    fn has(&self, this: ThreadId) -> bool {
+        self.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this)
+            || self.order.waiting().any(|thread| thread.id() == this)
+    }
+
     /// Takes the line for `ticket` if it is free and `ticket` is next.
     fn take(&mut self, ticket: Ticket) -> bool {
         if self.owner.is_none() {
@@ -284,7 +304,7 @@ mod tests {
         let first = queue.turn(Read, unit(1), &mut || false).unwrap();
         thread::scope(|scope| {
             let queue = &queue;
-            let waiter = scope.spawn(move || assert!(queue.turn(Read, unit(1), &mut || true).is_none()));
+            let waiter = scope.spawn(move || assert!(queue.turn(Read, unit(1), &mut || true).is_err()));
             // Ends only when the one who waits has given up.
             while !waiter.is_finished() {
                 waiter.thread().unpark();
@@ -298,9 +318,11 @@ mod tests {
     fn who_gives_up_leaves_no_gap() {
         let queue = Queue::default();
         let first = queue.turn(Read, unit(1), &mut || false).unwrap();
-        assert!(queue.turn(Stop, unit(1), &mut || true).is_none());
+        thread::scope(|scope| {
+            scope.spawn(|| assert_eq!(queue.turn(Stop, unit(1), &mut || true).unwrap_err(), NoTurn::GivenUp));
+        });
         drop(first);
-        assert!(queue.turn(Read, unit(1), &mut || true).is_some());
+        assert!(queue.turn(Read, unit(1), &mut || true).is_ok());
     }
 
     #[test]
@@ -326,9 +348,8 @@ mod tests {
     fn who_panics_leaves_its_place() {
         let queue = Queue::default();
         let first = queue.turn(Read, unit(1), &mut || false).unwrap();
-        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            queue.turn(Read, unit(1), &mut || panic!("asked")).is_some()
-        }));
+        let panicked =
+            thread::scope(|scope| scope.spawn(|| queue.turn(Read, unit(1), &mut || panic!("asked")).is_ok()).join());
         assert!(panicked.is_err());
         assert!(queue.lock().order.is_empty());
         drop(first);
@@ -340,6 +361,8 @@ mod tests {
         assert!(!queue.has_this_thread());
         let mut first = queue.turn(Read, unit(1), &mut || false).unwrap();
         assert!(queue.has_this_thread());
+        let again = queue.turn(Read, unit(1), &mut || panic!("it would wait for itself"));
+        assert_eq!(again.unwrap_err(), NoTurn::OwnThread);
         thread::scope(|scope| {
             let queue = &queue;
             scope.spawn(move || {
@@ -349,7 +372,7 @@ mod tests {
                     seen = queue.has_this_thread();
                     true
                 });
-                assert!(turn.is_none() && seen);
+                assert!(turn.is_err() && seen);
             });
         });
         assert!(first.let_pass(&mut || false));
