@@ -254,6 +254,12 @@ class TestListening:
         with pytest.raises(PortError):
             bus.listen(0.05)
 
+    def test_what_was_heard_is_counted_as_noise(self) -> None:
+        with Bus(Wire(b"\x00\xff\x5a")) as bus:
+            bus.listen(0.05)
+            stats = bus.stats()
+        assert (stats["noise_bytes"], stats["noise_idle"], stats["requests"]) == (3, 2, 0)
+
     def test_a_simulated_line_is_quiet(self) -> None:
         with line() as simulator, Bus(simulator) as bus:
             start = bus.now()
