@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::Line;
 use crate::call::{Call, CallOptions};
@@ -18,7 +18,7 @@ use crate::opener::Opener;
 use crate::owner::Owner;
 use crate::process::Process;
 use crate::punctual;
-use crate::queue::{LOOK_UP, Priority, Queue};
+use crate::queue::{LOOK_UP, NoTurn, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
 use crate::units::UnitOptions;
@@ -320,6 +320,13 @@ impl Bus {
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.
     pub(crate) fn now_of(&self, owner: &Owner) -> Instant {
         self.clock.now().unwrap_or_else(|| owner.now())
+    }
+
+    pub(crate) fn no_turn(&self, why: NoTurn) -> Failure {
+        match why {
+            NoTurn::GivenUp => self.given_up(),
+            NoTurn::OwnThread => Failure::NotBegun(BeginError::OutOfTurn),
+        }
     }
 
     pub(crate) fn given_up(&self) -> Failure {

@@ -8,14 +8,14 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::backoff::Verdict;
 use crate::bus::Bus;
 use crate::course::{Course, is_unanswered};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::queue::{NoTurn, Priority, Turn};
+use crate::queue::{Priority, Turn};
 
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
@@ -106,13 +106,10 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b>, Box<CallError>> {
-        self.bus.queue.turn(self.priority, self.unit, give_up).map_err(|why| match why {
-            NoTurn::GivenUp => self.failed(self.bus.given_up()),
-            NoTurn::OwnThread => {
-                let now = self.bus.now_at_hand();
-                self.ask.failed(Failure::NotBegun(BeginError::OutOfTurn), None, now, &[])
-            }
-        })
+        self.bus
+            .queue
+            .turn(self.priority, self.unit, give_up)
+            .map_err(|why| self.ask.failed(self.bus.no_turn(why), None, self.bus.now_at_hand(), &[]))
     }
 
     /// An error of a request that was not sent.

@@ -18,7 +18,7 @@ impl Bus {
     /// # Errors
     ///
     /// [`Failure::Port`]: the line is lost. [`Failure::Interrupted`]: `give_up`, asked about every 50 ms, said so.
-    /// [`Failure::Closed`].
+    /// [`Failure::Closed`]. [`Failure::NotBegun`]: from inside a `give_up` of the same thread.
     pub fn listen(
         &self,
         time: Duration,
@@ -30,9 +30,7 @@ impl Bus {
         }
         let end = self.now() + time;
         loop {
-            let Some(_turn) = self.queue.turn(Priority::Poll, None, give_up) else {
-                return Err(self.given_up());
-            };
+            let _turn = self.queue.turn(Priority::Poll, None, give_up).map_err(|why| self.no_turn(why))?;
             let mut owner = self.lock();
             owner.prepare(give_up)?;
             let now = self.now_of(&owner);
