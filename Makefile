@@ -1,5 +1,5 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -121,12 +121,10 @@ format: $(VENV)/.dev ## changes files
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-bench: $(VENV)/.dev $(VENV)/.wheel
-	$(BIN)/python tools/bench_report.py
-
 # The other masters live apart: what they need shall not be what drivebus is tested with.
 # One of them needs Python 3.12, so the newest that runs is taken.
-PEERS := .venv-conformance
+PEERS       := .venv-conformance
+BENCH_PEERS := .venv-bench
 CONFORMANCE_PYTHON ?= $(shell for each in python3.14 python3.13 python3.12; do \
     $$each -c '' 2>/dev/null && echo $$each && break; done || echo $(PYTHON))
 
@@ -135,6 +133,18 @@ $(PEERS)/.installed: pyproject.toml dist/.wheel
 	$(PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
 	$(PEERS)/bin/python -m pip install --quiet --group conformance dist/drivebus-*.whl
 	@touch $@
+
+$(BENCH_PEERS)/.installed: pyproject.toml dist/.wheel
+	$(CONFORMANCE_PYTHON) -m venv --clear $(BENCH_PEERS)
+	$(BENCH_PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BENCH_PEERS)/bin/python -m pip install --quiet --group bench dist/drivebus-*.whl
+	@touch $@
+
+# Some sections only, printed and not written: make bench ONLY="cycle unpaced"
+ONLY ?=
+
+bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
+	$(BENCH_PEERS)/bin/python tools/bench_report.py $(ONLY)
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run --out docs/conformance.md
@@ -180,4 +190,4 @@ soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) $(PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -1,41 +1,101 @@
-"""Runs the benchmarks of both languages, side by side with their peers, and writes benches/RESULTS.md."""
+"""Runs the benchmarks, side by side with their peers, and writes benches/RESULTS.md.
+
+Each section is a module that prints a table, or with --json its figures; here stands which there are, and the sentence
+that says what each measured. A new one is an entry of SECTIONS.
+
+usage: bench_report.py [SECTION …] [--realtime]     (with sections named, they are printed and nothing is written)
+"""
 
 from __future__ import annotations
 
+import argparse
 import datetime
-import json
 import os
 import platform
 import subprocess
 import sys
-import tempfile
-from collections import defaultdict
+import time
 from importlib import metadata
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benches/RESULTS.md"
-CRITERION = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "criterion"
-PEERS = ["pymodbus", "minimalmodbus", "fastcrc", "pyserial"]
+PEERS = [
+    *("fastcrc", "minimalmodbus", "modbus-tk", "pylibmodbus", "pymodbus", "pyserial", "tmodbus", "uModbus"),
+    *("pytest-benchmark",),
+]
 
 
-def nanoseconds(value: float) -> str:
-    """A time for people."""
-    for factor, unit in ((1e9, "s"), (1e6, "ms"), (1e3, "µs")):
-        if value >= factor:
-            return f"{value / factor:.3g} {unit}"
-    return f"{value:.3g} ns"
+class Section(NamedTuple):
+    """One table."""
+
+    name: str
+    title: str
+    about: str
+    """What was measured, in a sentence or two."""
+    command: list[str]
+    realtime: bool = False
+    """Whether it knows --realtime."""
 
 
-def by_number(name: str) -> list[tuple[int, str]]:
-    """Sorts `crc/8` before `crc/11`."""
-    return [(int(part), "") if part.isdigit() else (0, part) for part in name.split("/")]
+def module(name: str, *options: str) -> list[str]:
+    """`benches/python/NAME.py`, run with this interpreter."""
+    return [sys.executable, "-m", f"benches.python.{name}", *options]
 
 
-def run(*command: str) -> None:
-    """Runs *command* in the repository, and fails with it."""
-    print("$", " ".join(command), flush=True)
-    subprocess.run(command, cwd=ROOT, check=True)
+SECTIONS = [
+    Section(
+        "cycle",
+        "Share of the shortest possible cycle",
+        "One unit that answers as soon as the protocol lets it, on a pseudo-terminal with the pace of the "
+        "wire, read again and again by each master in turn: the least time from request to request that the "
+        "protocol allows (8 characters, silence, answer, silence), in percent of the median time that it "
+        "took; the median of five runs. `c` is a bare master in C without any care for errors "
+        "(benches/c/master.c). Above 100 % a master cuts into the silence: the last column counts the "
+        "requests that came before it was over.",
+        module("cycle", "--seconds", "0.5"),
+        True,
+    ),
+    Section(
+        "unpaced",
+        "Transactions on a line without pace",
+        "Reads of one word from a slave in C that answers at once (benches/c/slave.c): what a transaction "
+        "costs when the wire costs nothing. `c` and drivebus are told to keep no silence; minimalmodbus, "
+        "pymodbus and tmodbus keep one of their own. Medians of five runs in turns; processor time is that of "
+        "the master's process.",
+        module("unpaced", "--seconds", "0.7"),
+        True,
+    ),
+    Section(
+        "monitor",
+        "Reading a drive by names",
+        "All monitor registers of a GD350 from the same slave in C: `drive.monitor()` beside raw reads of the "
+        "same words. Medians of five runs in turns.",
+        module("monitor"),
+    ),
+    Section(
+        "calls",
+        "Calls from Python that need no line",
+        "Medians of pytest-benchmark; encoding and decoding are what each library's own client calls to make "
+        "a request and to take an answer apart. `struct + fastcrc` is the least that Python code can do.",
+        module("calls"),
+    ),
+    Section(
+        "many-lines",
+        "32 lines in one process",
+        "28 pseudo-terminals and 4 TCP connections at 19200 bit/s with 8 units each, simulated by another "
+        "process; shares of the shortest cycle as above, processor time of the measured process in cores.",
+        module("many_lines"),
+    ),
+    Section(
+        "rust",
+        "Without Python",
+        "Medians of criterion; CRCs in C (`cc -O2`, benches/c/crc_tables.c) from the same minutes. A read on "
+        "a line that has the answer is the bus, or the client, alone.",
+        module("in_rust"),
+    ),
+]
 
 
 def machine() -> str:
@@ -47,64 +107,61 @@ def machine() -> str:
             line.partition(":")[2].strip() for line in information.read_text().splitlines() if "model name" in line
         ]
         name = models[0] if models else name
-    rustc = subprocess.run(["rustc", "--version"], capture_output=True, text=True, check=True).stdout.strip()
-    peers = ", ".join(f"{peer} {metadata.version(peer)}" for peer in PEERS)
+
+    def said(*command: str) -> str:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[0]
+
+    peers = []
+    for peer in PEERS:
+        try:
+            peers.append(f"{peer} {metadata.version(peer)}")
+        except metadata.PackageNotFoundError:
+            peers.append(f"no {peer}")
     return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}; "
-        f"CPython {platform.python_version()}; {rustc}; {peers}"
+        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}; drivebus "
+        f"{metadata.version('drivebus')}, CPython {platform.python_version()}, {said('rustc', '--version')}, "
+        f"{said('cc', '--version')}; {', '.join(peers)}"
     )
 
 
-def rust() -> str:
-    """Criterion's medians."""
-    run("cargo", "bench", "--locked", "--quiet", "-p", "drivebus-benches")
-    medians = {}
-    for path in CRITERION.glob("**/new/benchmark.json"):
-        name = json.loads(path.read_text())["full_id"]
-        medians[name] = json.loads((path.parent / "estimates.json").read_text())["median"]["point_estimate"]
-    rows = [f"| {name} | {nanoseconds(medians[name])} |" for name in sorted(medians, key=by_number)]
-    return "\n".join(["| benchmark | median |", "| --- | ---: |", *rows])
-
-
-def python(folder: Path) -> str:
-    """pytest-benchmark's medians, each beside the others of its group."""
-    file = folder / "python.json"
-    run(
-        *(sys.executable, "-m", "pytest", "benches/python", "-o", "python_files=bench_*.py", "-p", "no:cacheprovider"),
-        *("--quiet", "--benchmark-disable-gc", "--benchmark-warmup=on", f"--benchmark-json={file}"),
+def measured(section: Section, realtime: bool) -> str:
+    """The section as Markdown."""
+    command = [*section.command, *(["--realtime"] if realtime and section.realtime else [])]
+    print("$", *command[1:], file=sys.stderr, flush=True)
+    start = time.monotonic()
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{section.name} failed")
+    print(f"  {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+    how = (
+        " On a machine that others used, with all that was measured at real-time priority."
+        if "--realtime" in command
+        else ""
     )
-    groups: dict[str, dict[str, float]] = defaultdict(dict)
-    for each in json.loads(file.read_text())["benchmarks"]:
-        groups[each["group"]][each["params"]["engine"]] = each["stats"]["median"] * 1e9
-    rows = ["| what | engine | median | drivebus is faster by |", "| --- | --- | ---: | ---: |"]
-    for group, engines in groups.items():
-        for engine, median in sorted(engines.items(), key=lambda item: item[1]):
-            ratio = "" if engine == "drivebus" else f"{median / engines['drivebus']:.2f} x"
-            rows.append(f"| {group} | {engine} | {nanoseconds(median)} | {ratio} |")
-    return "\n".join(rows)
-
-
-def cycle() -> str:
-    """The share of the shortest possible cycle."""
-    done = subprocess.run(
-        [sys.executable, "-m", "benches.python.cycle"], cwd=ROOT, check=True, capture_output=True, text=True
-    )
-    return done.stdout.strip()
+    return f"## {section.title}\n\n{section.about}{how}\n\n{done.stdout.strip()}\n"
 
 
 def main() -> None:
     """Measures, then writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        parts = {
-            "Rust (criterion)": rust(),
-            "Python, beside other packages (pytest-benchmark)": python(Path(folder)),
-            "Share of the shortest possible cycle, one unit, paced pseudo-terminal": cycle(),
-        }
-    text = f"# Results of `make bench`\n\n{datetime.date.today().isoformat()}. {machine()}\n"
-    for title, table in parts.items():
-        text += f"\n## {title}\n\n{table}\n"
-    RESULTS.write_text(text, encoding="utf-8")
-    print(f"wrote {RESULTS.relative_to(ROOT)}")
+    options = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    options.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(each.name for each in SECTIONS))
+    options.add_argument("--realtime", action="store_true", help="on a busy machine: the lines' masters go first")
+    given = options.parse_args()
+    known = {section.name: section for section in SECTIONS}
+    for name in given.sections:
+        if name not in known:
+            options.error(f"{name} is none of {', '.join(known)}")
+    parts = [measured(known[name], given.realtime) for name in given.sections or known]
+    if given.sections:
+        print("\n".join(parts))
+        return
+    head = (
+        f"# Results of `make bench`\n\n{datetime.date.today().isoformat()}. {machine()}\n\n"
+        "The processor was kept from idling while lines were measured (benches/c/awake.c): waking it takes a virtual "
+        "machine longer than a transaction. Read ratios within a table; times of different days differ.\n"
+    )
+    RESULTS.write_text("\n".join([head, *parts]), encoding="utf-8")
+    print(f"wrote {RESULTS.relative_to(ROOT)}", file=sys.stderr)
 
 
 if __name__ == "__main__":

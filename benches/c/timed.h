@@ -21,7 +21,7 @@ static int by_size(const void *a, const void *b) {
 }
 
 /* Calls `cycle` (0 is success) `warm` times, then `cycles` times or until `limit` is over, and prints JSON, in seconds. */
-static int timed_run(int (*cycle)(void), long warm, long cycles, int64_t limit) {
+__attribute__((unused)) static int timed_run(int (*cycle)(void), long warm, long cycles, int64_t limit) {
     int64_t *took = calloc((size_t)cycles, sizeof *took);
     if (took == NULL) return 1;
     for (long n = 0; n < warm; n++)

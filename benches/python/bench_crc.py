@@ -15,8 +15,9 @@ Engine = Callable[[bytes], int]
 
 ENGINES: dict[str, Engine] = {"drivebus": drivebus.crc16, "fastcrc": fastcrc.crc16.modbus}
 
-# The bodies of an answer of one word, a request, answers of four and sixteen words, the longest body, and a capture.
-SIZES = [5, 6, 11, 35, 254, 65536]
+# The bodies of an answer of one word and of a request, a whole request, the body of an answer of four words, a whole
+# answer of sixteen, the longest body, and a capture.
+SIZES = [5, 6, 8, 11, 37, 254, 65536]
 
 
 @pytest.mark.parametrize("size", SIZES)

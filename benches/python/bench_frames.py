@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from typing import ClassVar
 
 import fastcrc
 import minimalmodbus
@@ -47,16 +48,23 @@ class Drivebus:
 
 
 class Struct:
-    @staticmethod
-    def encode(count: int) -> bytes:
-        body = struct.pack(">BBHH", UNIT, 3, ADDRESS, count)
-        return body + fastcrc.crc16.modbus(body).to_bytes(2, "little")
+    """As fast as it goes: formats made beforehand, and no more names looked up than needed."""
 
-    @staticmethod
-    def decode(request: bytes, answer: bytes) -> list[int]:
-        if fastcrc.crc16.modbus(answer[:-2]) != int.from_bytes(answer[-2:], "little") or answer[:2] != request[:2]:
+    head = struct.Struct(">BBHH")
+    words: ClassVar = {count: struct.Struct(f">3x{count}H2x") for count in COUNTS}
+    crc = staticmethod(fastcrc.crc16.modbus)
+
+    @classmethod
+    def encode(cls, count: int) -> bytes:
+        body = cls.head.pack(UNIT, 3, ADDRESS, count)
+        return body + cls.crc(body).to_bytes(2, "little")
+
+    @classmethod
+    def decode(cls, request: bytes, answer: bytes) -> list[int]:
+        # The CRC of a frame with its CRC is 0.
+        if cls.crc(answer) or answer[:2] != request[:2] or answer[2] != 2 * request[5]:
             raise ValueError(answer)
-        return list(struct.unpack(f">{answer[2] // 2}H", answer[3:-2]))
+        return list(cls.words[request[5]].unpack(answer))
 
 
 class Pymodbus:

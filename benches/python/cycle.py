@@ -10,10 +10,12 @@ usage: python -m benches.python.cycle [--only drivebus,c] [--baud 115200] [--wor
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+from benches.python.figures import markdown, show
 from benches.python.masters import UNIT, Order
-from benches.python.race import Result, markdown, parser, race, show, workers
+from benches.python.race import Result, parser, race, workers
 
 import drivebus
 
@@ -70,6 +72,11 @@ class Cycle(NamedTuple):
 HEAD = ["bit/s", "words", "master", "share of the shortest cycle", "all runs", "processor time", "silence violations"]
 
 
+def seen_by(line: drivebus.sim.SimulatedLine) -> Callable[[], tuple[int, int]]:
+    """Counts requests that came too early, and all."""
+    return lambda: (line.silence_violations, line.requests)
+
+
 def shortest(line: drivebus.SerialFormat, words: int) -> float:
     """Seconds that no master can go below."""
     return (8 + 5 + 2 * words) * line.char_time + 2 * line.t35
@@ -94,7 +101,7 @@ def main() -> None:
                         simulator.port, baudrate, True, line.char_time, line.t35, words,
                         warm=5, cycles=max(20, round(given.seconds / least)), limit=3 * given.seconds,
                     )  # fmt: skip
-                    results = race(masters, given.runs, order, lambda: simulator.line.silence_violations)
+                    results = race(masters, given.runs, order, seen_by(simulator.line))
                     cycles += [Cycle(baudrate, words, least, result) for result in results]
     show(given.json, [each.figures() for each in cycles], markdown(HEAD, [each.row() for each in cycles]))
 

@@ -1,8 +1,8 @@
 """Many lines in one process, each polled at wire speed: the share of the shortest cycle on each, and the cost.
 
-A process of its own simulates the lines, most behind pseudo-terminals and some behind TCP, with strict units that answer
-at once (P14.03 = 0). The measured process has a bus for each and reads words of one unit after the other, by a thread for
-each bus.
+A process of its own simulates the lines, most behind pseudo-terminals and some behind TCP, with strict units that
+answer at once (P14.03 = 0). The measured process has a bus for each and reads words of one unit after the other, by a
+thread for each bus.
 
 usage: python -m benches.python.many_lines [--lines 32] [--tcp 4] [--units 8] [--words 1] [--seconds 5] [--json]
 """
@@ -22,7 +22,7 @@ from contextlib import ExitStack, contextmanager
 from typing import NamedTuple, cast
 
 from benches.python import programs
-from benches.python.race import markdown, show
+from benches.python.figures import markdown, show
 
 import drivebus
 

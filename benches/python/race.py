@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
@@ -83,28 +82,21 @@ def workers(given: argparse.Namespace) -> Iterator[list[Worker]]:
             worker.close()
 
 
-def race(masters: Sequence[Worker], runs: int, order: Order, violations: Callable[[], int] = lambda: 0) -> list[Result]:
-    """All of them, in turns, so that a busy moment of the machine meets each alike."""
+def race(
+    masters: Sequence[Worker], runs: int, order: Order, seen: Callable[[], tuple[int, int]] = lambda: (0, 0)
+) -> list[Result]:
+    """All of them, in turns, so that a busy moment of the machine meets each alike.
+
+    *seen* counts, from the line, the requests that came before the silence was over, and all requests.
+    """
     results = {worker.name: Result(worker.name, [], 0, 0) for worker in masters}
     for _ in range(runs):
         for worker in masters:
-            before = violations()
+            violations, asked = seen()
             outcome = worker.run(order)
+            violations, asked = seen()[0] - violations, seen()[1] - asked
             result = results[worker.name]
             results[worker.name] = result._replace(
-                runs=[*result.runs, outcome],
-                violations=result.violations + violations() - before,
-                asked=result.asked + outcome.cycles + order.warm,
+                runs=[*result.runs, outcome], violations=result.violations + violations, asked=result.asked + asked
             )
     return list(results.values())
-
-
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
-    lines = [head, ["---:"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def show(as_json: bool, figures: object, table: str) -> None:
-    """Prints one or the other."""
-    print(json.dumps(figures, indent=1) if as_json else table)

@@ -9,8 +9,9 @@ usage: python -m benches.python.unpaced [--only drivebus,c,pylibmodbus] [--words
 from __future__ import annotations
 
 from benches.python import programs
+from benches.python.figures import markdown, show
 from benches.python.masters import Order
-from benches.python.race import Result, markdown, parser, race, show, workers
+from benches.python.race import Result, parser, race, workers
 
 BAUDRATE = 115_200
 HEAD = ["master", "transactions a second", "all runs", "processor time of each", "median from call to call"]

@@ -8,11 +8,10 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
+use drivebus_benches::{Ready, bus_on};
 use drivebus_drives::{Entry, Profile, ReadPlan};
-use drivebus_line::{AdapterEcho, Bus, BusOptions, CallOptions, Line, PortError};
-use drivebus_rtu::{
-    Adu, Answer, Duration, Event, FIRST_CONTACT, Frame, Framer, Instant, Master, Request, SerialFormat, UnitAddress,
-};
+use drivebus_line::{Bus, CallOptions};
+use drivebus_rtu::{Adu, Answer, Duration, Event, Frame, Framer, Instant, Master, Request, SerialFormat, UnitAddress};
 use drivebus_sim::{Options, Simulator};
 
 /// How often each step is done while it is counted. The tool reads this line.
@@ -41,64 +40,6 @@ fn main() {
     for _warm in 0..2 {
         measured::bus_reads_from_the_simulator(&simulated);
         measured::bus_reads_alone(&alone);
-    }
-}
-
-/// A bus that was open for long enough to trust its unit.
-fn bus_on(line: impl Line + 'static) -> Bus {
-    let mut line: Option<Box<dyn Line>> = Some(Box::new(line));
-    let options = BusOptions { echo: AdapterEcho::Absent, ..BusOptions::new(SerialFormat::DEFAULT) };
-    let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
-    bus.sleep(FIRST_CONTACT, &mut || false);
-    bus
-}
-
-/// A line that always has the answer of 16 words: what is counted is the bus alone.
-#[derive(Debug)]
-struct Ready {
-    now: Instant,
-    answer: Adu,
-    asked: bool,
-}
-
-impl Ready {
-    fn new() -> Self {
-        let answer = Adu::answer(UnitAddress::MIN, &Answer::read(&[7; 16]).unwrap());
-        Self { now: Instant::ZERO, answer, asked: false }
-    }
-}
-
-impl Line for Ready {
-    fn now(&self) -> Instant {
-        self.now
-    }
-
-    fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
-        self.asked = true;
-        Ok(self.now)
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
-        if !self.asked {
-            self.now = self.now.max(until);
-            return Ok(0);
-        }
-        self.asked = false;
-        let bytes = self.answer.as_bytes();
-        buffer[..bytes.len()].copy_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn sleep(&mut self, until: Instant) {
-        self.now = self.now.max(until);
-    }
-
-    fn name(&self) -> String {
-        String::from("ready")
-    }
-
-    fn is_virtual(&self) -> bool {
-        true
     }
 }
 

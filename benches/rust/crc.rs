@@ -4,6 +4,8 @@
 //! longest there is; 64 KiB is a capture. `crc-fast` multiplies without carries where the processor can.
 #![allow(missing_docs, reason = "what criterion's macros make")]
 
+mod short;
+
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -53,7 +55,7 @@ fn checksum(c: &mut Criterion) {
 
 criterion_group! {
     name = benches;
-    config = Criterion::default().sample_size(30).warm_up_time(std::time::Duration::from_millis(100)).measurement_time(std::time::Duration::from_millis(400));
+    config = short::short();
     targets = checksum
 }
 criterion_main!(benches);

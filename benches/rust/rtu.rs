@@ -1,21 +1,22 @@
-//! Encode, decode, framer and master, at sizes that occur on the line.
-//!
-//! Bodies: 6 bytes are a request, 8 the longest short frame, 11 an answer with 4 registers, 37 one with 16, 254 the
-//! longest there is; 64 KiB is a capture.
+//! Encode, decode, framer and master, at sizes that occur on the line, beside rmodbus where it has the like.
 #![allow(missing_docs, reason = "what criterion's macros make")]
 #![allow(clippy::unwrap_used, reason = "a benchmark may panic")]
+
+mod short;
 
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use drivebus_rtu::{Adu, Answer, Duration, Event, Frame, Framer, Instant, Master, Request, SerialFormat, UnitAddress};
+use rmodbus::ModbusProto;
+use rmodbus::client::ModbusRequest;
 
 const SILENCE: Duration = Duration::from_micros(1_750);
 
 fn frames(c: &mut Criterion) {
     let unit = UnitAddress::MIN;
     let words: Vec<u16> = (0..16).map(|n| n * 4_099).collect();
-    let mut group = c.benchmark_group("frame");
+    let mut group = c.benchmark_group("frame, drivebus");
     let mut adu = Adu::new();
     group.bench_function("encode a read", |b| {
         b.iter(|| {
@@ -38,6 +39,37 @@ fn frames(c: &mut Criterion) {
             let Ok(Answer::Read { words, .. }) = expected.judge_frame(unit, &frame) else { return 0 };
             words.iter().zip(&mut target).for_each(|(word, place)| *place = word);
             target[15]
+        });
+    });
+}
+
+fn rmodbus(c: &mut Criterion) {
+    let words: Vec<u16> = (0..16).map(|n| n * 4_099).collect();
+    let mut group = c.benchmark_group("frame, rmodbus");
+    let mut request = ModbusRequest::new(1, ModbusProto::Rtu);
+    let mut wire = Vec::with_capacity(256);
+    group.bench_function("encode a read", |b| {
+        b.iter(|| {
+            wire.clear();
+            request.generate_get_holdings(black_box(0x3000), 16, &mut wire).unwrap();
+            wire.len()
+        });
+    });
+    let mut another = ModbusRequest::new(1, ModbusProto::Rtu);
+    group.bench_function("encode a write of 16 words", |b| {
+        b.iter(|| {
+            wire.clear();
+            another.generate_set_holdings_bulk(0x2000, black_box(&words), &mut wire).unwrap();
+            wire.len()
+        });
+    });
+    let answer = Adu::answer(UnitAddress::MIN, &Answer::read(&words).unwrap());
+    let mut target = Vec::with_capacity(16);
+    group.bench_function("decode an answer of 16 words", |b| {
+        b.iter(|| {
+            target.clear();
+            request.parse_u16(black_box(answer.as_bytes()), &mut target).unwrap();
+            target.len()
         });
     });
 }
@@ -93,5 +125,9 @@ fn master(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, frames, framer, master);
+criterion_group! {
+    name = benches;
+    config = short::short();
+    targets = frames, rmodbus, framer, master
+}
 criterion_main!(benches);

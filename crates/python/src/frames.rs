@@ -61,7 +61,11 @@ fn frame<'py>(py: Python<'py>, to: Destination, request: &Request<'_>) -> Bound<
 
 /// The words that a frame answers to a request, or None for a confirmation.
 #[pyfunction]
-pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u16>>> {
+pub(crate) fn decode_answer<'py>(
+    request: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+) -> PyResult<Option<Bound<'py, PyList>>> {
+    let py = frame.py();
     let (asked, came) = (bytes_of(request)?, bytes_of(frame)?);
     let (asked, came) = (asked.as_bytes(), came.as_bytes());
     let request = Frame::parse(asked).map_err(refuse)?;
@@ -69,7 +73,7 @@ pub(crate) fn decode_answer(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>
     let expected = Request::parse(request.pdu()).map_err(refuse)?.expected();
     let answer = Frame::parse(came).map_err(|error| frame_error(error, came))?;
     match expected.judge_frame(unit, &answer) {
-        Ok(Answer::Read { words, .. }) => Ok(Some(words.iter().collect())),
+        Ok(Answer::Read { words, .. }) => PyList::new(py, words.iter()).map(Some),
         Ok(Answer::Exception { function, code, .. }) => {
             let message = format!("unit {unit} refused function {function:02X}H with exception {:02X}H", code.0);
             Err(refused(&message, code, |keywords| {
