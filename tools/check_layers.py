@@ -64,10 +64,11 @@ PYTHON: dict[str, set[str]] = {
     "drive": {"at_once", "moving", "operations", "protocols", "values", "watchdog"},
     "sim": {"_native", "checks", "errors", "profile"},
     "ports": {"_native", "checks", "errors", "profile", "sim"},
-    "bus": {"_native", "checks", "drive", "errors", "ports", "profile", "sim", "values"},
+    "poll": {"_native", "checks", "errors", "profile", "values"},
+    "bus": {"_native", "checks", "drive", "errors", "poll", "ports", "profile", "sim", "values"},
     "doctor": {"_native", "bus", "checks", "drive", "errors", "ports", "rtu", "sim", "values"},
     "__main__": {"cli"},
-    "__init__": {"_native", "bus", "doctor", "drive", "errors", "profile", "rtu", "sim", "values"},
+    "__init__": {"_native", "bus", "doctor", "drive", "errors", "poll", "profile", "rtu", "sim", "values"},
     "cli": {"drivebus", "protocols", "rtu", "sim"},
 }
 

@@ -28,6 +28,7 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
+from drivebus.poll import Batch, Poll, Sample
 from drivebus.profile import Profile, profiles
 from drivebus.sim import Simulator
 from drivebus.values import (
@@ -47,6 +48,7 @@ from drivebus.values import (
 
 __all__ = [
     "BadAnswer",
+    "Batch",
     "Bus",
     "Choice",
     "Control",
@@ -62,9 +64,11 @@ __all__ = [
     "Link",
     "NoAnswer",
     "NotAllowed",
+    "Poll",
     "PortError",
     "Profile",
     "Refused",
+    "Sample",
     "SerialFormat",
     "Simulator",
     "Snapshot",

@@ -12,8 +12,10 @@ from typing_extensions import Buffer
 
 __version__: Final[str]
 __all__ = [
+    "Batch",
     "Bus",
     "Plan",
+    "Poller",
     "Profile",
     "SerialFormat",
     "SimulatedDrive",
@@ -139,6 +141,9 @@ class Bus:
         """What was opened, for people."""
     @property
     def closed(self) -> bool: ...
+    @property
+    def virtual(self) -> bool:
+        """Whether the line's clock is a simulation's, which moves only while somebody waits."""
     @property
     def read_only(self) -> bool: ...
     def close(self) -> None:
@@ -302,6 +307,47 @@ class Plan:
 
         Ints where the drive counts or names, floats where it measures.
         """
+
+@final
+class Poller:
+    """Reads that go on in cycles, in a thread of the core's own; in virtual time, in whoever waits."""
+
+    def __new__(
+        cls,
+        bus: Bus,
+        targets: Sequence[tuple[int, Plan | Sequence[tuple[int, int]]]],
+        interval: float | None,
+        size: int,
+        /,
+    ) -> Poller:
+        """Begins at once. Each of *targets* is a unit (1..=247) and a plan, or addresses and numbers of words."""
+    @property
+    def shortest(self) -> float:
+        """Seconds that one cycle takes at least; 0.0 where the line sets no such limit."""
+    @property
+    def over(self) -> bool:
+        """Whether nothing is asked any more."""
+    def counts(self) -> dict[str, int]:
+        """`cycles`, `missing`, `late`, `dropped`."""
+    def wait(self, count: int, timeout: float | None, /) -> int:
+        """Waits until *count* samples are there, or it is over, for *timeout* seconds of the line's clock at most.
+
+        Returns how many are there. A signal ends it at once.
+        """
+    def take(self, max: int, /) -> Batch:  # noqa: A002
+        """The oldest samples, *max* at most, without waiting."""
+    def close(self) -> None:
+        """Ends it; what is there can still be taken. Closing again does nothing."""
+
+@final
+class Batch:
+    """Samples that were taken out of a `Poller`."""
+
+    def __len__(self) -> int: ...
+    def samples(self) -> list[tuple[int, float, float, list[int | float] | None, Exception | None]]:
+        """Each sample: its target by number, Unix times of request and answer, values or None, error or None."""
+    def rows(self, target: int, /) -> bytearray:
+        """Those of one target as doubles in native order: the two times and the values, NaN for what is missing."""
 
 @final
 class Simulator:

@@ -7,13 +7,15 @@ what people type as a port.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
+from typing import Any
 
 from drivebus import _native, checks, ports
 from drivebus._native import SerialFormat
 from drivebus.drive import Drive
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.poll import Poll, Sample
 from drivebus.profile import Profile, identify, profiles
 from drivebus.sim import Simulator
 from drivebus.values import Found, Link, Stats
@@ -332,6 +334,41 @@ class Bus:
                 unit=unit,
             )
         return Profile.builtin(family)
+
+    def poll(
+        self,
+        targets: Mapping[Any, Any],
+        interval: float | None = None,
+        *,
+        size: int = 10_000,
+        callback: Callable[[Sample], object] | None = None,
+    ) -> Poll:
+        """Asks drives again and again, in a thread of the core's own, and gives what comes as samples.
+
+            with bus.poll({drive: ["running_frequency", "output_current"], other: None}, interval=0.1) as poll:
+                for sample in poll:
+                    ...
+
+        In each cycle every drive is asked once, in the fewest reads. Whatever else wants the line goes before the next
+        request, a stop first. What is not answered is not repeated: the sample is marked `missing` and the next cycle
+        asks again. A drive that is dead costs the others one time-out now and then, as always. A port that was lost is
+        opened again. Several polls of a bus take turns.
+
+        Args:
+            targets: What to ask of whom: register names or parameter codes of a `Drive`, None for its monitor
+                registers; of a unit that no profile is known of, by its address, `[(address, count), …]`.
+            interval: Seconds from one cycle's beginning to the next one's. Beats do not drift; those that pass while
+                the line is taken are counted (`Poll.late`) and not made up for. None: as fast as the wire.
+            size: How many samples are kept for whoever takes them; then the oldest give way (`Poll.dropped`).
+            callback: Is called for each sample, in a thread of its own. What it raises ends the poll and is raised by
+                `Poll.wait` or at the end of the `with` block. In virtual time it is `Poll.wait` that calls it.
+
+        Raises:
+            NotAllowed: Nobody to poll, an unknown name, a drive of another bus, one unit twice, or an interval that is
+                shorter than the wire can carry at this baud rate; the message has the shortest. Nothing was sent.
+            PortError: The bus is closed.
+        """
+        return Poll(self, self._native, targets, interval, size, callback)
 
     def stats(self) -> Stats:
         """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.

@@ -47,7 +47,10 @@ class ReadPlan:
 
     def values(self, answers: Sequence[Sequence[int]]) -> list[Value]:
         """The value of each name, in their order, out of the words that each read brought."""
-        values: list[Value] = self.native.values(answers)
+        return self.named(self.native.values(answers))
+
+    def named(self, values: list[Value]) -> list[Value]:
+        """*values*, with a `Choice` for each that the profile has a label for; the list itself is changed."""
         for index, labels in self._labels:
             value = values[index]
             # A float is never a choice, although one may equal its number.

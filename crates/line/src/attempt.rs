@@ -5,12 +5,12 @@ use std::sync::MutexGuard;
 
 use drivebus_rtu::{Agreement, Answer, Attribution, Request, UnitAddress};
 
-use crate::call::Call;
+use crate::call::{Call, is_silence};
 use crate::course::Course;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
 use crate::owner::{Asked, Next, Owner};
-use crate::queue::Turn;
+use crate::queue::{Priority, Turn};
 use crate::resync::Tried;
 
 /// How the question may be put.
@@ -92,7 +92,15 @@ impl<'b> Call<'b, '_> {
             match owner.next(&self.ask, tried, in_time) {
                 Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
                 Next::LookForEcho => owner.look_for_echo(&self.ask, tried, give_up)?,
-                Next::Probe(unit, probe) => owner.probe(unit, probe, &self.ask, tried, give_up)?,
+                Next::Probe(unit, probe) => {
+                    owner.probe(unit, probe, &self.ask, tried, give_up)?;
+                    // Who polls comes again: the others wait for one time-out at a time.
+                    if self.priority == Priority::Poll
+                        && let Some(error) = tried.failure.take_if(|error| is_silence(&error.failure))
+                    {
+                        return Err(error);
+                    }
+                }
                 Next::Wait(until) => {
                     drop(owner);
                     self.stand_by(turn, until, give_up)?;

@@ -329,6 +329,22 @@ impl Bus {
         }
     }
 
+    /// Whether frames are told apart by something else than silence. Not so while no line is open.
+    pub(crate) fn is_gapless(&self) -> bool {
+        self.lock().line().is_some_and(|line| line.gapless())
+    }
+
+    /// The least silence before a request to `unit`.
+    pub(crate) fn silence_before(&self, unit: UnitAddress) -> Duration {
+        let gap = self.units().get(&unit).and_then(|set| set.gap).unwrap_or_default();
+        self.options.format.t35().max(gap)
+    }
+
+    /// Why a bus that [is closed](Self::is_closed) is.
+    pub(crate) fn ended(&self) -> Failure {
+        if self.is_shut() { Failure::Closed } else { Failure::Forked }
+    }
+
     pub(crate) fn given_up(&self) -> Failure {
         if self.is_shut() { Failure::Closed } else { Failure::Interrupted }
     }

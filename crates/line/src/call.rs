@@ -45,7 +45,7 @@ pub(crate) struct Call<'b, 'r> {
     pub(crate) bus: &'b Bus,
     pub(crate) ask: Ask<'r>,
     pub(crate) unit: Option<UnitAddress>,
-    priority: Priority,
+    pub(crate) priority: Priority,
     retries: u32,
     pub(crate) verify: bool,
     read_back: Option<u16>,
@@ -91,7 +91,7 @@ impl<'b, 'r> Call<'b, 'r> {
             let mut owner = self.bus.lock();
             match &result {
                 Ok(done) => owner.dead.answered(unit, done.ended),
-                Err(error) if matches!(error.failure, Failure::NoAnswer { .. }) => owner.dead.silent(unit, error.ended),
+                Err(error) if is_silence(&error.failure) => owner.dead.silent(unit, error.ended),
                 Err(error) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, error.ended),
                 Err(_) => {}
             }
@@ -136,8 +136,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 Verdict::Wait(until) if owner.line().is_some() => until,
                 Verdict::Ask | Verdict::Wait(_) => return Ok(()),
             };
-            let patience =
-                *patience.get_or_insert(now + self.ask.timeout.saturating_mul(self.retries.saturating_add(1)));
+            let patience = *patience.get_or_insert(now + self.patience());
             if now >= patience {
                 owner.stats().count(Some(unit), |counters| counters.not_asked += 1);
                 let left = until.saturating_duration_since(now);
@@ -146,6 +145,15 @@ impl<'b, 'r> Call<'b, 'r> {
             drop(owner);
             self.stand_by(turn, until.min(patience), give_up)?;
         }
+    }
+
+    /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who
+    /// polls has others to ask meanwhile.
+    fn patience(&self) -> Duration {
+        if self.priority == Priority::Poll {
+            return Duration::ZERO;
+        }
+        self.ask.timeout.saturating_mul(self.retries.saturating_add(1))
     }
 
     /// Leaves the line to others until `until`.
@@ -254,6 +262,11 @@ impl<'b, 'r> Call<'b, 'r> {
             }
         }
     }
+}
+
+/// Whether a time-out was waited for in vain.
+pub(crate) fn is_silence(failure: &Failure) -> bool {
+    matches!(failure, Failure::NoAnswer { .. })
 }
 
 /// `error`, which came when it was asked for the last of so many times.

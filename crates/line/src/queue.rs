@@ -99,6 +99,12 @@ impl Queue {
         self.lock().has(thread::current().id())
     }
 
+    /// How many wait.
+    #[cfg(test)]
+    pub(crate) fn waiting(&self) -> usize {
+        self.lock().order.waiting().count()
+    }
+
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -205,7 +211,7 @@ mod tests {
 
     /// Until `count` wait.
     fn wait_for(queue: &Queue, count: usize) {
-        while queue.lock().order.waiting().count() < count {
+        while queue.waiting() < count {
             thread::yield_now();
         }
     }

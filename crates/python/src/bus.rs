@@ -74,6 +74,11 @@ impl Bus {
         self.core.is_closed()
     }
 
+    #[getter(r#virtual)]
+    fn is_virtual(&self) -> bool {
+        self.core.is_virtual()
+    }
+
     #[getter]
     fn read_only(&self) -> bool {
         self.core.options().read_only
@@ -303,7 +308,7 @@ impl Bus {
         })
     }
 
-    fn unix_clock(&self, py: Python<'_>) -> UnixClock {
+    pub(crate) fn unix_clock(&self, py: Python<'_>) -> UnixClock {
         let ahead = self.virtual_ahead.unwrap_or_else(|| unix_time() - py.detach(|| to_seconds(self.core.now())));
         UnixClock { ahead }
     }
@@ -317,7 +322,10 @@ fn stop_if(urgent: bool) -> Option<Priority> {
 /// Runs `work` without the GIL, with a question to ask now and then: has a signal handler of Python raised?
 ///
 /// What it raised is what comes back, whatever `work` made of it.
-fn with_signals<T: Send>(py: Python<'_>, work: impl FnOnce(&mut dyn FnMut() -> bool) -> T + Send) -> PyResult<T> {
+pub(crate) fn with_signals<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&mut dyn FnMut() -> bool) -> T + Send,
+) -> PyResult<T> {
     let raised = Mutex::new(None);
     let result = py.detach(|| {
         work(&mut || {
@@ -336,12 +344,13 @@ fn with_signals<T: Send>(py: Python<'_>, work: impl FnOnce(&mut dyn FnMut() -> b
 }
 
 /// The line's clock and the calendar's, at one moment.
-struct UnixClock {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct UnixClock {
     ahead: f64,
 }
 
 impl UnixClock {
-    fn at(&self, moment: Instant) -> f64 {
+    pub(crate) fn at(self, moment: Instant) -> f64 {
         to_seconds(moment) + self.ahead
     }
 }
@@ -354,7 +363,7 @@ fn to_seconds(moment: Instant) -> f64 {
     moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
 }
 
-fn duration(what: &str, given: f64) -> PyResult<Duration> {
+pub(crate) fn duration(what: &str, given: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(given)
         .map_err(|_| not_allowed(format!("{what} {given} is not a number of seconds, 0 or more")))
 }

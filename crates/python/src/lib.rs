@@ -12,6 +12,7 @@ mod format;
 mod frames;
 mod open;
 mod plan;
+mod poll;
 mod profile;
 mod pyserial;
 mod sim;
@@ -32,6 +33,8 @@ mod _native {
     use crate::open::port_facts;
     #[pymodule_export]
     use crate::plan::Plan;
+    #[pymodule_export]
+    use crate::poll::{Batch, Poller};
     #[pymodule_export]
     use crate::profile::Profile;
     #[pymodule_export]

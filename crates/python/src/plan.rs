@@ -1,5 +1,7 @@
 //! `Plan` for Python: what to read for some names, and the way from the words to their values.
 
+use std::sync::Arc;
+
 use drivebus_drives::ReadPlan;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -13,7 +15,7 @@ use crate::profile::number;
 #[derive(Debug)]
 pub(crate) struct Plan {
     names: Vec<String>,
-    core: ReadPlan,
+    core: Arc<ReadPlan>,
 }
 
 #[pymethods]
@@ -54,6 +56,10 @@ impl Plan {
 
 impl Plan {
     pub(crate) fn new(names: Vec<String>, core: ReadPlan) -> Self {
-        Self { names, core }
+        Self { names, core: Arc::new(core) }
+    }
+
+    pub(crate) fn core(&self) -> Arc<ReadPlan> {
+        Arc::clone(&self.core)
     }
 }
