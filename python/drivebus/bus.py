@@ -159,7 +159,8 @@ class Bus:
     def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
         """What comes within *seconds* while nothing is asked: pieces, each with its moment on the line's clock.
 
-        On a sound line of one's own that is nothing. Requests of other threads go before, and their answers are theirs.
+        On a sound line of one's own that is nothing. Requests of other threads go before, within 50 ms; their answers
+        are theirs.
         """
         return self._native.listen(checks.number("seconds", seconds, 0.0))
 

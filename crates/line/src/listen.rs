@@ -12,7 +12,7 @@ use crate::queue::{LOOK_UP, Priority};
 impl Bus {
     /// Gives `hear` what comes within `time`, each piece with the moment it was handed over. Nothing is sent.
     ///
-    /// Others may ask in between; the answers to their requests are theirs and are not heard here. What is heard belongs to
+    /// Others may ask in between, and wait 50 ms at most; the answers to their requests are theirs and are not heard here. What is heard belongs to
     /// no request of ours, and is counted so.
     ///
     /// # Errors
