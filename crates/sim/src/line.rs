@@ -1,6 +1,7 @@
 //! The simulated line as a [`Line`]: a master in the same process.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use drivebus_line::{Line, PortError, PortErrorKind};
 use drivebus_rtu::Instant;
@@ -36,8 +37,8 @@ impl SimLine {
 
     /// Lets time pass until `until`, or until bytes arrive if `buffer` has room for them; returns how many did.
     fn wait(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
+        let mut world = self.shared.present();
         loop {
-            let mut world = self.shared.present();
             self.check(&world)?;
             let count = world.take(self.listener, buffer);
             if count > 0 || world.now() >= until {
@@ -49,6 +50,7 @@ impl SimLine {
                 drop(world);
                 // The end of a wait is exact because the caller counts silence with it.
                 self.shared.clock.wait(next, wakeup.is_none_or(|wakeup| wakeup.exact));
+                world = self.shared.present();
             } else {
                 world.advance(next);
             }
@@ -58,7 +60,7 @@ impl SimLine {
 
 impl Line for SimLine {
     fn now(&self) -> Instant {
-        self.shared.clock.now(self.shared.lock().now())
+        self.shared.now()
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
@@ -73,14 +75,19 @@ impl Line for SimLine {
     }
 
     fn sleep(&mut self, until: Instant) {
-        if self.wait(&mut [], until).is_err() {
-            // Time goes on without the adapter.
+        // In virtual time nobody has to be awake for what happens meanwhile; time goes on without the adapter too.
+        if self.is_virtual() || self.wait(&mut [], until).is_err() {
             self.shared.pass(until);
         }
     }
 
     fn name(&self) -> String {
         self.shared.name.clone()
+    }
+
+    /// In virtual time nobody minds waking up for each character, and each is told by its moment.
+    fn char_time(&self) -> Option<Duration> {
+        self.shared.clock.is_real().then_some(self.shared.char_time)
     }
 
     /// Adapters do, and this one may be told to.

@@ -56,7 +56,8 @@ impl Port {
             if count < buffer.len() {
                 let due = next.and_then(|wakeup| {
                     let at = self.shared.clock.system(wakeup.at)?;
-                    let latest = if wakeup.exact { at } else { at + self.shared.leeway };
+                    // Nobody waits for what is not the end of a run.
+                    let latest = if wakeup.exact { at } else { at + self.shared.char_time / 2 };
                     Some(Due { at, latest })
                 });
                 return due.map_or(Next::Readable, Next::At);

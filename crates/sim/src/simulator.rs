@@ -1,6 +1,7 @@
 //! The simulator as its user holds it: made from units and options, shared by its handles.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -8,7 +9,7 @@ use drivebus_line::{PortError, PortErrorKind};
 use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 
 use crate::clock::Clock;
-use crate::drive::{Drive, Map};
+use crate::drive::{Drive, Drives, Map};
 use crate::error::SimError;
 use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
@@ -86,12 +87,13 @@ pub(crate) struct Shared {
     pub(crate) name: String,
     units: Vec<u8>,
     world: Mutex<World>,
+    /// How far the world has come, in nanoseconds.
+    shown: Arc<AtomicU64>,
     /// After how many characters a served port hands them over.
     #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
     pub(crate) fifo: usize,
-    /// How late a served port may do what nobody waits for: half a character.
-    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
-    pub(crate) leeway: Duration,
+    /// Of the format.
+    pub(crate) char_time: Duration,
     pub(crate) outlets: Outlets,
 }
 
@@ -99,6 +101,11 @@ impl Shared {
     /// The world as some thread left it; no thread leaves it half done.
     pub(crate) fn lock(&self) -> MutexGuard<'_, World> {
         self.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The present. In virtual time it is what the world has come to, and nobody who asks waits for the world.
+    pub(crate) fn now(&self) -> Instant {
+        self.clock.now(Instant::from_nanos(self.shown.load(Ordering::Acquire)))
     }
 
     /// The world, come to the present.
@@ -145,13 +152,16 @@ impl Simulator {
             }
         }
         let named: Vec<String> = drives.iter().map(|(unit, drive)| format!("{unit}={}", drive.profile())).collect();
+        let units = drives.keys().copied().collect();
+        let world = World::new(options.format, options.strict_silence, options.seed, Drives::new(drives));
         let shared = Shared {
             clock: if options.realtime { Clock::real() } else { Clock::Virtual },
             name: format!("sim:{}", named.join(",")),
-            units: drives.keys().copied().collect(),
-            world: Mutex::new(World::new(options.format, options.strict_silence, options.seed, drives)),
+            units,
+            shown: world.shown(),
+            world: Mutex::new(world),
             fifo: options.fifo.0,
-            leeway: options.format.chars(1) / 2,
+            char_time: options.format.char_time(),
             outlets: Outlets::default(),
         };
         Ok(Self { shared: Arc::new(shared) })

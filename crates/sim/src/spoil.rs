@@ -69,6 +69,12 @@ impl Spoil {
         *self = Self::default();
     }
 
+    /// Whether nothing becomes of an answer.
+    pub(crate) fn is_idle(&self) -> bool {
+        let Self { drop, replace, delay, before, after } = self;
+        *drop == 0 && replace.is_empty() && delay.is_none() && before.is_none() && after.is_none()
+    }
+
     /// What becomes of `answer`; `None` where it is lost.
     pub(crate) fn apply(&mut self, answer: &[u8]) -> Option<Outgoing> {
         if self.drop > 0 {
@@ -101,9 +107,11 @@ mod tests {
         spoil.noise_after(&[0xFF, 0xFF], 1);
         spoil.delay_answers(Duration::from_millis(3), 1);
         spoil.drop_answers(1);
+        assert!(!spoil.is_idle());
         assert_eq!(spoil.apply(&[1]), None);
         assert_eq!(spoil.apply(&[1]), Some(sent(&[0, 1, 0xFF, 0xFF], 3)));
         assert_eq!(spoil.apply(&[1]), Some(sent(&[0, 1], 0)));
+        assert!(spoil.is_idle());
         assert_eq!(spoil.apply(&[1]), Some(sent(&[1], 0)));
     }
 

@@ -29,7 +29,7 @@ pub struct Transmission {
     pub bytes: Vec<u8>,
 }
 
-/// A ring of the last 1000 transmissions.
+/// A ring of the last 1000 transmissions. Those that are over are reused for those that come.
 #[derive(Debug, Default)]
 pub(crate) struct Trace {
     ring: VecDeque<Transmission>,
@@ -38,10 +38,11 @@ pub(crate) struct Trace {
 impl Trace {
     /// A transmission begins.
     pub(crate) fn begin(&mut self, begin: Instant, side: Side, bytes: &[u8]) {
-        if self.ring.len() == KEPT {
-            self.ring.pop_front();
-        }
-        self.ring.push_back(Transmission { begin, side, bytes: bytes.to_vec() });
+        let oldest = if self.ring.len() == KEPT { self.ring.pop_front() } else { None };
+        let mut kept = oldest.map_or_else(Vec::new, |oldest| oldest.bytes);
+        kept.clear();
+        kept.extend_from_slice(bytes);
+        self.ring.push_back(Transmission { begin, side, bytes: kept });
     }
 
     /// The latest transmission of `side` goes on.

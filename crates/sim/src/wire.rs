@@ -27,8 +27,9 @@ pub(crate) enum Step {
         /// When the 3.5 characters of silence after it are over: the earliest that a unit may answer.
         silent: Instant,
     },
-    /// A character from a unit arrived at every master.
-    Delivered(u8),
+    /// What is in [`Wire::arrived`] came from a unit and arrived at every master: a character, or several of which
+    /// nothing can tell that they did not come one by one.
+    Delivered,
     /// A character came back to the master that sent it.
     Echoed(Listener, u8),
 }
@@ -59,6 +60,8 @@ struct Talking {
     /// The first of those characters.
     from: usize,
     delivered: usize,
+    /// When the next character is over.
+    next_end: Instant,
     /// Before which character, and how long.
     pauses: VecDeque<(usize, Duration)>,
 }
@@ -82,6 +85,8 @@ struct Echo {
 #[derive(Debug)]
 pub(crate) struct Wire {
     format: SerialFormat,
+    /// Of the format.
+    t35: Duration,
     strict_silence: bool,
     heard: Heard,
     /// Frames that ended before their silence did, because the next request came too soon.
@@ -93,6 +98,15 @@ pub(crate) struct Wire {
     waiting: VecDeque<Waiting>,
     answers: VecDeque<Span>,
     echoes: VecDeque<Echo>,
+    /// What was delivered last.
+    pub(crate) arrived: Vec<u8>,
+    /// The buffer of a frame that is over, for the next one.
+    pub(crate) spare_frame: Vec<u8>,
+    /// The same of an answer.
+    spare_answer: Vec<u8>,
+    /// Every character for itself, also where nothing can interfere.
+    #[cfg(test)]
+    pub(crate) plodding: bool,
     /// Whether masters hear what they send.
     pub(crate) echo: bool,
     random: Random,
@@ -108,6 +122,7 @@ impl Wire {
     pub(crate) fn new(format: SerialFormat, strict_silence: bool, seed: u64) -> Self {
         Self {
             format,
+            t35: format.t35(),
             strict_silence,
             heard: Heard::default(),
             cut_short: VecDeque::new(),
@@ -116,6 +131,11 @@ impl Wire {
             waiting: VecDeque::new(),
             answers: VecDeque::new(),
             echoes: VecDeque::new(),
+            arrived: Vec::new(),
+            spare_frame: Vec::new(),
+            spare_answer: Vec::new(),
+            #[cfg(test)]
+            plodding: false,
             echo: false,
             random: Random::new(seed),
             spoil: Spoil::default(),
@@ -135,9 +155,9 @@ impl Wire {
         if bytes.is_empty() {
             return begin;
         }
-        let whole = self.heard.is_whole();
+        let whole = !self.heard.is_empty() && self.heard.is_whole();
         if self.heard.is_empty() || whole {
-            let too_soon = self.last_bit().is_some_and(|last| begin < last + self.format.t35());
+            let too_soon = self.last_bit().is_some_and(|last| begin < last + self.t35);
             self.requests += 1;
             self.silence_violations += u64::from(too_soon);
             self.trace.begin(begin, Side::Master, bytes);
@@ -153,16 +173,12 @@ impl Wire {
             self.trace.extend(Side::Master, bytes);
         }
 
-        let ends = (1..=u32::MAX).map(|count| begin + self.format.chars(count));
-        let mut end = begin;
-        for (&byte, char_end) in bytes.iter().zip(ends) {
-            let span = Span { begin: end, end: char_end };
-            self.heard.push(byte, span);
-            if self.echo {
-                self.echoes.push_back(Echo { to: from, byte, span });
-            }
-            end = char_end;
+        self.heard.push(bytes, begin, &self.format);
+        if self.echo {
+            let spans = (0..).map(|place| Span::of_char(&self.format, begin, place));
+            self.echoes.extend(bytes.iter().zip(spans).map(|(&byte, span)| Echo { to: from, byte, span }));
         }
+        let end = begin + self.chars(bytes.len());
         self.master = Some(match self.master {
             Some(span) if span.end == begin => Span { begin: span.begin, end },
             _ => Span { begin, end },
@@ -172,7 +188,7 @@ impl Wire {
 
     /// The adapter is pulled out: what it was still sending is cut off.
     pub(crate) fn cut_off(&mut self, now: Instant) {
-        self.heard.cut(now);
+        self.heard.cut(now, &self.format);
         self.echoes.clear();
         if let Some(master) = &mut self.master {
             master.end = master.end.min(now);
@@ -183,9 +199,16 @@ impl Wire {
     ///
     /// Assumption: a unit answers in the order it was asked, so an answer that is held back holds back those after it.
     pub(crate) fn answer(&mut self, unit: u8, begin: Instant, answer: &[u8], hits: Hits) {
-        let spoilt = self.spoil.apply(answer);
-        let Some(outgoing) = spoilt.and_then(|outgoing| self.faults.apply(hits, outgoing)) else { return };
-        let Outgoing { bytes, pauses, delay } = outgoing;
+        let outgoing = if self.spoil.is_idle() {
+            let mut bytes = std::mem::take(&mut self.spare_answer);
+            bytes.clear();
+            bytes.extend_from_slice(answer);
+            Some(Outgoing { bytes, ..Outgoing::default() })
+        } else {
+            self.spoil.apply(answer)
+        };
+        let outgoing = outgoing.and_then(|outgoing| self.faults.apply(hits, outgoing));
+        let Some(Outgoing { bytes, pauses, delay }) = outgoing else { return };
         if bytes.is_empty() {
             return;
         }
@@ -210,7 +233,7 @@ impl Wire {
             } else if self.echoes.front().is_some_and(|echo| echo.span.end == next) {
                 return self.echo_back();
             } else if self.talking.is_some() {
-                return self.deliver();
+                return self.deliver(to);
             } else {
                 self.begin_answer(next);
             }
@@ -221,7 +244,7 @@ impl Wire {
     pub(crate) fn next_wakeup(&self) -> Option<Wakeup> {
         let character = match (&self.talking, self.waiting.front()) {
             (Some(talking), _) => {
-                Some(Wakeup { at: self.char_end(talking), exact: talking.delivered + 1 == talking.until() })
+                Some(Wakeup { at: talking.next_end, exact: talking.delivered + 1 == talking.until() })
             }
             (None, Some(waiting)) => Some(Wakeup { at: self.earliest(waiting), exact: false }),
             (None, None) => None,
@@ -267,24 +290,29 @@ impl Wire {
 
     /// When silence ends the frame that is being heard.
     fn heard_until(&self) -> Option<Instant> {
-        self.heard.end().map(|end| end + self.format.t35())
+        self.heard.end().map(|end| end + self.t35)
     }
 
     /// The frame is over: what the units heard of it.
     fn end_frame(&mut self) {
         let Some(silent) = self.heard_until() else { return };
         let (answers, random, collisions) = (&self.answers, &mut self.random, &mut self.collisions);
-        let bytes = self.heard.take(|byte, span| {
+        // Answers come one after the other: where the last one was over, all were.
+        let alone = answers.back().is_none_or(|last| self.heard.begin().is_some_and(|begin| last.end <= begin));
+        let spoil = (!alone).then_some(|byte: u8, span: Span| {
             if answers.iter().any(|answer| answer.overlaps(span)) { garble(byte, random, collisions) } else { byte }
         });
-        if let Some(bytes) = bytes {
+        let mut bytes = std::mem::take(&mut self.spare_frame);
+        if self.heard.take(&mut bytes, &self.format, spoil) {
             self.cut_short.push_back(Step::Heard { bytes, silent });
+        } else {
+            self.spare_frame = bytes;
         }
     }
 
     /// Assumption: a unit that is to speak while another speaks waits for it and for the silence after it.
     fn earliest(&self, waiting: &Waiting) -> Instant {
-        let silent = self.answers.back().map_or(Instant::ZERO, |span| span.end + self.format.t35());
+        let silent = self.answers.back().map_or(Instant::ZERO, |span| span.end + self.t35);
         waiting.begin.max(silent)
     }
 
@@ -295,38 +323,65 @@ impl Wire {
         }
         let paused: Duration = pauses.iter().map(|&(_, pause)| pause).sum();
         self.answers.push_back(Span { begin, end: begin + self.chars(bytes.len()) + paused });
-        let talking = Talking { begin, bytes, from: 0, delivered: 0, pauses };
+        let next_end = begin + self.chars(1);
+        let talking = Talking { begin, bytes, from: 0, delivered: 0, next_end, pauses };
         self.trace.begin(begin, Side::Unit, &talking.bytes[..talking.until()]);
         self.talking = Some(talking);
-    }
-
-    fn char_end(&self, talking: &Talking) -> Instant {
-        talking.begin + self.chars(talking.delivered - talking.from + 1)
     }
 
     fn chars(&self, count: usize) -> Duration {
         self.format.chars(u32::try_from(count).unwrap_or(u32::MAX))
     }
 
-    /// One character of the answer arrives.
-    fn deliver(&mut self) -> Option<Step> {
+    /// What comes of the answer until `to`, of which one character at least is over.
+    ///
+    /// Where the master is silent, and with it its echo, and no frame of it waits for its end, nothing can come between
+    /// two characters of a run.
+    fn deliver(&mut self, to: Instant) -> Option<Step> {
         let mut talking = self.talking.take()?;
-        let end = self.char_end(&talking);
-        let character = Span { begin: talking.begin + self.chars(talking.delivered - talking.from), end };
-        let sent = *talking.bytes.get(talking.delivered)?;
-        talking.delivered += 1;
-        if talking.delivered < talking.bytes.len() {
-            if let Some(&(before, pause)) = talking.pauses.front()
-                && before == talking.delivered
-            {
-                talking.pauses.pop_front();
-                (talking.begin, talking.from) = (end + pause, before);
-                self.trace.begin(talking.begin, Side::Unit, &talking.bytes[before..talking.until()]);
+        let begun = talking.delivered;
+        let first = Span::of_char(&self.format, talking.begin, begun - talking.from);
+        let master_is_over = self.master.is_none_or(|master| master.end <= first.begin);
+        let mut upto = begun + 1;
+        if master_is_over && self.heard.is_empty() && !self.plods() {
+            upto = talking.until();
+            if talking.begin + self.chars(upto - talking.from) > to {
+                let whole = |place: &usize| talking.begin + self.chars(place + 1 - talking.from) <= to;
+                upto = (begun + 1..upto).take_while(whole).last().map_or(begun + 1, |last| last + 1);
             }
-            self.talking = Some(talking);
         }
-        let spoilt = self.master.is_some_and(|master| master.overlaps(character));
-        Some(Step::Delivered(if spoilt { garble(sent, &mut self.random, &mut self.collisions) } else { sent }))
+        self.arrived.clear();
+        self.arrived.extend_from_slice(talking.bytes.get(begun..upto)?);
+        if self.master.is_some_and(|master| master.overlaps(first)) {
+            self.arrived[0] = garble(self.arrived[0], &mut self.random, &mut self.collisions);
+        }
+        talking.delivered = upto;
+        if upto == talking.bytes.len() {
+            self.spare_answer = talking.bytes;
+            return Some(Step::Delivered);
+        }
+        if let Some(&(before, pause)) = talking.pauses.front()
+            && before == upto
+        {
+            talking.pauses.pop_front();
+            let end = talking.begin + self.chars(upto - talking.from);
+            (talking.begin, talking.from) = (end + pause, before);
+            self.trace.begin(talking.begin, Side::Unit, &talking.bytes[before..talking.until()]);
+        }
+        talking.next_end = talking.begin + self.chars(upto + 1 - talking.from);
+        self.talking = Some(talking);
+        Some(Step::Delivered)
+    }
+
+    #[cfg(test)]
+    fn plods(&self) -> bool {
+        self.plodding
+    }
+
+    #[cfg(not(test))]
+    #[expect(clippy::unused_self, reason = "tests can ask for it")]
+    const fn plods(&self) -> bool {
+        false
     }
 
     /// One character of a master's own comes back to it.

@@ -2,11 +2,13 @@
 //!
 //! It reads no clock. Whoever holds it says how far time has come.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use drivebus_rtu::{Destination, Frame, Instant, SerialFormat, UnitAddress};
 
-use crate::drive::Drive;
+use crate::drive::{Drive, Drives};
 use crate::faults::FaultKind;
 use crate::wire::{Step, Wakeup, Wire};
 
@@ -21,9 +23,11 @@ pub(crate) struct Listener(u64);
 #[derive(Debug)]
 pub(crate) struct World {
     now: Instant,
+    /// The same in nanoseconds, for who only wants to know the time.
+    shown: Arc<AtomicU64>,
     pub(crate) wire: Wire,
-    drives: BTreeMap<u8, Drive>,
-    inboxes: BTreeMap<Listener, VecDeque<u8>>,
+    drives: Drives,
+    inboxes: Vec<(Listener, VecDeque<u8>)>,
     next_listener: u64,
     plug: Plug,
 }
@@ -39,12 +43,13 @@ struct Plug {
 }
 
 impl World {
-    pub(crate) fn new(format: SerialFormat, strict_silence: bool, seed: u64, drives: BTreeMap<u8, Drive>) -> Self {
+    pub(crate) fn new(format: SerialFormat, strict_silence: bool, seed: u64, drives: Drives) -> Self {
         Self {
             now: Instant::ZERO,
+            shown: Arc::default(),
             wire: Wire::new(format, strict_silence, seed),
             drives,
-            inboxes: BTreeMap::new(),
+            inboxes: Vec::new(),
             next_listener: 0,
             plug: Plug { is_in: true, pulls: 0, back_at: None },
         }
@@ -53,6 +58,11 @@ impl World {
     /// How far time has come.
     pub(crate) fn now(&self) -> Instant {
         self.now
+    }
+
+    /// Where [`now`](Self::now) is shown, in nanoseconds.
+    pub(crate) fn shown(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.shown)
     }
 
     /// Lets everything happen that is due until `to`.
@@ -71,19 +81,23 @@ impl World {
     fn run(&mut self, to: Instant) {
         while let Some(step) = self.wire.step(to) {
             match step {
-                Step::Delivered(byte) => self.inboxes.values_mut().for_each(|inbox| put(inbox, byte)),
+                Step::Delivered => self.inboxes.iter_mut().for_each(|(_, inbox)| put(inbox, &self.wire.arrived)),
                 Step::Echoed(to, byte) => {
-                    if let Some(inbox) = self.inboxes.get_mut(&to) {
-                        put(inbox, byte);
+                    if let Some(inbox) = self.inbox_mut(to) {
+                        put(inbox, &[byte]);
                     }
                 }
-                Step::Heard { bytes, silent } => self.hear(&bytes, silent),
+                Step::Heard { bytes, silent } => {
+                    self.hear(&bytes, silent);
+                    self.wire.spare_frame = bytes;
+                }
             }
             if !self.plug.is_in {
-                self.inboxes.values_mut().for_each(VecDeque::clear);
+                self.empty_inboxes();
             }
         }
         self.now = self.now.max(to);
+        self.shown.store(self.now.as_nanos(), Ordering::Release);
     }
 
     /// The master `from` sends at `at`; returns when its last character has left.
@@ -103,7 +117,7 @@ impl World {
             self.plug.is_in = false;
             self.plug.pulls += 1;
             self.wire.cut_off(at);
-            self.inboxes.values_mut().for_each(VecDeque::clear);
+            self.empty_inboxes();
         }
         self.plug.back_at = back_at;
     }
@@ -125,7 +139,7 @@ impl World {
 
     /// The drive with the address `unit`, as it is now.
     pub(crate) fn drive(&mut self, unit: UnitAddress) -> Option<&mut Drive> {
-        let drive = self.drives.get_mut(&unit.get())?;
+        let drive = self.drives.get_mut(unit)?;
         drive.advance(self.now);
         Some(drive)
     }
@@ -134,21 +148,23 @@ impl World {
     pub(crate) fn attach(&mut self) -> Listener {
         let listener = Listener(self.next_listener);
         self.next_listener += 1;
-        self.inboxes.insert(listener, VecDeque::new());
+        self.inboxes.push((listener, VecDeque::new()));
         listener
     }
 
     /// A master is gone.
     pub(crate) fn detach(&mut self, listener: Listener) {
-        self.inboxes.remove(&listener);
+        self.inboxes.retain(|(name, _)| *name != listener);
     }
 
     /// Moves what arrived for `listener` into `buffer`; returns how much.
     pub(crate) fn take(&mut self, listener: Listener, buffer: &mut [u8]) -> usize {
-        let Some(inbox) = self.inboxes.get_mut(&listener) else { return 0 };
+        let Some(inbox) = self.inbox_mut(listener) else { return 0 };
         let count = inbox.len().min(buffer.len());
-        for (slot, byte) in buffer.iter_mut().zip(inbox.drain(..count)) {
-            *slot = byte;
+        if count > 0 {
+            for (slot, byte) in buffer.iter_mut().zip(inbox.drain(..count)) {
+                *slot = byte;
+            }
         }
         count
     }
@@ -168,7 +184,15 @@ impl World {
     /// How much `listener` has not taken.
     #[cfg(unix)]
     fn held(&self, listener: Listener) -> usize {
-        self.inboxes.get(&listener).map_or(0, VecDeque::len)
+        self.inboxes.iter().find(|(name, _)| *name == listener).map_or(0, |(_, inbox)| inbox.len())
+    }
+
+    fn inbox_mut(&mut self, listener: Listener) -> Option<&mut VecDeque<u8>> {
+        self.inboxes.iter_mut().find(|(name, _)| *name == listener).map(|(_, inbox)| inbox)
+    }
+
+    fn empty_inboxes(&mut self) {
+        self.inboxes.iter_mut().for_each(|(_, inbox)| inbox.clear());
     }
 
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.
@@ -176,12 +200,12 @@ impl World {
         let Ok(frame) = Frame::parse(bytes) else { return };
         match Destination::from_wire(frame.address()) {
             Ok(Destination::Broadcast) => {
-                for drive in self.drives.values_mut() {
+                for drive in self.drives.iter_mut() {
                     drive.handle(silent, frame.pdu());
                 }
             }
             Ok(Destination::Unit(unit)) => {
-                let Some(drive) = self.drives.get_mut(&unit.get()) else { return };
+                let Some(drive) = self.drives.get_mut(unit) else { return };
                 let hits = self.wire.faults.next();
                 if hits.has(FaultKind::Deaf) {
                     self.wire.faults.happened(FaultKind::Deaf);
@@ -202,19 +226,19 @@ impl World {
     }
 }
 
-/// A byte arrives.
-fn put(inbox: &mut VecDeque<u8>, byte: u8) {
-    if inbox.len() == INBOX {
-        inbox.pop_front();
+/// Bytes arrive.
+fn put(inbox: &mut VecDeque<u8>, bytes: &[u8]) {
+    inbox.extend(bytes);
+    if inbox.len() > INBOX {
+        inbox.drain(..inbox.len() - INBOX);
     }
-    inbox.push_back(byte);
 }
 
 #[cfg(all(test, unix))]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-    use std::sync::Arc;
+    use std::collections::BTreeMap;
     use std::time::Duration;
 
     use drivebus_rtu::{Adu, Request};
@@ -223,11 +247,75 @@ mod tests {
     use super::*;
     use crate::drive::Map;
 
+    fn world(strict_silence: bool) -> World {
+        let map = Arc::new(Map::builtin("gd350").unwrap());
+        let drive = |unit| (unit, Drive::new(UnitAddress::new(unit).unwrap(), Arc::clone(&map), Instant::ZERO));
+        World::new(SerialFormat::default(), strict_silence, 7, Drives::new(BTreeMap::from([1, 2].map(drive))))
+    }
+
+    /// What may happen to a world.
+    #[derive(Debug, Clone)]
+    enum Act {
+        /// A read of so many words of a unit, or, where it is longer than that, only its first characters.
+        Send {
+            unit: u8,
+            count: u16,
+            length: usize,
+        },
+        /// Characters that are no frame, and more than one has.
+        Babble(usize),
+        Pass(Duration),
+        Unplug,
+        Replug,
+        DelayAnswers(Duration),
+    }
+
+    fn act() -> impl Strategy<Value = Act> {
+        let send =
+            (1..=2_u8, 1..=16_u16, 3..30_usize).prop_map(|(unit, count, length)| Act::Send { unit, count, length });
+        prop_oneof![
+            6 => send,
+            8 => (0..30_000_000_u64).prop_map(|nanos| Act::Pass(Duration::from_nanos(nanos))),
+            2 => (0..1_200_000_000_u64).prop_map(|nanos| Act::Pass(Duration::from_nanos(nanos))),
+            2 => (520..2_000_usize).prop_map(Act::Babble),
+            1 => Just(Act::Unplug),
+            2 => Just(Act::Replug),
+            2 => (0..600_000_000_u64).prop_map(|nanos| Act::DelayAnswers(Duration::from_nanos(nanos))),
+        ]
+    }
+
+    /// Lets `acts` happen; says what the master had to read after each, and what the world is like in the end.
+    fn happened(mut world: World, acts: &[Act]) -> (Vec<Vec<u8>>, World) {
+        let port = world.attach();
+        let mut read = Vec::new();
+        let mut buffer = [0; 4_096];
+        for act in acts {
+            let now = world.now();
+            match *act {
+                Act::Send { unit, count, length } => {
+                    let to = UnitAddress::new(unit).unwrap().into();
+                    let frame = Adu::request(to, &Request::read(0x3000, count).unwrap());
+                    let bytes = frame.as_bytes();
+                    world.transmit(port, now, &bytes[..length.min(bytes.len())]);
+                }
+                Act::Babble(length) => {
+                    world.transmit(port, now, &vec![0x55; length]);
+                }
+                Act::Pass(time) => world.advance(now + time),
+                Act::Unplug => world.unplug(now, None),
+                Act::Replug => world.replug(),
+                Act::DelayAnswers(delay) => world.wire.spoil.delay_answers(delay, 1),
+            }
+            let count = world.take(port, &mut buffer);
+            read.push(buffer[..count].to_vec());
+        }
+        (read, world)
+    }
+
     /// Reads of `counts` words, one a second; what a port with `fifo` hands over, and when.
     fn handed_over(fifo: usize, faults: &[(u64, FaultKind)], echo: bool, counts: &[u16]) -> Vec<(Instant, Vec<u8>)> {
         let unit = UnitAddress::MIN;
-        let drive = Drive::new(unit, Arc::new(Map::builtin("gd350").unwrap()), Instant::ZERO);
-        let mut world = World::new(SerialFormat::default(), false, 7, BTreeMap::from([(1, drive)]));
+        let mut world = world(false);
         world.wire.faults.script(faults);
         world.wire.echo = echo;
         let port = world.attach();
@@ -256,7 +344,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
+        #![proptest_config(ProptestConfig::with_cases(256))]
 
         #[test]
         fn a_fifo_changes_neither_the_characters_nor_the_end_of_a_run(
@@ -281,6 +369,30 @@ mod tests {
                 place = next;
             }
             prop_assert_eq!(place, single.len());
+        }
+
+        #[test]
+        fn nothing_tells_whether_characters_came_one_by_one(
+            faults in prop::collection::vec((1..20_u64, prop::sample::select(&FaultKind::ALL[..])), 0..8),
+            strict: bool,
+            echo: bool,
+            acts in prop::collection::vec(act(), 1..60),
+        ) {
+            let [fast, slow] = [false, true].map(|plodding| {
+                let mut world = world(strict);
+                world.wire.plodding = plodding;
+                world.wire.faults.script(&faults);
+                world.wire.echo = echo;
+                happened(world, &acts)
+            });
+            prop_assert_eq!(fast.0, slow.0);
+            let [fast, slow] = [fast.1, slow.1].map(|world| {
+                let Wire { requests, silence_violations, collisions, .. } = world.wire;
+                let wakeup = world.wire.next_wakeup();
+                let counts = FaultKind::ALL.map(|kind| world.wire.faults.count(kind));
+                (world.wire.trace.to_vec(), wakeup, counts, [requests, silence_violations, collisions])
+            });
+            prop_assert_eq!(fast, slow);
         }
     }
 }

@@ -33,7 +33,7 @@ impl Drive {
         self.advance(now);
         let function = *pdu.first().filter(|&&code| code & function::EXCEPTION_BIT == 0)?;
         self.last_heard = Some(now);
-        let mut words = Vec::new();
+        let mut words = [0; MAX_WORDS as usize];
         let answer = match Request::parse(pdu) {
             Ok(request) => self.carry_out(now, &request, &mut words),
             // A range beyond FFFFH is a combination of address and quantity that leaves the valid area.
@@ -66,14 +66,15 @@ impl Drive {
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        words: &'a mut Vec<u16>,
+        words: &'a mut [u16; MAX_WORDS as usize],
     ) -> Result<Answer<'a>, Refusal> {
         match *request {
             Request::ReadHolding { address, count, .. } => {
                 check_count(count)?;
                 self.check_unlocked()?;
-                for offset in 0..count {
-                    words.push(self.word(address.wrapping_add(offset)).ok_or(Refusal::Address)?);
+                let words = &mut words[..usize::from(count)];
+                for (word, offset) in words.iter_mut().zip(0..) {
+                    *word = self.word(address.wrapping_add(offset)).ok_or(Refusal::Address)?;
                 }
                 return Answer::read(words).map_err(|_| Refusal::Structure);
             }

@@ -130,6 +130,8 @@ pub(crate) struct Machine {
     output: Output,
     load: f64,
     heat: f64,
+    /// How fast heat builds up (or goes, below zero). Between two events neither the torque nor the current changes.
+    heating: f64,
     fault: Option<u16>,
     /// A fault whose cause is still there cannot be reset.
     held: bool,
@@ -137,7 +139,8 @@ pub(crate) struct Machine {
 
 impl Machine {
     pub(crate) fn new(now: Instant, load: f64) -> Self {
-        Self { now, output: Output::Off { rpm: 0.0, since: now }, load, heat: 0.0, fault: None, held: false }
+        let output = Output::Off { rpm: 0.0, since: now };
+        Self { now, output, load, heat: 0.0, heating: -COOLING, fault: None, held: false }
     }
 
     /// Lets time pass until `to`; returns the fault that tripped the drive on the way, if one did.
@@ -151,13 +154,14 @@ impl Machine {
             let overload = self.overload_at();
             let next = [turn, overload, Some(to)].into_iter().flatten().min().unwrap_or(to);
             let seconds = next.saturating_duration_since(self.now).as_secs_f64();
-            self.heat = (self.heat + self.heating() * seconds).max(0.0);
+            self.heat = (self.heat + self.heating * seconds).max(0.0);
             self.now = next;
             if overload == Some(next) {
                 self.trip(OL1);
                 tripped = Some(OL1);
-            } else {
+            } else if turn == Some(next) {
                 self.finish_stop();
+                self.heating = self.heating();
             }
         }
         tripped
@@ -217,6 +221,7 @@ impl Machine {
             *since = self.now;
         }
         self.load = load;
+        self.heating = self.heating();
     }
 
     pub(crate) fn load(&self) -> f64 {
@@ -296,10 +301,12 @@ impl Machine {
         };
         self.output = Output::On { purpose, ramp: Ramp::new(self.now, from, to, slopes) };
         self.finish_stop();
+        self.heating = self.heating();
     }
 
     fn turn_off(&mut self) {
         self.output = Output::Off { rpm: self.speed(), since: self.now };
+        self.heating = self.heating();
     }
 
     /// A stop that has reached 0 Hz switches the output off.
@@ -311,7 +318,7 @@ impl Machine {
         }
     }
 
-    /// How fast heat builds up (or goes, below zero) at this working point.
+    /// The heating at this working point.
     fn heating(&self) -> f64 {
         let current = self.working_point().current_share();
         if current > OVERLOAD_CURRENT { current.powi(2) - OVERLOAD_CURRENT.powi(2) } else { -COOLING }
@@ -319,11 +326,10 @@ impl Machine {
 
     /// When the overload trips if nothing changes before.
     fn overload_at(&self) -> Option<Instant> {
-        let heating = self.heating();
-        if heating <= 0.0 {
+        if self.heating <= 0.0 {
             return None;
         }
-        let time = Duration::try_from_secs_f64((TRIP_HEAT - self.heat) / heating).unwrap_or(Duration::ZERO);
+        let time = Duration::try_from_secs_f64((TRIP_HEAT - self.heat) / self.heating).unwrap_or(Duration::ZERO);
         // At least one nanosecond, so that the moment lies ahead and is reached.
         Some(self.now + time.max(Duration::from_nanos(1)))
     }

@@ -1,11 +1,13 @@
 //! What a profile says about each word of a drive, with factory values where the manuals print none.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use drivebus_drives::{Access as ProfileAccess, Entry, Kind, Profile, ProfileError, Quantity, Value};
 use drivebus_rtu::UnitAddress;
 
 use super::addresses as at;
+use super::places::Places;
 
 /// When a word may be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,18 +37,36 @@ struct Word {
 pub(crate) struct Map {
     profile: String,
     identification: u16,
-    words: BTreeMap<u16, Word>,
+    /// By address.
+    words: Vec<(u16, Word)>,
+    places: Places,
+    /// Where the parameters stand among the parameters, by address.
+    parameters: Arc<Places>,
 }
 
 impl Map {
     /// The words of the shipped profile `name`.
     pub(crate) fn builtin(name: &str) -> Result<Self, ProfileError> {
         let profile = Profile::builtin(name)?;
-        let words = profile.entries().map(|entry| (entry.address(), word(&profile, entry))).collect();
+        let words: BTreeMap<u16, Word> =
+            profile.entries().map(|entry| (entry.address(), word(&profile, entry))).collect();
         // A profile lists its siblings' codes too; the first of its own name is the plain model.
         let own = profile.identifications().iter().find(|listed| listed.family == profile.name());
         let identification = own.map_or(0, |listed| listed.code);
-        Ok(Self { profile: profile.name().to_owned(), identification, words })
+        let places = Places::new(words.keys().copied());
+        let of_parameters = words.iter().filter(|(_, word)| word.parameter).map(|(&address, _)| address);
+        let parameters = Arc::new(Places::new(of_parameters));
+        let words = words.into_iter().collect();
+        Ok(Self { profile: profile.name().to_owned(), identification, words, places, parameters })
+    }
+
+    fn word(&self, address: u16) -> Option<&Word> {
+        self.places.of(address).and_then(|place| self.words.get(place)).map(|(_, word)| word)
+    }
+
+    /// Where each parameter stands in [`factory`](Self::factory).
+    pub(crate) fn parameters(&self) -> Arc<Places> {
+        Arc::clone(&self.parameters)
     }
 
     pub(crate) fn profile(&self) -> &str {
@@ -59,20 +79,20 @@ impl Map {
     }
 
     pub(crate) fn has(&self, address: u16) -> bool {
-        self.words.contains_key(&address)
+        self.places.of(address).is_some()
     }
 
     pub(crate) fn is_parameter(&self, address: u16) -> bool {
-        self.words.get(&address).is_some_and(|word| word.parameter)
+        self.word(address).is_some_and(|word| word.parameter)
     }
 
     pub(crate) fn access(&self, address: u16) -> Access {
-        self.words.get(&address).map_or(Access::ReadOnly, |word| word.access)
+        self.word(address).map_or(Access::ReadOnly, |word| word.access)
     }
 
     /// Whether `raw` is in range; `parameter` tells the parameters that the range depends on.
     pub(crate) fn allows(&self, address: u16, raw: u16, parameter: impl Fn(u16) -> u16) -> bool {
-        let Some(word) = self.words.get(&address) else { return false };
+        let Some(word) = self.word(address) else { return false };
         let count = |raw| word.quantity.decode(raw).count();
         let value = count(raw);
         let bound = |address: Option<u16>| address.map(|address| count(parameter(address)));
@@ -81,11 +101,11 @@ impl Map {
         above && below
     }
 
-    /// Every parameter with its factory value, in a drive with the address `unit`.
-    pub(crate) fn factory(&self, unit: UnitAddress) -> impl Iterator<Item = (u16, u16)> {
-        self.words.iter().filter(|(_, word)| word.parameter).map(move |(&address, word)| match address {
-            at::UNIT_ADDRESS => (address, u16::from(unit.get())),
-            _ => (address, word.factory),
+    /// The factory value of every parameter, in a drive with the address `unit`.
+    pub(crate) fn factory(&self, unit: UnitAddress) -> impl Iterator<Item = u16> {
+        self.words.iter().filter(|(_, word)| word.parameter).map(move |(address, word)| match *address {
+            at::UNIT_ADDRESS => u16::from(unit.get()),
+            _ => word.factory,
         })
     }
 }

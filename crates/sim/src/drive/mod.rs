@@ -8,9 +8,11 @@
 //! - Assumption: baud rate, format and address (P14.00 to P14.02) are stored, and change nothing.
 
 mod addresses;
+mod all;
 mod bus;
 mod machine;
 mod map;
+mod places;
 mod refusal;
 mod settings;
 mod store;
@@ -23,6 +25,7 @@ use std::time::Duration;
 use drivebus_rtu::{Instant, UnitAddress};
 
 use addresses as at;
+pub(crate) use all::Drives;
 use machine::{Command, Machine, RunState, Settings};
 pub(crate) use map::Map;
 use store::Store;
@@ -73,7 +76,7 @@ pub(crate) struct Drive {
 impl Drive {
     /// A drive fresh from the factory, switched on at `now`.
     pub(crate) fn new(unit: UnitAddress, map: Arc<Map>, now: Instant) -> Self {
-        let store = Store::new(map.factory(unit));
+        let store = Store::new(map.parameters(), map.factory(unit));
         let control = [0; CONTROL_WORDS];
         let settings = settings::settings(&store, &control);
         Self {

@@ -1,73 +1,71 @@
 //! Parameters in two memories: EEPROM, which outlives the power, and RAM, which the drive works with.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// One parameter in both memories.
-#[derive(Debug)]
-struct Cell {
-    eeprom: u16,
-    ram: u16,
-    writes: u64,
-}
+use super::places::Places;
 
 /// All parameters of one drive, by address.
 ///
 /// Assumption: each word written to a plain address wears the EEPROM, also where it changes nothing. What the drive
 /// keeps by itself (its fault history) is not counted.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Store {
-    cells: BTreeMap<u16, Cell>,
+    /// Where a parameter stands in the lists; all drives of a family share it.
+    places: Arc<Places>,
+    ram: Vec<u16>,
+    eeprom: Vec<u16>,
+    /// Words written to the EEPROM from the bus, by address.
+    writes: BTreeMap<u16, u64>,
 }
 
 impl Store {
-    /// A store with factory values.
-    pub(crate) fn new(factory: impl IntoIterator<Item = (u16, u16)>) -> Self {
-        let cells =
-            factory.into_iter().map(|(address, word)| (address, Cell { eeprom: word, ram: word, writes: 0 })).collect();
-        Self { cells }
+    /// A store with factory values, in the order of `places`.
+    pub(crate) fn new(places: Arc<Places>, factory: impl IntoIterator<Item = u16>) -> Self {
+        let ram: Vec<u16> = factory.into_iter().collect();
+        Self { places, eeprom: ram.clone(), ram, writes: BTreeMap::new() }
     }
 
     /// The value in force; `None` where there is no such parameter.
     pub(crate) fn get(&self, address: u16) -> Option<u16> {
-        self.cells.get(&address).map(|cell| cell.ram)
+        self.places.of(address).and_then(|place| self.ram.get(place)).copied()
     }
 
     /// As a plain address does: both memories.
     pub(crate) fn write_eeprom(&mut self, address: u16, word: u16) {
-        if let Some(cell) = self.cells.get_mut(&address) {
-            *cell = Cell { eeprom: word, ram: word, writes: cell.writes + 1 };
+        if self.places.of(address).is_some() {
+            self.keep(address, word);
+            *self.writes.entry(address).or_default() += 1;
         }
     }
 
     /// As an address with the top bit does: lost with the power.
     pub(crate) fn write_ram(&mut self, address: u16, word: u16) {
-        if let Some(cell) = self.cells.get_mut(&address) {
-            cell.ram = word;
+        if let Some(cell) = self.places.of(address).and_then(|place| self.ram.get_mut(place)) {
+            *cell = word;
         }
     }
 
     /// The drive itself keeps `word` for good.
     pub(crate) fn keep(&mut self, address: u16, word: u16) {
-        if let Some(cell) = self.cells.get_mut(&address) {
-            cell.eeprom = word;
-            cell.ram = word;
+        self.write_ram(address, word);
+        if let Some(cell) = self.places.of(address).and_then(|place| self.eeprom.get_mut(place)) {
+            *cell = word;
         }
     }
 
     /// Power off and on: what was only in RAM is lost.
     pub(crate) fn power_cycle(&mut self) {
-        for cell in self.cells.values_mut() {
-            cell.ram = cell.eeprom;
-        }
+        self.ram.copy_from_slice(&self.eeprom);
     }
 
     /// Words written to the EEPROM from the bus.
     pub(crate) fn eeprom_writes(&self) -> u64 {
-        self.cells.values().map(|cell| cell.writes).sum()
+        self.writes.values().sum()
     }
 
     /// Words written to one EEPROM address from the bus.
     pub(crate) fn eeprom_writes_of(&self, address: u16) -> u64 {
-        self.cells.get(&address).map_or(0, |cell| cell.writes)
+        self.writes.get(&address).copied().unwrap_or(0)
     }
 }

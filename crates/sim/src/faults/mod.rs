@@ -58,6 +58,8 @@ impl Default for Times {
 pub(crate) struct Faults {
     random: Random,
     rates: [f64; KINDS],
+    /// Whether one of the rates is more than nothing.
+    by_rate: bool,
     /// By the number of the answer.
     script: BTreeMap<u64, Hits>,
     /// Answers since the script began.
@@ -73,6 +75,7 @@ impl Faults {
         Self {
             random: Random::new(seed ^ OWN_CHANCE),
             rates: [0.0; KINDS],
+            by_rate: false,
             script: BTreeMap::new(),
             answers: 0,
             counts: [0; KINDS],
@@ -84,6 +87,7 @@ impl Faults {
     /// `share` is 0.0..=1.0.
     pub(crate) fn set_rate(&mut self, kind: FaultKind, share: f64) {
         self.rates[kind.index()] = share;
+        self.by_rate = self.rates.iter().any(|&rate| rate > 0.0);
     }
 
     pub(crate) fn rate(&self, kind: FaultKind) -> f64 {
@@ -102,6 +106,7 @@ impl Faults {
     /// Forgets rates and script; what was counted stays.
     pub(crate) fn clear(&mut self) {
         self.rates = [0.0; KINDS];
+        self.by_rate = false;
         self.script.clear();
     }
 
@@ -113,6 +118,9 @@ impl Faults {
     pub(crate) fn next(&mut self) -> Hits {
         self.answers += 1;
         let mut hits = self.script.remove(&self.answers).unwrap_or_default();
+        if !self.by_rate {
+            return hits;
+        }
         for kind in FaultKind::ALL {
             let rate = self.rates[kind.index()];
             if rate > 0.0 && self.random.happens(rate) {
