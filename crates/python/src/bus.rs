@@ -7,9 +7,9 @@ use drivebus_line::{
     AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind,
     Priority, UnitOptions,
 };
-use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
+use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, MAX_READ, Request};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::convert::{bytes_of, one_word, unit_address, words_of};
 use crate::errors::{call_error, not_allowed, port_error, refuse};
@@ -114,30 +114,30 @@ impl Bus {
 
     #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
-    fn read(
+    fn read<'py>(
         &self,
-        unit: &Bound<'_, PyAny>,
+        unit: &Bound<'py, PyAny>,
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
         timeout: Option<f64>,
         retries: Option<u32>,
         urgent: bool,
         verify: bool,
-    ) -> PyResult<Vec<u16>> {
+    ) -> PyResult<Bound<'py, PyList>> {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         let options = CallOptions { timeout, retries, verify, priority: stop_if(urgent), ..CallOptions::default() };
         Ok(self.read_words(unit, address, count, options)?.0)
     }
 
     #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
-    fn read_stamped(
+    fn read_stamped<'py>(
         &self,
-        unit: &Bound<'_, PyAny>,
+        unit: &Bound<'py, PyAny>,
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
         urgent: bool,
         verify: bool,
-    ) -> PyResult<(Vec<u16>, f64, f64)> {
+    ) -> PyResult<(Bound<'py, PyList>, f64, f64)> {
         let options = CallOptions { verify, priority: stop_if(urgent), ..CallOptions::default() };
         let (words, done) = self.read_words(unit, address, count, options)?;
         let clock = self.unix_clock(unit.py());
@@ -256,22 +256,24 @@ impl Bus {
 }
 
 impl Bus {
-    fn read_words(
+    fn read_words<'py>(
         &self,
-        unit: &Bound<'_, PyAny>,
+        unit: &Bound<'py, PyAny>,
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
         options: CallOptions,
-    ) -> PyResult<(Vec<u16>, Done)> {
+    ) -> PyResult<(Bound<'py, PyList>, Done)> {
         let py = unit.py();
         let request = Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)?;
-        let mut read = Vec::new();
+        // Kept here while the interpreter is let go of, so that only the list is made.
+        let (mut read, mut count) = ([0; MAX_READ as usize], 0);
         let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
             if let Answer::Read { words, .. } = answer {
-                read = words.iter().collect();
+                count = words.len();
+                read.iter_mut().zip(words.iter()).for_each(|(slot, word)| *slot = word);
             }
         })?;
-        Ok((read, done))
+        Ok((PyList::new(py, &read[..count])?, done))
     }
 
     fn write_to(
