@@ -108,7 +108,7 @@ pub(crate) fn exchange(
         let wake = now + LOOK_UP;
         until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
         if let Some(nearly) = pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, master.lacks())) {
-            line.sleep(nearly.min(wake));
+            line.sleep(nearly.min(until));
             // What has come by then is taken without waiting for more.
             until = now;
         }

@@ -52,8 +52,6 @@ pub struct Framer {
     expect: Option<(UnitAddress, Expected)>,
     /// The request whose answer is looked for: an adapter may send it back to us.
     own: Adu,
-    /// Silence was seen and could not decide: only new bytes can.
-    settled: bool,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
     overrun: bool,
 }
@@ -84,7 +82,6 @@ impl Framer {
             last: None,
             expect: None,
             own: Adu::new(),
-            settled: false,
             overrun: false,
         }
     }
@@ -127,7 +124,6 @@ impl Framer {
             self.bytes[self.len..self.len + count].copy_from_slice(&bytes[..count]);
             self.len += count;
             self.last = self.last.max(Some(now));
-            self.settled = false;
         }
         count
     }
@@ -138,7 +134,7 @@ impl Framer {
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         match self.last {
-            Some(last) if self.len > self.taken && !self.settled => Some(last + self.silence),
+            Some(last) if self.len > self.taken && self.lacks() == 0 => Some(last + self.silence),
             _ => None,
         }
     }
@@ -167,7 +163,6 @@ impl Framer {
         self.len = 0;
         self.taken = 0;
         self.ended = 0;
-        self.settled = false;
         self.overrun = false;
         dropped
     }
@@ -224,7 +219,6 @@ impl Framer {
             None => 0,
         };
         if give_up == 0 {
-            self.settled = quiet;
             return None;
         }
         let range = 0..give_up;
@@ -363,21 +357,21 @@ impl Framer {
     }
 
     /// How many bytes the answer looked for, or our own request before it, lacks at least; 0 where nothing of it is
-    /// there, or only silence tells.
+    /// there, or where silence would tell more.
     pub(crate) fn lacks(&self) -> usize {
         let here = self.pending();
         if !self.is_expected(self.taken) {
             return 0;
         }
-        let answer = match *here {
+        let own = self.own.as_bytes();
+        let own = own.starts_with(here).then_some(own.len());
+        let answer = self.is_beginning_of_answer(here).then(|| match *here {
             // It may be a refusal.
             [_] => EXCEPTION_ADU,
             [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
             _ => self.answer_len().unwrap_or_default(),
-        };
-        let own = self.own.as_bytes();
-        let len = if own.starts_with(here) { answer.min(own.len()) } else { answer };
-        len.saturating_sub(here.len())
+        });
+        own.into_iter().chain(answer).min().map_or(0, |len| len.saturating_sub(here.len()))
     }
 
     fn is_quiet(&self, now: Instant) -> bool {

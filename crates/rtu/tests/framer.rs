@@ -204,15 +204,15 @@ fn what_begins_after_a_silence_is_not_cut_though_nobody_looked() {
 }
 
 #[test]
-fn a_deadline_passed_without_a_verdict_is_not_offered_again() {
+fn silence_is_no_deadline_for_an_answer_that_only_lacks_its_end() {
     let unit = UnitAddress::MIN;
     let answer = Adu::answer(unit, &Answer::read(&[1, 2]).unwrap());
     let mut framer = Framer::new(SILENCE);
     framer.expect(unit, Request::read(0, 2).unwrap().expected());
     framer.receive(at(0), &answer.as_bytes()[..6]);
-    assert_eq!(framer.deadline(), Some(at(1_750)));
+    assert_eq!(framer.deadline(), None, "only bytes can help");
     assert_eq!(framer.poll(at(1_750)), None);
-    assert_eq!(framer.deadline(), None, "only bytes can help now; a loop would spin on the old deadline");
+    assert_eq!(framer.deadline(), None, "a loop would spin on a deadline that is over");
 }
 
 #[test]
