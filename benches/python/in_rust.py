@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 import subprocess
-from pathlib import Path
+import sys
 
 from benches.python import programs
 from benches.python.figures import markdown, nanoseconds, show
@@ -22,12 +22,10 @@ def criterion() -> dict[str, float]:
     """Median nanoseconds by name."""
     shutil.rmtree(CRITERION, ignore_errors=True)
     cargo = os.environ.get("CARGO", "cargo")
-    subprocess.run(
-        [cargo, "bench", "--locked", "--quiet", "-p", "drivebus-benches"],
-        cwd=programs.ROOT,
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+    command = [cargo, "bench", "--locked", "--quiet", "-p", "drivebus-benches"]
+    done = subprocess.run(command, cwd=programs.ROOT, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stdout + done.stderr)
     medians = {}
     for path in CRITERION.glob("**/new/benchmark.json"):
         name = json.loads(path.read_text(encoding="utf-8"))["full_id"]
@@ -43,19 +41,21 @@ def in_c() -> dict[str, float]:
     return {f"crc/{method}/{size}": took for size, methods in sizes.items() for method, took in methods.items()}
 
 
-def order(name: str) -> list[tuple[int, str]]:
-    """Sorts CRCs by number of bytes, everything else by name."""
-    what, *rest = name.split("/")
-    number = int(rest[-1]) if rest and rest[-1].isdigit() else 0
-    return [(0, what), (number, ""), (0, "/".join(rest))]
-
-
-def label(name: str) -> tuple[str, str]:
-    """Of `crc/drivebus/8`: what is done, and by whom."""
-    parts = name.split("/")
-    if parts[0] == "crc":
-        return f"CRC of {Path(name).name} bytes", parts[1]
-    return parts[0], "/".join(parts[1:])
+def tables(medians: dict[str, float]) -> str:
+    """One of CRCs, a column for each number of bytes, and one of all the rest."""
+    crc: dict[str, dict[int, float]] = {}
+    rest = []
+    for name, took in sorted(medians.items()):
+        what, _, by = name.partition("/")
+        if what == "crc":
+            engine, _, size = by.rpartition("/")
+            crc.setdefault(engine, {})[int(size)] = took
+        else:
+            rest.append([what, by, nanoseconds(took)])
+    sizes = sorted(crc["drivebus"])
+    rows = [[engine, *(nanoseconds(took[size]) for size in sizes)] for engine, took in crc.items()]
+    head = ["CRC of", *(f"{size} bytes" for size in sizes)]
+    return f"{markdown(head, rows)}\n\n{markdown(['what', 'by', 'median'], rest)}"
 
 
 def main() -> None:
@@ -67,8 +67,7 @@ def main() -> None:
     medians = criterion()
     # The machine's mood may change meanwhile: C has the better of before and after.
     medians |= {name: min(took, before[name]) for name, took in in_c().items()}
-    rows = [[*label(name), nanoseconds(medians[name])] for name in sorted(medians, key=order)]
-    show(given.json, medians, markdown(["what", "by", "median"], rows))
+    show(given.json, medians, tables(medians))
 
 
 if __name__ == "__main__":

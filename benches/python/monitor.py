@@ -1,7 +1,8 @@
-"""What reading a drive by names costs beyond the line: processor time of `drive.monitor()` and of the same raw reads.
+"""What reading a drive by names costs beyond the line: processor time of `drive.monitor()`, a poll, and raw reads.
 
 At the other end is the slave in C that answers at once (see `unpaced`); all 23 monitor registers of a GD350 are read
-in the few requests that the planner makes of them. Figures are medians of the runs, which take turns.
+in the few requests that the planner makes of them. A poll asks without Python in the loop;
+its samples are taken and decoded. Figures are medians of the runs, which take turns.
 
 usage: python -m benches.python.monitor [--runs 5] [--seconds 0.5] [--json]
 """
@@ -21,7 +22,8 @@ from benches.python.unpaced import BAUDRATE
 
 import drivebus
 
-HEAD = ["what", "requests each", "a second", "processor time of each", "beyond the raw reads"]
+RAW, MONITOR, POLL = "bus.read() of the same words", "drive.monitor()", "bus.poll(), each sample decoded"
+HEAD = ["what", "registers in requests", "a second", "processor time of each", "beyond the raw reads"]
 
 
 class Run(NamedTuple):
@@ -31,17 +33,49 @@ class Run(NamedTuple):
     cpu: float
 
 
-def timed(work: Callable[[], object], seconds: float) -> Run:
-    """Calls *work* for so long."""
+def timed(work: Callable[[], int], seconds: float) -> Run:
+    """Calls *work*, which says how often it did its work, for so long."""
     for _ in range(20):
         work()
     count, cpu = 0, time.process_time()
     now = start = time.perf_counter()
     while now - start < seconds:
-        work()
-        count += 1
+        count += work()
         now = time.perf_counter()
     return Run((now - start) / count, (time.process_time() - cpu) / count)
+
+
+def taken(poll: drivebus.Poll) -> Callable[[], int]:
+    """Takes the samples that have come, and decodes them."""
+    return lambda: sum(1 for sample in poll.batch() if dict(sample))
+
+
+def measure(runs: int, seconds: float) -> tuple[int, int, dict[str, list[Run]]]:
+    """How many registers in how many requests, and all runs of each way to read them."""
+    with (
+        programs.beside("awake"),
+        programs.beside("slave") as port,
+        drivebus.Bus(port, baudrate=BAUDRATE, parity="N", stopbits=2, silence=0.0) as bus,
+    ):
+        drive = bus.drive(UNIT, "gd350")
+        names = list(drive.monitor())
+        reads = drivebus.Profile.builtin("gd350")._native.compile(names).reads
+
+        def raw() -> int:
+            for address, count in reads:
+                bus.read(UNIT, address, count)
+            return 1
+
+        def monitor() -> int:
+            return len(drive.monitor()) // len(names)
+
+        measured: dict[str, list[Run]] = {RAW: [], MONITOR: [], POLL: []}
+        for _ in range(runs):
+            measured[RAW].append(timed(raw, seconds))
+            measured[MONITOR].append(timed(monitor, seconds))
+            with bus.poll({drive: None}) as poll:
+                measured[POLL].append(timed(taken(poll), seconds))
+        return len(names), len(reads), measured
 
 
 def main() -> None:
@@ -51,38 +85,15 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=0.5, help="of each run")
     options.add_argument("--json", action="store_true", help="figures instead of a table")
     given = options.parse_args()
-    with (
-        programs.beside("awake"),
-        programs.beside("slave") as port,
-        drivebus.Bus(port, baudrate=BAUDRATE, parity="N", stopbits=2, silence=0.0) as bus,
-    ):
-        drive = bus.drive(UNIT, "gd350")
-        names = list(drive.monitor())
-        asked = bus.stats().requests
-        drive.monitor()
-        requests = bus.stats().requests - asked
-        reads = drivebus.Profile.builtin("gd350")._native.compile(names).reads
-
-        def raw() -> None:
-            for address, count in reads:
-                bus.read(UNIT, address, count)
-
-        kinds: dict[str, Callable[[], object]] = {"raw reads": raw, "drive.monitor()": drive.monitor}
-        runs: dict[str, list[Run]] = {kind: [] for kind in kinds}
-        for _ in range(given.runs):
-            for kind, work in kinds.items():
-                runs[kind].append(timed(work, given.seconds))
-    beyond = statistics.median(
-        monitor.cpu - raw.cpu for monitor, raw in zip(runs["drive.monitor()"], runs["raw reads"], strict=True)
-    )
-    figures: dict[str, object] = {"registers": len(names), "requests": requests, "beyond": beyond}
+    registers, requests, measured = measure(given.runs, given.seconds)
+    figures: dict[str, object] = {"registers": registers, "requests": requests}
     rows = []
-    for kind, all_runs in runs.items():
-        wall = statistics.median(run.wall for run in all_runs)
-        cpu = statistics.median(run.cpu for run in all_runs)
-        figures[kind] = {"wall": wall, "cpu": cpu}
-        extra = f"{1e6 * beyond:.1f} µs" if kind != "raw reads" else ""
-        rows.append([kind, str(requests), f"{1 / wall:.0f}", f"{1e6 * cpu:.1f} µs", extra])
+    for kind, runs in measured.items():
+        wall, cpu = (statistics.median(times) for times in zip(*runs, strict=True))
+        beyond = statistics.median(run.cpu - raw.cpu for run, raw in zip(runs, measured[RAW], strict=True))
+        figures[kind] = {"wall": wall, "cpu": cpu, "beyond": beyond}
+        extra = "" if kind == RAW else f"{1e6 * beyond:.1f} µs"
+        rows.append([kind, f"{registers} in {requests}", f"{1 / wall:.0f}", f"{1e6 * cpu:.1f} µs", extra])
     show(given.json, figures, markdown(HEAD, rows))
 
 
