@@ -1,17 +1,20 @@
 """What a program can say about time: units that need more of it, and values that are none."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 
 import drivebus
 
 
 @pytest.fixture
-def bus():
+def bus() -> Iterator[drivebus.Bus]:
     with drivebus.Bus("sim://1=gd350,2=gd350?clock=virtual") as bus:
         yield bus
 
 
-def test_a_unit_can_be_given_its_own_silence(bus):
+def test_a_unit_can_be_given_its_own_silence(bus: drivebus.Bus) -> None:
     bus.read(1, 0x2100)
     _, _, before = bus.read_stamped(1, 0x2100)
     bus.configure(1, gap=0.25)
@@ -23,9 +26,10 @@ def test_a_unit_can_be_given_its_own_silence(bus):
     assert sent - before == pytest.approx(bus.format.t35, abs=1e-6)
 
 
-def test_a_unit_can_be_given_its_own_time_out(bus):
+def test_a_unit_can_be_given_its_own_time_out(bus: drivebus.Bus) -> None:
     bus.read(1, 0x2100)
     bus.configure(1, timeout=0.05)
+    assert bus.simulator is not None
     bus.simulator.line.set_faults(silence=1.0)
     with pytest.raises(drivebus.NoAnswer, match="50 ms"):
         bus.read(1, 0x2100)
@@ -42,12 +46,12 @@ def test_a_unit_can_be_given_its_own_time_out(bus):
         ({"unit": 1, "gap": "long"}, "gap"),
     ],
 )
-def test_what_is_no_time_is_refused(bus, arguments, message):
+def test_what_is_no_time_is_refused(bus: drivebus.Bus, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(drivebus.NotAllowed, match=message):
         bus.configure(**arguments)
 
 
-def test_the_turnaround_is_the_buss_own():
+def test_the_turnaround_is_the_buss_own() -> None:
     with drivebus.Bus("sim://gd350?clock=virtual", turnaround=0.4) as bus:
         start = bus.now()
         bus.broadcast(0x2000, 5)
@@ -56,7 +60,7 @@ def test_the_turnaround_is_the_buss_own():
         drivebus.Bus("sim://gd350", turnaround=-1)
 
 
-def test_the_delay_of_a_unit_is_counted(bus):
+def test_the_delay_of_a_unit_is_counted(bus: drivebus.Bus) -> None:
     bus.read(1, 0x2100)
     bus.read(1, 0x2100)
     delay = bus.stats().units[1].delay
