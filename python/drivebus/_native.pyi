@@ -12,11 +12,14 @@ from typing_extensions import Buffer
 
 __version__: Final[str]
 __all__ = [
+    "Asked",
     "Batch",
     "Bus",
+    "Mailbox",
     "Plan",
     "Poller",
     "Profile",
+    "Requests",
     "SerialFormat",
     "SimulatedDrive",
     "SimulatedLine",
@@ -29,6 +32,7 @@ __all__ = [
     "encode_read",
     "encode_write",
     "fault_kinds",
+    "open_bus",
     "port_facts",
 ]
 
@@ -209,6 +213,86 @@ class Bus:
 
         Counters are ints, latencies seconds.
         """
+
+@final
+class Mailbox:
+    """Where the threads of the core leave what is meant for one event loop."""
+
+    def __new__(cls) -> Mailbox: ...
+    def fileno(self) -> int:
+        """A socket that is readable when something was left; it lasts as long as this does."""
+    def detach_socket(self) -> int:
+        """The same socket once more, for the caller to close."""
+    def take(self) -> list[tuple[int, Any, BaseException | None]]:
+        """All that was left since: a number, and the value or the exception that belongs to it."""
+
+@final
+class Asked:
+    """Something that was asked for an event loop."""
+
+    @property
+    def number(self) -> int:
+        """Under which its answer comes."""
+    def abandon(self) -> None:
+        """It is no longer wanted: what still waits is not sent, and what is on the wire is not repeated."""
+
+@final
+class Requests:
+    """A bus, as an event loop uses it: nothing here waits, and what comes is left in the mailbox.
+
+    Arguments as those of `Bus`.
+    """
+
+    def __new__(cls, bus: Bus, mailbox: Mailbox) -> Requests: ...
+    def read(
+        self,
+        unit: int,
+        address: int,
+        count: int,
+        /,
+        *,
+        timeout: float | None = None,
+        retries: int | None = None,
+        urgent: bool = False,
+        verify: bool = False,
+    ) -> Asked: ...
+    def read_stamped(
+        self, unit: int, address: int, count: int, /, *, urgent: bool = False, verify: bool = False
+    ) -> Asked: ...
+    def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+    ) -> Asked: ...
+    def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked: ...
+    def echo(self, unit: int, word: int | None = None, /) -> Asked: ...
+    def transact(self, unit: int, pdu: bytes, reply_length: int | None = None, /) -> Asked: ...
+    def link(self, unit: int, /) -> Asked: ...
+    def sleep(self, seconds: float, /) -> Asked: ...
+    def listen(self, seconds: float, /) -> Asked: ...
+    def close(self) -> Asked: ...
+
+def open_bus(
+    mailbox: Mailbox,
+    port: object,
+    format: SerialFormat,  # noqa: A002
+    *,
+    timeout: float = 0.5,
+    retries: int = 2,
+    read_only: bool = False,
+    rs485: Mapping[str, object] | None = None,
+    echo: str = "auto",
+    turnaround: float = 0.1,
+    learn_timeout: bool = False,
+    low_latency: bool = True,
+) -> Asked:
+    """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 
 @final
 class Profile:

@@ -11,23 +11,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native, checks, ports
+from drivebus import _native, checks, who
 from drivebus._native import SerialFormat
+from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import NotAllowed
+from drivebus.opening import BusFace, Opening
 from drivebus.poll import Poll, Sample
-from drivebus.profile import Profile, identify, profiles
-from drivebus.sim import Simulator
-from drivebus.values import Found, Link, Stats
+from drivebus.profile import Profile
+from drivebus.values import Found, Link
 
 __all__ = ["Bus"]
 
-_IDENTIFICATION = "identification_code"
-_SCAN_TIMEOUT = 0.1
-"""Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
 
-
-class Bus:
+class Bus(BusFace[_native.Bus]):
     """One line, opened at once. Safe from any thread; requests of several threads take turns.
 
     Args:
@@ -61,9 +58,6 @@ class Bus:
         format: The `SerialFormat` in force.
     """
 
-    simulator: Simulator | None
-    format: SerialFormat
-
     def __init__(
         self,
         port: object,
@@ -82,51 +76,26 @@ class Bus:
         learn_timeout: bool = False,
         low_latency: bool = True,
     ) -> None:
-        turnaround = checks.number("turnaround", turnaround, 0.0, 3600.0)
-        timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
-        retries = checks.whole("retries", retries, 0, 100)
-        if rs485 is not None and not isinstance(rs485, Mapping):
-            raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
-        asked = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
-        target = ports.resolve(port, asked)
-        self.format = ports.format_of(target, asked)
-        self.simulator = target if isinstance(target, Simulator) else None
-        self._owned = target if target is not port and not isinstance(target, str) else None
-        if isinstance(target, Simulator):
-            target = target._native if target.transport == "process" else target.port
-        self._native = _native.Bus(
-            target,
-            self.format,
+        opening = Opening(
+            port,
+            SerialFormat(baudrate, parity, stopbits, bytesize, silence),
             timeout=timeout,
             retries=retries,
             read_only=read_only,
-            rs485=None if rs485 is None else dict(rs485),
+            rs485=rs485,
             echo=echo,
             turnaround=turnaround,
             learn_timeout=learn_timeout,
             low_latency=low_latency,
         )
-        self._timeout = timeout
+        super().__init__(opening, _native.Bus(opening.target, opening.format, **opening.keywords))
 
-    @property
-    def port(self) -> str:
-        """What was opened, for people."""
-        return self._native.port
-
-    @property
-    def closed(self) -> bool:
-        """Whether `close` was called; in a forked child True, for the line is its parent's."""
-        return self._native.closed
-
-    @property
-    def read_only(self) -> bool:
-        """Whether every write is refused."""
-        return self._native.read_only
-
-    @property
-    def timeout(self) -> float:
-        """Seconds a unit is given to answer."""
-        return self._timeout
+    @classmethod
+    def around(cls, opening: Opening, native: _native.Bus) -> Bus:
+        """Another face of a bus that is open."""
+        self = cls.__new__(cls)
+        BusFace.__init__(self, opening, native)
+        return self
 
     def close(self) -> None:
         """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
@@ -145,16 +114,9 @@ class Bus:
     ) -> None:
         self.close()
 
-    def __repr__(self) -> str:
-        return f"<Bus on {self.port}{', closed' if self.closed else ''}>"
-
-    def now(self) -> float:
-        """Seconds on the line's clock: real time, or the simulation's."""
-        return self._native.now()
-
     def sleep(self, seconds: float, /) -> None:
         """Waits on the line's clock. Ctrl-C ends it at once."""
-        self._native.sleep(checks.number("seconds", seconds, 0.0))
+        return self._native.sleep(checks.number("seconds", seconds, 0.0))
 
     def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
         """What comes within *seconds* while nothing is asked: pieces, each with its moment on the line's clock.
@@ -225,35 +187,15 @@ class Bus:
         if connection is not None:
             connection = checks.whole("connection", connection, 0, 2**63)
         unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
-        self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
-
-    def configure(self, unit: int, *, timeout: float | None = None, gap: float | None = None) -> None:
-        """Sets what *unit* needs otherwise than the bus, for every call from now on. None keeps what the bus has.
-
-        Args:
-            unit: Its address, 1..247.
-            timeout: Seconds it is given to answer.
-            gap: Seconds of silence before a request to it, where it needs more than the silence between frames: some
-                units are deaf for a while after they answered.
-        """
-        if timeout is not None:
-            timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
-        if gap is not None:
-            gap = checks.number("gap", gap, 0.0, 3600.0)
-        self._native.configure(checks.unit(unit), timeout=timeout, gap=gap)
+        return self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
         return Link(*self._native.link(checks.unit(unit)))
 
-    @property
-    def reconnects(self) -> int:
-        """How often the port was opened again after it was lost. Another drive may answer behind it."""
-        return self._native.reconnects
-
     def broadcast(self, address: int, value: int | Sequence[int]) -> None:
         """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once."""
-        self._native.broadcast(checks.address(address), checks.payload(value))
+        return self._native.broadcast(checks.address(address), checks.payload(value))
 
     def echo(self, unit: int, word: int | None = None) -> float:
         """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
@@ -286,26 +228,16 @@ class Bus:
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
-        if not isinstance(units, Iterable):
-            raise NotAllowed(f"units {units!r} are no units; give several of 1..247, such as range(1, 248) or [5]")
-        wanted = [checks.unit(unit) for unit in units]
-        limit = min(_SCAN_TIMEOUT, self._timeout) if timeout is None else timeout
-        limit = checks.number("timeout", limit, 0.0, 3600.0, above=True)
-        return self._scan(wanted, limit)
+        return self._scan(who.units(units), who.time_for(timeout, self._timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
+        async def read(unit: int, address: int) -> list[int]:
+            return self._native.read(unit, address, 1, timeout=timeout, retries=0)
+
         for unit in units:
-            started = self.now()
-            code: int | None = None
-            problem: str | None = None
-            try:
-                [code] = self._native.read(unit, _identification_address(), 1, timeout=timeout, retries=0)
-            except NoAnswer:
-                continue
-            except (Refused, BadAnswer) as error:
-                problem = str(error)
-            family = None if code is None else identify(code)
-            yield Found(unit, family, code, self.now() - started, problem)
+            found = at_once(who.look_for(read, self.now, unit))
+            if found is not None:
+                yield found
 
     def drive(self, unit: int, profile: str | os.PathLike[str] | Profile | None = None) -> Drive:
         """The drive at *unit*.
@@ -321,20 +253,7 @@ class Bus:
         unit = checks.unit(unit)
         if profile is not None:
             return Drive(self, unit, Profile.find(profile))
-        [code] = self.read(unit, _identification_address())
-        return Drive(self, unit, self._profile_of(unit, code), code)
-
-    def _profile_of(self, unit: int, code: int) -> Profile:
-        family = identify(code)
-        if family not in profiles():
-            known = "no list names" if family is None else f"is a {family}, a family without a profile yet"
-            raise NotAllowed(
-                f"unit {unit} identifies itself as {code:04X}H, which {known}; the registers and command codes of "
-                "another family may differ. If you know that it behaves like one of "
-                f"{', '.join(profiles())}, give profile=…",
-                unit=unit,
-            )
-        return Profile.builtin(family)
+        return Drive(self, unit, *at_once(who.ask(BlockingBus(self), unit)))
 
     def poll(
         self,
@@ -370,15 +289,3 @@ class Bus:
             PortError: The bus is closed.
         """
         return Poll(self, self._native, targets, interval, size, callback)
-
-    def stats(self) -> Stats:
-        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
-
-        `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
-        """
-        return Stats(self._native.stats())
-
-
-def _identification_address() -> int:
-    """Where a drive says what it is. All shipped families use one register."""
-    return Profile.builtin(profiles()[0]).address(_IDENTIFICATION)

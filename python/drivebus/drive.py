@@ -89,7 +89,7 @@ class Drive:
             Unconfirmed: The drive shows another setpoint, however often it was written.
             Refused: The drive kept the old one.
         """
-        return at_once(self._operations.setpoint())
+        return at_once(self._operations.ask_setpoint())
 
     @setpoint.setter
     def setpoint(self, hz: float) -> None:

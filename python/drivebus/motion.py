@@ -153,7 +153,7 @@ class Motion(Registers):
         await self._command("reset_fault")
         await self._confirm("reset_fault", shows, confirm)
 
-    async def setpoint(self) -> float:
+    async def ask_setpoint(self) -> float:
         """The setpoint last given over the bus, in Hz."""
         return float(await self.read("set_frequency"))
 

@@ -6,9 +6,12 @@ tests about time and about what the line carries.
 
 from __future__ import annotations
 
+import asyncio
+import importlib.util
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from typing import Any
 
 import pytest
 
@@ -49,6 +52,53 @@ def obedient(drive: drivebus.Drive) -> drivebus.Drive:
     drive.prepare_control()
     drive.write({"P00.11": RAMP, "P00.12": RAMP})
     return drive
+
+
+class Unwatching(asyncio.SelectorEventLoop):
+    """Tells of no descriptor that is readable, as the proactor of Windows."""
+
+    def add_reader(self, *_: object) -> None:
+        """Not here."""
+        raise NotImplementedError
+
+
+def new_uvloop() -> asyncio.AbstractEventLoop:
+    import uvloop
+
+    loop: asyncio.AbstractEventLoop = uvloop.new_event_loop()
+    return loop
+
+
+NO_UVLOOP = pytest.mark.skipif(importlib.util.find_spec("uvloop") is None, reason="uvloop is not installed")
+
+
+async def end_the_rest() -> None:
+    rest = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in rest:
+        task.cancel()
+    await asyncio.gather(*rest, return_exceptions=True)
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(asyncio.new_event_loop, id="asyncio"),
+        pytest.param(Unwatching, id="unwatching"),
+        pytest.param(new_uvloop, id="uvloop", marks=NO_UVLOOP),
+    ]
+)
+def run(request: pytest.FixtureRequest) -> Callable[[Coroutine[Any, Any, Any]], Any]:
+    """Runs a coroutine in an event loop of its own, of each kind in turn, and ends that as `asyncio.run` does."""
+
+    def run_until_complete(work: Coroutine[Any, Any, Any]) -> Any:
+        loop = request.param()
+        try:
+            return loop.run_until_complete(work)
+        finally:
+            loop.run_until_complete(end_the_rest())
+            loop.run_until_complete(loop.shutdown_asyncgens())
+            loop.close()
+
+    return run_until_complete
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ impl<'b> Call<'b, '_> {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(MutexGuard<'b, Owner>, Question), Box<CallError>> {
         loop {
-            if !turn.let_pass(give_up) {
+            if !turn.let_pass(give_up) || !self.is_wanted() {
                 return Err(self.failed(self.bus.given_up()));
             }
             let mut owner = self.bus.lock();

@@ -66,7 +66,7 @@ impl BusOptions {
 /// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
-    pub(crate) queue: Queue,
+    pub(crate) queue: Arc<Queue>,
     owner: Mutex<Owner>,
     /// What can be asked for while somebody waits on the line.
     stats: Arc<Mutex<Stats>>,
@@ -124,7 +124,7 @@ impl Bus {
             owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         Ok(Self {
-            queue: Queue::default(),
+            queue: Arc::default(),
             stats: owner.shared_stats(),
             words,
             notes: Mutex::new(notes),
@@ -160,6 +160,10 @@ impl Bus {
         self.closed.load(Ordering::Acquire)
     }
 
+    pub(crate) fn is_of_this_process(&self) -> bool {
+        self.opened_by.is_current()
+    }
+
     /// Whether the line's clock is a simulation's.
     pub fn is_virtual(&self) -> bool {
         matches!(self.clock, Clock::Virtual)
@@ -174,6 +178,7 @@ impl Bus {
         if !self.opened_by.is_current() {
             return;
         }
+        self.dismiss();
         if self.queue.has_this_thread() {
             return;
         }
@@ -222,7 +227,7 @@ impl Bus {
     }
 
     /// What one call asks, with the times that hold for it.
-    fn ask<'a>(&self, destination: Destination, request: &'a Request<'a>, options: &CallOptions) -> Ask<'a> {
+    pub(crate) fn ask<'a>(&self, destination: Destination, request: &'a Request<'a>, options: &CallOptions) -> Ask<'a> {
         let (timeout, gap) = match destination {
             Destination::Broadcast => (self.options.turnaround, Duration::ZERO),
             Destination::Unit(unit) => {
@@ -259,6 +264,11 @@ impl Bus {
     /// Now, on the line's clock.
     pub fn now(&self) -> Instant {
         self.clock.now().unwrap_or_else(|| self.lock().now())
+    }
+
+    /// As [`now`](Self::now), without waiting for who uses the line: zero where only the line knows, and it is in use.
+    pub(crate) fn now_if_known(&self) -> Instant {
+        self.clock.now().or_else(|| self.owner.try_lock().ok().map(|owner| owner.now())).unwrap_or_default()
     }
 
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
@@ -352,5 +362,14 @@ impl Bus {
     /// A thread that panicked has left the master in a state that the next `begin` refuses, not in a wrong one.
     pub(crate) fn lock(&self) -> MutexGuard<'_, Owner> {
         self.owner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Bus {
+    /// Whoever still waits for an answer is told that none will come.
+    fn drop(&mut self) {
+        if self.opened_by.is_current() {
+            self.dismiss();
+        }
     }
 }

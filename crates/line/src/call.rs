@@ -6,6 +6,7 @@
 //! | a write whose words can be read back | read back; written again only where the unit shows other words |
 //! | any other write, an echo, a custom request | never: the caller is told |
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
@@ -50,6 +51,8 @@ pub(crate) struct Call<'b, 'r> {
     pub(crate) verify: bool,
     read_back: Option<u16>,
     pub(crate) connection: Option<u64>,
+    /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
+    wanted: Option<&'r AtomicBool>,
 }
 
 impl<'b, 'r> Call<'b, 'r> {
@@ -66,17 +69,38 @@ impl<'b, 'r> Call<'b, 'r> {
             verify: options.verify,
             read_back: options.read_back.filter(|_| ask.request.is_write()),
             connection: options.connection,
+            wanted: None,
             ask,
         }
     }
 
+    /// Ends as soon as `wanted` is false and nothing of it is on the wire.
+    pub(crate) fn while_wanted(mut self, wanted: &'r AtomicBool) -> Self {
+        self.wanted = Some(wanted);
+        self
+    }
+
+    pub(crate) fn is_wanted(&self) -> bool {
+        self.wanted.is_none_or(|wanted| wanted.load(Ordering::Acquire))
+    }
+
     /// Asks until it is answered, refused or given up.
     pub(crate) fn run(
-        mut self,
+        self,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let mut turn = self.turn(give_up)?;
+        let turn = self.turn(give_up)?;
+        self.run_in(turn, give_up, take)
+    }
+
+    /// As [`run`](Self::run), for who has the turn.
+    pub(crate) fn run_in(
+        mut self,
+        mut turn: Turn<'b>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
         if let Some(unit) = self.unit
             && self.priority != Priority::Stop
         {
@@ -166,7 +190,7 @@ impl<'b, 'r> Call<'b, 'r> {
         turn.leave();
         let mut ended = false;
         self.bus.sleep(until.saturating_duration_since(self.bus.now()), &mut || {
-            ended = give_up();
+            ended = give_up() || !self.is_wanted();
             ended
         });
         if ended || self.bus.is_shut() {
@@ -193,7 +217,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 Err(error) => error,
             };
             let is_port = matches!(error.failure, Failure::Port(_));
-            if !course.goes_on(&error, asked) {
+            if !course.goes_on(&error, asked) || !self.is_wanted() {
                 // How the port was lost tells more than that it is still not there. But where the request went out only
                 // the second time, that has to be said.
                 let lost = lost.filter(|_| is_port && error.sent.is_none());

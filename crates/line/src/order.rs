@@ -101,6 +101,18 @@ impl<T> Order<T> {
         self.next_index().map(|index| &self.waiting[index].whose)
     }
 
+    /// The place of who is next.
+    pub(crate) fn next_ticket(&self) -> Option<Ticket> {
+        self.next_index().map(|index| self.waiting[index].ticket)
+    }
+
+    /// All who wait and of whom `who` says so wait no longer.
+    pub(crate) fn dismiss(&mut self, who: impl Fn(&T) -> bool) -> Vec<T> {
+        let (gone, kept) = std::mem::take(&mut self.waiting).into_iter().partition(|waiting| who(&waiting.whose));
+        self.waiting = kept;
+        gone.into_iter().map(|waiting| waiting.whose).collect()
+    }
+
     /// `ticket` has the turn now, if it is next.
     pub(crate) fn take(&mut self, ticket: Ticket) -> Option<T> {
         let index = self.next_index().filter(|&index| self.waiting[index].ticket == ticket)?;
@@ -194,6 +206,7 @@ mod tests {
         for (name, priority) in (0..).zip([Poll, Read, Write, Stop, Poll, Read, Write, Stop]) {
             come(&mut order, priority, 1, name);
         }
+        assert_eq!(order.next_ticket().map(|ticket| ticket.is_stop()), Some(true));
         assert_eq!(serve_all(&mut order), [3, 7, 2, 6, 1, 5, 0, 4]);
     }
 
@@ -253,6 +266,17 @@ mod tests {
             };
             assert_eq!(serve(&mut order), expected, "turn {turn}");
         }
+    }
+
+    #[test]
+    fn who_is_dismissed_waits_no_longer() {
+        let mut order = Order::default();
+        for name in 0..6 {
+            come(&mut order, Read, 1, name);
+        }
+        assert_eq!(order.dismiss(|name| name % 2 == 0), [0, 2, 4]);
+        assert_eq!(serve_all(&mut order), [1, 3, 5]);
+        assert_eq!(order.next_ticket(), None);
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! Whose turn it is: one owner of the line at a time. Who waits sleeps until it is called; who is called is decided by
 //! [`Order`] at the last moment, so that a stop that comes while the next one wakes up still goes first.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
 use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
 
 use crate::clock::monotonic;
+use crate::crew::{Crew, Waiter};
 use crate::order::{Order, Ticket};
 
 /// How often somebody who waits looks up to see whether it should still wait.
@@ -33,16 +34,21 @@ pub enum Priority {
 
 /// A queue at the line. The calling thread itself works on the line when its turn comes, so that a lone caller pays
 /// for no hand-over.
+///
+/// Work that is left here waits in the same order, without a thread: one of the [`Crew`] is called when its turn comes.
 #[derive(Debug, Default)]
 pub(crate) struct Queue {
-    state: Mutex<State>,
+    pub(crate) state: Mutex<State>,
+    /// Where the crew waits to be called.
+    pub(crate) called: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
-    owner: Option<(Ticket, Thread)>,
+pub(crate) struct State {
+    pub(crate) owner: Option<(Ticket, Thread)>,
     /// While the line is free and somebody waits, the next one has been called.
-    order: Order<Thread>,
+    pub(crate) order: Order<Waiter>,
+    pub(crate) crew: Crew,
 }
 
 /// Why there is no turn.
@@ -57,8 +63,10 @@ pub(crate) enum NoTurn {
 /// The right to use the line, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Turn<'a> {
-    queue: &'a Queue,
-    ticket: Ticket,
+    pub(crate) queue: &'a Queue,
+    pub(crate) ticket: Ticket,
+    /// Whoever drops it comes back at once for the next work.
+    pub(crate) of_crew: bool,
 }
 
 impl Queue {
@@ -85,11 +93,11 @@ impl Queue {
         if is_free {
             state.order.begin(ticket);
             state.owner = Some((ticket, thread));
-            return Ok(Turn { queue: self, ticket });
+            return Ok(Turn { queue: self, ticket, of_crew: false });
         }
-        state.order.wait(ticket, thread);
+        state.order.wait(ticket, Waiter::Thread(thread));
         drop(state);
-        let turn = Turn { queue: self, ticket };
+        let turn = Turn { queue: self, ticket, of_crew: false };
         if turn.comes(give_up) { Ok(turn) } else { Err(NoTurn::GivenUp) }
     }
 
@@ -106,7 +114,7 @@ impl Queue {
     }
 
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
-    fn lock(&self) -> MutexGuard<'_, State> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -122,9 +130,9 @@ impl Turn<'_> {
             return true;
         }
         if let Some((ticket, thread)) = state.owner.take_if(|(owner, _)| *owner == self.ticket) {
-            state.order.step_aside(ticket, thread);
+            state.order.step_aside(ticket, Waiter::Thread(thread));
         }
-        state.call_next();
+        self.queue.call_next(&mut state);
         drop(state);
         let back = self.comes(give_up);
         if !back {
@@ -155,19 +163,29 @@ impl Turn<'_> {
     }
 
     /// Gives up the turn, or the place of who waits for it. Doing so again does nothing.
-    pub(crate) fn leave(&self) {
+    pub(crate) fn leave(&mut self) {
+        // Who goes on after this does not come back for the next work.
+        self.of_crew = false;
+        self.end();
+    }
+
+    fn end(&self) {
         let mut state = self.queue.lock();
+        if self.of_crew {
+            // A second thread need not be called for what this one is about to take.
+            state.crew.comes_back();
+        }
         let had_the_line = state.owner.take_if(|(owner, _)| *owner == self.ticket);
         let waited = state.order.leave(self.ticket);
         if had_the_line.is_some() || waited.is_some() {
-            state.call_next();
+            self.queue.call_next(&mut state);
         }
     }
 }
 
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
-        self.leave();
+        self.end();
     }
 }
 
@@ -175,25 +193,19 @@ impl State {
     /// Whether `this` thread has the line or waits for it.
     fn has(&self, this: ThreadId) -> bool {
         self.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this)
-            || self.order.waiting().any(|thread| thread.id() == this)
+            || self.order.waiting().any(|waiter| matches!(waiter, Waiter::Thread(thread) if thread.id() == this))
     }
 
     /// Takes the line for `ticket` if it is free and `ticket` is next.
     fn take(&mut self, ticket: Ticket) -> bool {
         if self.owner.is_none() {
-            self.owner = self.order.take(ticket).map(|thread| (ticket, thread));
+            self.owner = self.order.take(ticket).map(|waiter| match waiter {
+                Waiter::Thread(thread) => (ticket, thread),
+                Waiter::Work(_) => (ticket, thread::current()),
+            });
             return self.owner.is_some();
         }
         false
-    }
-
-    /// Wakes who is next, if the line is free. It looks for itself whether it still is.
-    fn call_next(&self) {
-        if self.owner.is_none()
-            && let Some(thread) = self.order.next()
-        {
-            thread.unpark();
-        }
     }
 }
 
@@ -339,8 +351,8 @@ mod tests {
         let waits = |priority, thread| {
             let mut state = queue.lock();
             let ticket = state.order.ticket(priority, unit(1));
-            state.order.wait(ticket, thread);
-            Turn { queue: &queue, ticket }
+            state.order.wait(ticket, Waiter::Thread(thread));
+            Turn { queue: &queue, ticket, of_crew: false }
         };
         let (called, next) = (waits(Write, elsewhere), waits(Read, thread::current()));
         drop(first);

@@ -4,17 +4,16 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
-    AdapterEcho, Bus as CoreBus, BusOptions, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind,
-    Priority, UnitOptions,
+    Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind, UnitOptions,
 };
-use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, MAX_READ, Request};
+use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
+use crate::arguments::{any_request, duration, open_failed, read_options, read_request, to_open, write_options};
 use crate::convert::{bytes_of, one_word, unit_address, words_of};
-use crate::errors::{call_error, not_allowed, port_error, refuse};
+use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
-use crate::open;
 
 /// One line and its owner.
 #[pyclass(frozen, module = "drivebus._native")]
@@ -23,7 +22,7 @@ pub(crate) struct Bus {
     /// Shared with the threads that work for it.
     pub(crate) core: Arc<CoreBus>,
     /// Where the line's clock stands on the calendar, if it is a simulation's: it began when the bus was opened.
-    virtual_ahead: Option<f64>,
+    pub(crate) virtual_ahead: Option<f64>,
 }
 
 #[pymethods]
@@ -45,23 +44,10 @@ impl Bus {
         learn_timeout: bool,
         low_latency: bool,
     ) -> PyResult<Self> {
-        let echo = match echo {
-            "auto" => AdapterEcho::Auto,
-            "yes" => AdapterEcho::Present,
-            "no" => AdapterEcho::Absent,
-            other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
-        };
-        let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
-        let timeout = duration("timeout", timeout)?;
-        let turnaround = duration("turnaround", turnaround)?;
-        let options = BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout };
-        let core =
-            with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(|failure| match failure {
-                Failure::Port(error) => port_error(&error),
-                other => refuse(other),
-            })?;
-        let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
-        Ok(Self { core: Arc::new(core), virtual_ahead })
+        let (opener, options) =
+            to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency)?;
+        let core = with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(open_failed)?;
+        Ok(Self::around(core))
     }
 
     #[getter]
@@ -101,15 +87,7 @@ impl Bus {
     #[pyo3(signature = (seconds, /))]
     fn listen<'py>(&self, py: Python<'py>, seconds: f64) -> PyResult<Vec<(f64, Bound<'py, PyBytes>)>> {
         let time = duration("seconds", seconds)?;
-        let mut heard = Vec::new();
-        with_signals(py, |give_up| {
-            self.core.listen(time, give_up, &mut |moment, bytes| heard.push((to_seconds(moment), bytes.to_vec())))
-        })?
-        .map_err(|failure| match failure {
-            Failure::Port(error) => port_error(&error),
-            other => port_error(&PortError::new(PortErrorKind::Closed, self.core.name(), other.to_string())),
-        })?;
-        Ok(heard.into_iter().map(|(moment, bytes)| (moment, PyBytes::new(py, &bytes))).collect())
+        with_signals(py, |give_up| Heard::on(&self.core, time, give_up))?.into_python(py, self.core.name())
     }
 
     #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
@@ -124,8 +102,7 @@ impl Bus {
         urgent: bool,
         verify: bool,
     ) -> PyResult<Bound<'py, PyList>> {
-        let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
-        let options = CallOptions { timeout, retries, verify, priority: stop_if(urgent), ..CallOptions::default() };
+        let options = read_options(timeout, retries, urgent, verify)?;
         Ok(self.read_words(unit, address, count, options)?.0)
     }
 
@@ -138,7 +115,7 @@ impl Bus {
         urgent: bool,
         verify: bool,
     ) -> PyResult<(Bound<'py, PyList>, f64, f64)> {
-        let options = CallOptions { verify, priority: stop_if(urgent), ..CallOptions::default() };
+        let options = read_options(None, None, urgent, verify)?;
         let (words, done) = self.read_words(unit, address, count, options)?;
         let clock = self.unix_clock(unit.py());
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
@@ -154,9 +131,7 @@ impl Bus {
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
     ) -> PyResult<()> {
-        let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-        let priority = stop_if(urgent);
-        let options = CallOptions { in_doubt: urgent, priority, read_back, connection, ..CallOptions::default() };
+        let options = write_options(urgent, read_back, connection)?;
         self.write_to(unit_address(unit)?.into(), address, value, options)
     }
 
@@ -193,12 +168,7 @@ impl Bus {
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
         let pdu = pdu.as_bytes();
-        let length = reply_length.map_or(AnswerLength::BySilence, AnswerLength::Bytes);
-        // A request that is known by name is checked as one; anything else is carried as it is.
-        let request = match Request::parse(pdu) {
-            Ok(request) if reply_length.is_none() && !matches!(request, Request::Custom { .. }) => request,
-            _ => Request::custom(pdu, length).map_err(refuse)?,
-        };
+        let request = any_request(pdu, reply_length)?;
         let mut reply = Vec::new();
         self.call(
             py,
@@ -264,7 +234,7 @@ impl Bus {
         options: CallOptions,
     ) -> PyResult<(Bound<'py, PyList>, Done)> {
         let py = unit.py();
-        let request = Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)?;
+        let request = read_request(address, count)?;
         // Kept here while the interpreter is let go of, so that only the list is made.
         let (mut read, mut count) = ([0; MAX_READ as usize], 0);
         let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
@@ -310,15 +280,36 @@ impl Bus {
         })
     }
 
+    pub(crate) fn around(core: CoreBus) -> Self {
+        let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
+        Self { core: Arc::new(core), virtual_ahead }
+    }
+
     pub(crate) fn unix_clock(&self, py: Python<'_>) -> UnixClock {
-        let ahead = self.virtual_ahead.unwrap_or_else(|| unix_time() - py.detach(|| to_seconds(self.core.now())));
-        UnixClock { ahead }
+        py.detach(|| UnixClock::of(&self.core, self.virtual_ahead))
     }
 }
 
-/// The turn of a stop.
-fn stop_if(urgent: bool) -> Option<Priority> {
-    urgent.then_some(Priority::Stop)
+/// What came on a line while nothing was asked, and how that ended.
+pub(crate) struct Heard {
+    frames: Vec<(f64, Vec<u8>)>,
+    end: Result<(), Failure>,
+}
+
+impl Heard {
+    pub(crate) fn on(core: &CoreBus, time: Duration, give_up: &mut dyn FnMut() -> bool) -> Self {
+        let mut frames = Vec::new();
+        let end = core.listen(time, give_up, &mut |moment, bytes| frames.push((to_seconds(moment), bytes.to_vec())));
+        Self { frames, end }
+    }
+
+    pub(crate) fn into_python<'py>(self, py: Python<'py>, port: &str) -> PyResult<Vec<(f64, Bound<'py, PyBytes>)>> {
+        self.end.map_err(|failure| match failure {
+            Failure::Port(error) => port_error(&error),
+            other => port_error(&PortError::new(PortErrorKind::Closed, port, other.to_string())),
+        })?;
+        Ok(self.frames.into_iter().map(|(moment, bytes)| (moment, PyBytes::new(py, &bytes))).collect())
+    }
 }
 
 /// Runs `work` without the GIL, with a question to ask now and then: has a signal handler of Python raised?
@@ -352,6 +343,11 @@ pub(crate) struct UnixClock {
 }
 
 impl UnixClock {
+    /// `virtual_ahead` is where a simulation's clock stands on the calendar.
+    pub(crate) fn of(core: &CoreBus, virtual_ahead: Option<f64>) -> Self {
+        Self { ahead: virtual_ahead.unwrap_or_else(|| unix_time() - to_seconds(core.now())) }
+    }
+
     pub(crate) fn at(self, moment: Instant) -> f64 {
         to_seconds(moment) + self.ahead
     }
@@ -363,11 +359,6 @@ fn unix_time() -> f64 {
 
 fn to_seconds(moment: Instant) -> f64 {
     moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
-}
-
-pub(crate) fn duration(what: &str, given: f64) -> PyResult<Duration> {
-    Duration::try_from_secs_f64(given)
-        .map_err(|_| not_allowed(format!("{what} {given} is not a number of seconds, 0 or more")))
 }
 
 fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyDict>> {

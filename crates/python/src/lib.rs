@@ -5,16 +5,19 @@
 
 use pyo3::prelude::*;
 
+mod arguments;
 mod bus;
 mod convert;
 mod errors;
 mod format;
 mod frames;
+mod mailbox;
 mod open;
 mod plan;
 mod poll;
 mod profile;
 mod pyserial;
+mod requests;
 mod sim;
 mod sim_line;
 
@@ -30,6 +33,8 @@ mod _native {
     #[pymodule_export]
     use crate::frames::{crc16, decode, decode_answer, encode_echo, encode_read, encode_write};
     #[pymodule_export]
+    use crate::mailbox::Mailbox;
+    #[pymodule_export]
     use crate::open::port_facts;
     #[pymodule_export]
     use crate::plan::Plan;
@@ -37,6 +42,8 @@ mod _native {
     use crate::poll::{Batch, Poller};
     #[pymodule_export]
     use crate::profile::Profile;
+    #[pymodule_export]
+    use crate::requests::{Asked, Requests, open_bus};
     #[pymodule_export]
     use crate::sim::{SimulatedDrive, Simulator};
     #[pymodule_export]

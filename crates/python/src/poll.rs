@@ -7,7 +7,8 @@ use drivebus_line::{Failure, Poll, PollBatch, PollError, PollSample, PollTarget}
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyInt, PyList, PyTuple};
 
-use crate::bus::{Bus, UnixClock, duration, with_signals};
+use crate::arguments::duration;
+use crate::bus::{Bus, UnixClock, with_signals};
 use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{Class, call_error, not_allowed, refuse};
 use crate::plan::Plan;

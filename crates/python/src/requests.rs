@@ -1,0 +1,265 @@
+//! The requests of an event loop: asked without waiting, and answered through the loop's mailbox.
+//!
+//! The same arguments as those of `Bus`, checked and converted by the same functions.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use drivebus_line::{Bus as CoreBus, CallOptions, Errand, Reply, Running};
+use drivebus_rtu::{Answer, Destination, Request};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::arguments::{any_request, duration, open_failed, read_options, read_request, to_open, write_options};
+use crate::bus::{Bus, Heard, UnixClock};
+use crate::convert::{one_word, unit_address, words_of};
+use crate::errors::{call_error, refuse};
+use crate::format::SerialFormat;
+use crate::mailbox::{Inbox, Mailbox};
+
+/// A bus, as an event loop uses it.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Requests {
+    core: Arc<CoreBus>,
+    virtual_ahead: Option<f64>,
+    inbox: Arc<Inbox>,
+}
+
+/// Something that was asked, and under which number its answer will come.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Asked {
+    #[pyo3(get)]
+    number: u64,
+    how: How,
+}
+
+#[derive(Debug)]
+enum How {
+    Errand(Option<Running>),
+    /// A thread of its own looks now and then whether it is still wanted.
+    Apart(Arc<AtomicBool>),
+}
+
+#[pymethods]
+impl Asked {
+    fn abandon(&self, py: Python<'_>) {
+        match &self.how {
+            How::Errand(Some(running)) => py.detach(|| running.abandon()),
+            How::Errand(None) => {}
+            How::Apart(wanted) => wanted.store(false, Ordering::Release),
+        }
+    }
+}
+
+/// Opens a bus in a thread of its own; it comes as a letter.
+#[pyfunction]
+#[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
+    turnaround = 0.1, learn_timeout = false, low_latency = true))]
+#[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+pub(crate) fn open_bus(
+    mailbox: &Mailbox,
+    port: &Bound<'_, PyAny>,
+    format: SerialFormat,
+    timeout: f64,
+    retries: u32,
+    read_only: bool,
+    rs485: Option<&Bound<'_, PyDict>>,
+    echo: &str,
+    turnaround: f64,
+    learn_timeout: bool,
+    low_latency: bool,
+) -> PyResult<Asked> {
+    let (opener, options) =
+        to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency)?;
+    apart(&mailbox.inbox, move |wanted| {
+        let core = CoreBus::open(opener, options, &mut || !wanted.load(Ordering::Acquire));
+        move |py: Python<'_>| match core {
+            Ok(core) => Ok(Bound::new(py, Bus::around(core))?.into_any()),
+            Err(failure) => Err(open_failed(failure)),
+        }
+    })
+}
+
+#[pymethods]
+impl Requests {
+    #[new]
+    fn new(bus: &Bus, mailbox: &Mailbox) -> Self {
+        Self { core: Arc::clone(&bus.core), virtual_ahead: bus.virtual_ahead, inbox: Arc::clone(&mailbox.inbox) }
+    }
+
+    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
+    fn read(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
+        timeout: Option<f64>,
+        retries: Option<u32>,
+        urgent: bool,
+        verify: bool,
+    ) -> PyResult<Asked> {
+        let options = read_options(timeout, retries, urgent, verify)?;
+        let request = read_request(address, count)?;
+        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| words(&reply).into_pyobject(py)))
+    }
+
+    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
+    fn read_stamped(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
+        urgent: bool,
+        verify: bool,
+    ) -> PyResult<Asked> {
+        let options = read_options(None, None, urgent, verify)?;
+        let request = read_request(address, count)?;
+        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, clock| {
+            let stamped = (words(&reply), clock.at(reply.done.sent), clock.at(reply.done.ended));
+            Ok(stamped.into_pyobject(py)?.into_any())
+        }))
+    }
+
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None))]
+    fn write(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        address: &Bound<'_, PyAny>,
+        value: &Bound<'_, PyAny>,
+        urgent: bool,
+        read_back: Option<&Bound<'_, PyAny>>,
+        connection: Option<u64>,
+    ) -> PyResult<Asked> {
+        let options = write_options(urgent, read_back, connection)?;
+        self.write_to(unit_address(unit)?.into(), address, value, options)
+    }
+
+    #[pyo3(signature = (address, value, /))]
+    fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<Asked> {
+        self.write_to(Destination::Broadcast, address, value, CallOptions::default())
+    }
+
+    #[pyo3(signature = (unit, word = None, /))]
+    fn echo(&self, unit: &Bound<'_, PyAny>, word: Option<&Bound<'_, PyAny>>) -> PyResult<Asked> {
+        let word = word.map_or_else(|| Ok(self.core.fresh_word()), |word| one_word("word", word))?;
+        Ok(self.ask(unit_address(unit)?.into(), &Request::echo(word), CallOptions::default(), |py, reply, _| {
+            let time = reply.done.ended.saturating_duration_since(reply.done.sent).as_secs_f64();
+            Ok(time.into_pyobject(py)?.into_any())
+        }))
+    }
+
+    #[pyo3(signature = (unit, pdu, reply_length = None, /))]
+    fn transact(&self, unit: &Bound<'_, PyAny>, pdu: &Bound<'_, PyBytes>, reply_length: Option<u8>) -> PyResult<Asked> {
+        let request = any_request(pdu.as_bytes(), reply_length)?;
+        let options = CallOptions { retries: Some(0), ..CallOptions::default() };
+        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| {
+            Ok(PyBytes::new(py, &reply.pdu).into_any())
+        }))
+    }
+
+    #[pyo3(signature = (unit, /))]
+    fn link(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
+        let (core, unit) = (Arc::clone(&self.core), unit_address(unit)?);
+        // Apart, because it waits for who uses the line.
+        apart(&self.inbox, move |_| {
+            let link = core.link(unit);
+            move |py: Python<'_>| Ok((link.good, link.asked).into_pyobject(py)?.into_any())
+        })
+    }
+
+    #[pyo3(signature = (seconds, /))]
+    fn sleep(&self, seconds: f64) -> PyResult<Asked> {
+        let (core, time) = (Arc::clone(&self.core), duration("seconds", seconds)?);
+        apart(&self.inbox, move |wanted| {
+            core.sleep(time, &mut || !wanted.load(Ordering::Acquire));
+            nothing
+        })
+    }
+
+    #[pyo3(signature = (seconds, /))]
+    fn listen(&self, seconds: f64) -> PyResult<Asked> {
+        let (core, time) = (Arc::clone(&self.core), duration("seconds", seconds)?);
+        apart(&self.inbox, move |wanted| {
+            let heard = Heard::on(&core, time, &mut || !wanted.load(Ordering::Acquire));
+            move |py: Python<'_>| Ok(heard.into_python(py, core.name())?.into_pyobject(py)?.into_any())
+        })
+    }
+
+    fn close(&self) -> PyResult<Asked> {
+        let core = Arc::clone(&self.core);
+        apart(&self.inbox, move |_| {
+            core.close();
+            nothing
+        })
+    }
+}
+
+impl Requests {
+    fn write_to(
+        &self,
+        to: Destination,
+        address: &Bound<'_, PyAny>,
+        value: &Bound<'_, PyAny>,
+        options: CallOptions,
+    ) -> PyResult<Asked> {
+        let address = one_word("address", address)?;
+        match words_of(value)? {
+            Err(value) => Ok(self.ask(to, &Request::write(address, value), options, confirmed)),
+            Ok(words) => {
+                let request = Request::write_many(address, &words).map_err(refuse)?;
+                Ok(self.ask(to, &request, options, confirmed))
+            }
+        }
+    }
+
+    /// Leaves the request with the bus. `make` makes of the reply what the program gets.
+    fn ask(
+        &self,
+        to: Destination,
+        request: &Request<'_>,
+        options: CallOptions,
+        make: impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
+    ) -> Asked {
+        let (number, inbox) = (self.inbox.number(), Arc::clone(&self.inbox));
+        let clock = UnixClock::of(&self.core, self.virtual_ahead);
+        let errand = Errand::new(to, request, options, move |result| {
+            inbox.post(number, move |py| match result {
+                Ok(reply) => make(py, reply, clock),
+                Err(error) => Err(call_error(&error, error.sent.map(|sent| clock.at(sent)), clock.at(error.ended))),
+            });
+        });
+        Asked { number, how: How::Errand(self.core.send(errand)) }
+    }
+}
+
+/// Does `work` in a thread of its own, and posts the letter that it makes.
+fn apart<L>(inbox: &Arc<Inbox>, work: impl FnOnce(&AtomicBool) -> L + Send + 'static) -> PyResult<Asked>
+where
+    L: for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
+{
+    let (number, wanted) = (inbox.number(), Arc::new(AtomicBool::new(true)));
+    let (inbox, asked) = (Arc::clone(inbox), Arc::clone(&wanted));
+    thread::Builder::new().name(String::from("drivebus-apart")).spawn(move || inbox.post(number, work(&asked)))?;
+    Ok(Asked { number, how: How::Apart(wanted) })
+}
+
+fn words(reply: &Reply) -> Vec<u16> {
+    match Answer::parse(&reply.pdu) {
+        Ok(Answer::Read { words, .. }) => words.iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// `None`, for what has nothing to tell.
+#[expect(clippy::unnecessary_wraps, reason = "a letter, as the others are")]
+fn nothing(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    Ok(py.None().into_bound(py))
+}
+
+fn confirmed(py: Python<'_>, _: Reply, _: UnixClock) -> PyResult<Bound<'_, PyAny>> {
+    nothing(py)
+}

@@ -1,0 +1,153 @@
+"""What is opened as a bus, and what every bus tells of itself without asking the line, however it is waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Generic, Protocol, TypeVar
+
+from drivebus import checks, ports
+from drivebus._native import SerialFormat
+from drivebus.errors import NotAllowed
+from drivebus.sim import Simulator
+from drivebus.values import Stats
+
+__all__ = ["BusFace", "Opening"]
+
+
+class Opening:
+    """The arguments of a bus, checked, and its port as the core takes it. Nothing is opened yet but a simulator.
+
+    Attributes:
+        target: What the core opens.
+        format: How its characters look.
+        keywords: What else the core is told.
+        simulator: The simulator behind it, if there is one.
+        owned: What was made here, and ends with the bus.
+    """
+
+    def __init__(
+        self,
+        port: object,
+        line: SerialFormat,
+        *,
+        timeout: float,
+        retries: int,
+        read_only: bool,
+        rs485: Mapping[str, object] | None,
+        echo: str,
+        turnaround: float,
+        learn_timeout: bool,
+        low_latency: bool,
+    ) -> None:
+        self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        if rs485 is not None and not isinstance(rs485, Mapping):
+            raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
+        self.keywords: dict[str, Any] = {
+            "timeout": self.timeout,
+            "retries": checks.whole("retries", retries, 0, 100),
+            "read_only": read_only,
+            "rs485": None if rs485 is None else dict(rs485),
+            "echo": echo,
+            "turnaround": checks.number("turnaround", turnaround, 0.0, 3600.0),
+            "learn_timeout": learn_timeout,
+            "low_latency": low_latency,
+        }
+        target = ports.resolve(port, line)
+        self.format = ports.format_of(target, line)
+        self.simulator = target if isinstance(target, Simulator) else None
+        self.owned = target if target is not port and not isinstance(target, str) else None
+        if isinstance(target, Simulator):
+            target = target._native if target.transport == "process" else target.port
+        self.target = target
+
+
+class _Native(Protocol):
+    """What the core tells at once."""
+
+    @property
+    def port(self) -> str: ...
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def read_only(self) -> bool: ...
+    @property
+    def reconnects(self) -> int: ...
+    def now(self) -> float: ...
+    def stats(self) -> dict[str, Any]: ...
+    def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None: ...
+
+
+_N = TypeVar("_N", bound=_Native)
+
+
+class BusFace(Generic[_N]):
+    """What a bus tells and is told without a word on the line.
+
+    Attributes:
+        simulator: The simulator behind a `sim://` port or the one that was given; None on a real line.
+        format: The `SerialFormat` in force.
+    """
+
+    simulator: Simulator | None
+    format: SerialFormat
+
+    def __init__(self, opening: Opening, native: _N) -> None:
+        self.simulator = opening.simulator
+        self.format = opening.format
+        self._owned = opening.owned
+        self._timeout = opening.timeout
+        self._native = native
+
+    @property
+    def port(self) -> str:
+        """What was opened, for people."""
+        return self._native.port
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called; in a forked child True, for the line is its parent's."""
+        return self._native.closed
+
+    @property
+    def read_only(self) -> bool:
+        """Whether every write is refused."""
+        return self._native.read_only
+
+    @property
+    def timeout(self) -> float:
+        """Seconds a unit is given to answer."""
+        return self._timeout
+
+    def __repr__(self) -> str:
+        return f"<Bus on {self.port}{', closed' if self.closed else ''}>"
+
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+        return self._native.now()
+
+    def configure(self, unit: int, *, timeout: float | None = None, gap: float | None = None) -> None:
+        """Sets what *unit* needs otherwise than the bus, for every call from now on. None keeps what the bus has.
+
+        Args:
+            unit: Its address, 1..247.
+            timeout: Seconds it is given to answer.
+            gap: Seconds of silence before a request to it, where it needs more than the silence between frames: some
+                units are deaf for a while after they answered.
+        """
+        if timeout is not None:
+            timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        if gap is not None:
+            gap = checks.number("gap", gap, 0.0, 3600.0)
+        self._native.configure(checks.unit(unit), timeout=timeout, gap=gap)
+
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost. Another drive may answer behind it."""
+        return self._native.reconnects
+
+    def stats(self) -> Stats:
+        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
+
+        `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
+        """
+        return Stats(self._native.stats())

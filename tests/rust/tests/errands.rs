@@ -1,0 +1,189 @@
+//! Errands: requests that wait in the queue of a bus without a thread, against a simulated drive in virtual time.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use drivebus_line::{
+    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Errand, Failure, Line, Priority, Reply, Running,
+};
+use drivebus_rtu::{Answer, Request, SerialFormat, UnitAddress};
+use drivebus_sim::{Options, Simulator};
+
+const IDENTIFICATION: u16 = 0x2103;
+const ACCELERATION: u16 = 0x800B; // P00.11 in RAM
+
+type Outcome = Result<Reply, Box<CallError>>;
+
+fn unit(raw: u8) -> UnitAddress {
+    UnitAddress::new(raw).unwrap()
+}
+
+fn pair() -> (Simulator, Arc<Bus>) {
+    open(Options::default(), false)
+}
+
+fn open(simulation: Options, read_only: bool) -> (Simulator, Arc<Bus>) {
+    let simulator = Simulator::new([(1, "gd350"), (2, "gd350")], simulation).unwrap();
+    let line: Box<dyn Line> = Box::new(simulator.line());
+    let mut line = Some(line);
+    let options = BusOptions { echo: AdapterEcho::Absent, read_only, ..BusOptions::new(SerialFormat::DEFAULT) };
+    let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
+    (simulator, Arc::new(bus))
+}
+
+/// Sends an errand whose outcome comes with `name`.
+fn send(
+    bus: &Arc<Bus>,
+    name: u32,
+    request: &Request<'_>,
+    options: CallOptions,
+    to: &Sender<(u32, Outcome)>,
+) -> Option<Running> {
+    let to = to.clone();
+    bus.send(Errand::new(unit(1).into(), request, options, move |outcome| to.send((name, outcome)).unwrap()))
+}
+
+fn identify() -> Request<'static> {
+    Request::read(IDENTIFICATION, 1).unwrap()
+}
+
+fn word(reply: &Reply) -> u16 {
+    let Ok(Answer::Read { words, .. }) = Answer::parse(&reply.pdu) else { return 0 };
+    words.iter().next().unwrap_or_default()
+}
+
+/// Somebody who has the line until told to let go: whatever is sent meanwhile stands in the queue.
+fn hold(bus: &Arc<Bus>) -> (Sender<()>, std::thread::JoinHandle<()>) {
+    let (let_go, told) = channel::<()>();
+    let (has_it, held) = channel();
+    let bus = Arc::clone(bus);
+    let thread = std::thread::spawn(move || {
+        let told = Mutex::new(told);
+        let mut once = Some(has_it);
+        bus.call(unit(2).into(), &identify(), CallOptions::default(), &mut || false, &mut |_| {
+            once.take().unwrap().send(()).unwrap();
+            told.lock().unwrap().recv().unwrap();
+        })
+        .unwrap();
+    });
+    held.recv().unwrap();
+    (let_go, thread)
+}
+
+fn names(outcomes: &Receiver<(u32, Outcome)>, count: usize) -> Vec<u32> {
+    (0..count).map(|_| outcomes.recv().unwrap().0).collect()
+}
+
+#[test]
+fn every_errand_gets_its_own_answer() {
+    let (simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    for name in 0..500_u32 {
+        let unit = unit(1 + u8::try_from(name % 2).unwrap());
+        let to = to.clone();
+        bus.send(Errand::new(unit.into(), &identify(), CallOptions::default(), move |outcome| {
+            to.send((name, outcome)).unwrap();
+        }));
+    }
+    for _ in 0..500 {
+        let (_, outcome) = outcomes.recv().unwrap();
+        assert_eq!(word(&outcome.unwrap()), 0x01A0);
+    }
+    assert_eq!(simulator.wire().silence_violations(), 0);
+}
+
+#[test]
+fn errands_keep_the_order_of_the_queue() {
+    let (_simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    let (let_go, holder) = hold(&bus);
+    let urgent = CallOptions { priority: Some(Priority::Stop), ..CallOptions::default() };
+    let polled = CallOptions { priority: Some(Priority::Poll), ..CallOptions::default() };
+    send(&bus, 1, &identify(), polled, &to);
+    send(&bus, 2, &identify(), CallOptions::default(), &to);
+    send(&bus, 3, &Request::write(ACCELERATION, 20), CallOptions::default(), &to);
+    send(&bus, 4, &identify(), CallOptions::default(), &to);
+    send(&bus, 5, &identify(), urgent, &to);
+    let_go.send(()).unwrap();
+    assert_eq!(names(&outcomes, 5), [5, 3, 2, 4, 1]);
+    holder.join().unwrap();
+}
+
+#[test]
+fn what_is_taken_back_is_neither_sent_nor_told() {
+    let (simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    let (let_go, holder) = hold(&bus);
+    let first = send(&bus, 1, &Request::write(ACCELERATION, 20), CallOptions::default(), &to).unwrap();
+    send(&bus, 2, &identify(), CallOptions::default(), &to);
+    first.abandon();
+    let_go.send(()).unwrap();
+    assert_eq!(names(&outcomes, 1), [2]);
+    holder.join().unwrap();
+    first.abandon(); // long over
+    drop(to);
+    assert!(outcomes.try_recv().is_err());
+    assert!(simulator.drive(1).unwrap().writes().is_empty());
+}
+
+/// In real time, so that the request is met on the wire.
+#[test]
+fn what_is_abandoned_on_the_wire_ends_and_is_not_repeated() {
+    let (simulator, bus) = open(Options::default().realtime(true), false);
+    let (to, outcomes) = channel();
+    bus.call(unit(1).into(), &identify(), CallOptions::default(), &mut || false, &mut |_| {}).unwrap();
+    simulator.wire().drop_answers(1000);
+    let before = simulator.wire().requests();
+    let options =
+        CallOptions { retries: Some(50), timeout: Some(Duration::from_millis(200)), ..CallOptions::default() };
+    let running = send(&bus, 1, &identify(), options, &to).unwrap();
+    while simulator.wire().requests() == before {
+        std::thread::yield_now();
+    }
+    running.abandon();
+    let (_, outcome) = outcomes.recv().unwrap();
+    assert!(matches!(outcome.unwrap_err().failure, Failure::NoAnswer { .. }), "it was left to end");
+    assert_eq!(simulator.wire().requests(), before + 1);
+}
+
+#[test]
+fn closing_tells_all_who_wait() {
+    let (_simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    let (let_go, holder) = hold(&bus);
+    for name in 0..10 {
+        send(&bus, name, &identify(), CallOptions::default(), &to);
+    }
+    let closer = {
+        let bus = Arc::clone(&bus);
+        std::thread::spawn(move || bus.close())
+    };
+    for _ in 0..10 {
+        assert_eq!(outcomes.recv().unwrap().1.unwrap_err().failure, Failure::Closed);
+    }
+    let_go.send(()).unwrap();
+    closer.join().unwrap();
+    holder.join().unwrap();
+    assert!(send(&bus, 11, &identify(), CallOptions::default(), &to).is_none());
+    assert_eq!(outcomes.recv().unwrap().1.unwrap_err().failure, Failure::Closed);
+}
+
+#[test]
+fn a_read_only_bus_refuses_before_anything_waits() {
+    let (_simulator, bus) = open(Options::default(), true);
+    let (to, outcomes) = channel();
+    assert!(send(&bus, 1, &Request::write(ACCELERATION, 20), CallOptions::default(), &to).is_none());
+    assert!(matches!(outcomes.recv().unwrap().1.unwrap_err().failure, Failure::ReadOnly { function: 6 }));
+}
+
+#[test]
+fn who_panics_when_told_ends_no_other_errand() {
+    let (_simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    bus.send(Errand::new(unit(1).into(), &identify(), CallOptions::default(), |_| panic!("a test")));
+    send(&bus, 1, &identify(), CallOptions::default(), &to);
+    assert_eq!(word(&outcomes.recv().unwrap().1.unwrap()), 0x01A0);
+}
