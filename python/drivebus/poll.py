@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Batch", "Poll", "Sample"]
 
-_MOST_SAMPLES = 10_000_000
+_MOST_SAMPLES = 1_000_000
 _LONGEST_INTERVAL = 86_400.0
 
 

@@ -31,6 +31,7 @@ mod owner;
 mod poll;
 mod poll_ring;
 mod poll_run;
+mod poll_samples;
 mod poll_schedule;
 mod port;
 mod process;

@@ -5,17 +5,18 @@
 //! waits for samples does the asking, and nobody else does.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::thread::{self, JoinHandle, ThreadId};
 use std::time::Duration;
 
-use drivebus_rtu::{SerialFormat, UnitAddress};
+use drivebus_rtu::{BeginError, SerialFormat, UnitAddress};
 
 use crate::bus::Bus;
 use crate::clock::monotonic;
 use crate::error::Failure;
 use crate::poll_ring::PollBatch;
-use crate::poll_run::{Progress, Runner, Samples};
+use crate::poll_run::{Progress, Runner};
+use crate::poll_samples::Samples;
 use crate::process::Process;
 use crate::queue::LOOK_UP;
 
@@ -102,6 +103,7 @@ pub struct Poll {
     stop: Arc<AtomicBool>,
     /// In virtual time, for whoever waits.
     runner: Option<Mutex<Runner>>,
+    asking: Mutex<Option<ThreadId>>,
     thread: Mutex<Option<JoinHandle<()>>>,
     shortest: Duration,
     opened_by: Process,
@@ -141,7 +143,8 @@ impl Poll {
             (None, Some(thread.map_err(|error| PollError::NoThread { message: error.to_string() })?))
         };
         let opened_by = Process::current();
-        Ok(Self { bus, samples, stop, runner, thread: Mutex::new(thread), shortest, opened_by })
+        let (asking, thread) = (Mutex::default(), Mutex::new(thread));
+        Ok(Self { bus, samples, stop, runner, asking, thread, shortest, opened_by })
     }
 
     /// How long one cycle takes at least on this line; zero where the line sets no such limit.
@@ -158,7 +161,8 @@ impl Poll {
     ///
     /// # Errors
     ///
-    /// [`Failure::Forked`]: the poll belongs to the parent of this process.
+    /// [`Failure::Forked`]: the poll belongs to the parent of this process. [`Failure::NotBegun`]: in virtual time, from
+    /// inside a `give_up` of the same thread.
     pub fn wait(
         &self,
         count: usize,
@@ -175,26 +179,31 @@ impl Poll {
         let mut look_up = monotonic() + LOOK_UP;
         loop {
             let there = self.samples.len();
-            if there >= count || self.samples.are_over() {
+            let is_late = deadline.is_some_and(|deadline| self.bus.now() >= deadline);
+            if there >= count || is_late || self.samples.are_over() {
                 return Ok(there);
             }
-            let progress = match runner.try_lock() {
-                Ok(mut runner) => runner.go_on(&self.samples, deadline, &mut || self.stops() || give_up()),
-                Err(TryLockError::Poisoned(broken)) => {
-                    // Whoever panicked did so in a question of its own; what the runner knows is whole.
-                    let mut runner = broken.into_inner();
-                    runner.go_on(&self.samples, deadline, &mut || self.stops() || give_up())
-                }
-                // Somebody else does the asking.
-                Err(TryLockError::WouldBlock) => {
-                    self.samples.wait(count, Some(LOOK_UP), &mut || false);
-                    Progress::Asked
-                }
+            let runner = match runner.try_lock() {
+                Ok(runner) => Some(runner),
+                // Whoever panicked did so in a question of its own; what the runner knows is whole.
+                Err(TryLockError::Poisoned(broken)) => Some(broken.into_inner()),
+                Err(TryLockError::WouldBlock) => None,
             };
-            match progress {
-                Progress::Asked => {}
-                Progress::TimeIsUp | Progress::GivenUp => return Ok(self.samples.len()),
-                Progress::Over => self.samples.end(),
+            if let Some(mut runner) = runner {
+                *self.asking() = Some(thread::current().id());
+                let progress = runner.go_on(&self.samples, deadline, &mut || self.stops() || give_up());
+                *self.asking() = None;
+                match progress {
+                    Progress::Asked => {}
+                    Progress::GivenUp => return Ok(self.samples.len()),
+                    Progress::Over => self.samples.end(),
+                }
+            } else if *self.asking() == Some(thread::current().id()) {
+                // Inside a `give_up` of its own, which may run a signal handler: it would wait for itself.
+                return Err(Failure::NotBegun(BeginError::OutOfTurn));
+            } else {
+                // Somebody else does the asking.
+                self.samples.wait(count, Some(LOOK_UP), &mut || false);
             }
             if monotonic() >= look_up {
                 look_up = monotonic() + LOOK_UP;
@@ -241,6 +250,20 @@ impl Poll {
         if self.opened_by.is_current() {
             self.samples.end();
         }
+    }
+
+    /// Has `notify` called, once, when `count` samples are there or the poll has ended: at once, or by the thread that
+    /// asks, which it must not keep. That is for event loops, which cannot [`wait`](Self::wait); in virtual time somebody
+    /// has to, all the same.
+    pub fn call_when(&self, count: usize, notify: impl FnOnce() + Send + 'static) {
+        if self.opened_by.is_current() {
+            self.samples.call_when(count, Box::new(notify));
+        }
+    }
+
+    /// Who does the asking in virtual time.
+    fn asking(&self) -> MutexGuard<'_, Option<ThreadId>> {
+        self.asking.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn stops(&self) -> bool {

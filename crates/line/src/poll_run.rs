@@ -1,7 +1,7 @@
 //! What a poll does: asks whom its schedule names, and puts what came where it is waited for.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -9,23 +9,18 @@ use drivebus_rtu::{Answer, Instant, Request};
 
 use crate::bus::Bus;
 use crate::call::CallOptions;
-use crate::clock::{monotonic, sleep_until};
 use crate::error::Failure;
-use crate::poll::{PollCounts, PollTarget};
-use crate::poll_ring::{PollBatch, PollSample, Ring};
+use crate::poll::PollTarget;
+use crate::poll_ring::PollSample;
+use crate::poll_samples::Samples;
 use crate::poll_schedule::{Schedule, Step};
-use crate::queue::{LOOK_UP, Priority};
-
-/// How long before a beat the poll's thread stops looking whether it is to end, and only waits.
-const NEAR: Duration = Duration::from_millis(1);
+use crate::queue::Priority;
 
 /// What came of going on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Progress {
     /// A target was asked, or a beat was waited for.
     Asked,
-    /// The moment until which there was time has come.
-    TimeIsUp,
     /// Who waits gave up.
     GivenUp,
     /// The bus was closed.
@@ -83,9 +78,6 @@ impl Runner {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Progress {
         let now = self.bus.now();
-        if deadline.is_some_and(|deadline| now >= deadline) {
-            return Progress::TimeIsUp;
-        }
         match self.schedule.step(now) {
             Step::Ask(target) => self.ask(target, samples, give_up),
             Step::Pause(until) => {
@@ -156,118 +148,6 @@ impl Drop for EndsWith {
     }
 }
 
-/// The samples of a poll, and who waits for them.
-#[derive(Debug)]
-pub(crate) struct Samples {
-    state: Mutex<State>,
-    /// Samples are there that somebody waits for, or it is over.
-    there: Condvar,
-    /// It is over.
-    ended: Condvar,
-}
-
-#[derive(Debug)]
-struct State {
-    ring: Ring,
-    cycles: u64,
-    late: u64,
-    missing: u64,
-    over: bool,
-    /// The least number of samples that somebody waits for. A wake-up costs as much as an exchange: none for nobody.
-    wanted: usize,
-}
-
-impl Samples {
-    pub(crate) fn new(size: usize, stride: usize) -> Self {
-        let ring = Ring::new(size, stride);
-        let state = State { ring, cycles: 0, late: 0, missing: 0, over: false, wanted: usize::MAX };
-        Self { state: Mutex::new(state), there: Condvar::new(), ended: Condvar::new() }
-    }
-
-    fn put(&self, sample: PollSample, words: &[u16], schedule: &Schedule) {
-        let mut state = self.lock();
-        state.missing += u64::from(sample.missing.is_some());
-        (state.cycles, state.late) = (schedule.cycles(), schedule.late());
-        state.ring.push(sample, words);
-        if state.ring.len() >= state.wanted {
-            state.wanted = usize::MAX;
-            self.there.notify_all();
-        }
-    }
-
-    /// Waits in real time until `count` are there, for `timeout` at most, and tells how many are there.
-    pub(crate) fn wait(&self, count: usize, timeout: Option<Duration>, give_up: &mut dyn FnMut() -> bool) -> usize {
-        let deadline = timeout.map(|timeout| monotonic() + timeout);
-        let mut look_up = monotonic() + LOOK_UP;
-        let mut state = self.lock();
-        while state.ring.len() < count && !state.over {
-            let now = monotonic();
-            if deadline.is_some_and(|deadline| now >= deadline) {
-                break;
-            }
-            if now >= look_up {
-                // Without the lock: the caller may need time or locks of its own to answer.
-                drop(state);
-                if give_up() {
-                    return self.len();
-                }
-                look_up = monotonic() + LOOK_UP;
-                state = self.lock();
-                continue;
-            }
-            let until = deadline.map_or(look_up, |deadline| deadline.min(look_up));
-            state.wanted = state.wanted.min(count);
-            let left = until.saturating_duration_since(now);
-            state = self.there.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
-        state.ring.len()
-    }
-
-    /// Waits in real time for `until` on the clock of `bus`, or until it is over.
-    fn pause(&self, bus: &Bus, until: Instant) {
-        let mut state = self.lock();
-        while !state.over && !bus.is_shut() {
-            let left = until.saturating_duration_since(bus.now());
-            if left <= NEAR {
-                drop(state);
-                sleep_until(monotonic() + left);
-                return;
-            }
-            let wait = left.saturating_sub(NEAR).min(LOOK_UP);
-            state = self.ended.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
-        }
-    }
-
-    pub(crate) fn take(&self, max: usize) -> PollBatch {
-        self.lock().ring.take(max)
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.lock().ring.len()
-    }
-
-    pub(crate) fn counts(&self) -> PollCounts {
-        let state = self.lock();
-        PollCounts { cycles: state.cycles, missing: state.missing, late: state.late, dropped: state.ring.dropped() }
-    }
-
-    pub(crate) fn are_over(&self) -> bool {
-        self.lock().over
-    }
-
-    /// No more samples come.
-    pub(crate) fn end(&self) {
-        self.lock().over = true;
-        self.there.notify_all();
-        self.ended.notify_all();
-    }
-
-    /// Nothing is done under the lock that can panic.
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::mpsc::{Receiver, Sender, channel};
@@ -275,6 +155,7 @@ mod tests {
     use drivebus_rtu::{Adu, SerialFormat, UnitAddress};
 
     use super::*;
+    use crate::clock::{monotonic, sleep_until};
     use crate::{BusOptions, Line, Poll, PortError};
 
     /// A unit that has zero everywhere. It says what it hears, and answers the first request only when it is told to.

@@ -3,15 +3,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use drivebus_line::{
     AdapterEcho, Bus, BusOptions, CallError, CallOptions, Failure, Line, Poll, PollBatch, PollError, PollSample,
     PollTarget, PortError,
 };
-use drivebus_rtu::{DataBits, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress};
+use drivebus_rtu::{
+    BeginError, DataBits, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress,
+};
 use drivebus_sim::{Options, SimLine, Simulator};
 
 const STATE: u16 = 0x2100;
@@ -325,4 +327,39 @@ fn who_waits_can_give_up() {
         asked == 3
     });
     assert_eq!((there, asked, poll.is_over()), (Ok(1), 3, false));
+}
+
+#[test]
+fn who_waits_does_not_wait_for_itself() {
+    let (_simulator, bus) = line();
+    let poll = poll(&bus, vec![target(1, &[(STATE, 1)])], Some(Duration::from_secs(3_600)));
+    poll.wait(1, None, &mut || false).unwrap();
+    let mut inside = None;
+    poll.wait(2, None, &mut || {
+        inside = Some(poll.wait(2, None, &mut || false));
+        true
+    })
+    .unwrap();
+    assert_eq!(inside, Some(Err(Failure::NotBegun(BeginError::OutOfTurn))));
+    assert_eq!(poll.wait(2, Some(Duration::from_secs(3_600)), &mut || false), Ok(2), "afterwards as always");
+}
+
+#[test]
+fn who_cannot_wait_is_called_once() {
+    let (_simulator, bus) = line();
+    let poll = poll(&bus, vec![target(1, &[(STATE, 1)])], None);
+    let (called, calls) = mpsc::channel();
+    for (name, count) in [("three", 3), ("two", 2), ("never", 99)] {
+        let called = called.clone();
+        poll.call_when(count, move || called.send(name).unwrap());
+    }
+    for (there, expected) in [(1, vec![]), (2, vec!["two"]), (5, vec!["three"])] {
+        poll.wait(there, None, &mut || false).unwrap();
+        assert_eq!(calls.try_iter().collect::<Vec<_>>(), expected, "{there} samples");
+    }
+    let at_once = called.clone();
+    poll.call_when(5, move || at_once.send("at once").unwrap());
+    assert_eq!(calls.try_iter().collect::<Vec<_>>(), ["at once"]);
+    poll.close();
+    assert_eq!(calls.try_iter().collect::<Vec<_>>(), ["never"], "it has ended");
 }
