@@ -30,6 +30,8 @@ BAUDRATE = 19_200
 MONITOR, RESPONSE_DELAY = 0x3000, 0x0E03
 WARM = 1.0
 """Seconds before anything counts."""
+LOOK = 0.1
+"""Seconds between two looks at what was polled."""
 
 
 class Figures(NamedTuple):
@@ -47,6 +49,8 @@ class Figures(NamedTuple):
     """The same of the process that simulates the lines."""
     reads: int
     """In the measured time, on all buses."""
+    missing: int
+    """Of all requests, those without an answer: a crowded machine may keep one waiting for longer than the time-out."""
     violations: int
     """Requests that came before the silence was over, from the first one on."""
     asked: int
@@ -133,6 +137,27 @@ def by_threads(buses: Sequence[drivebus.Bus], clock: Clock, units: int, words: i
     return results
 
 
+def by_poll(buses: Sequence[drivebus.Bus], clock: Clock, units: int, words: int) -> list[tuple[int, float]]:
+    """`bus.poll`, and one thread that looks at all samples; returns how many reads took how long, on each."""
+    unix = time.time() - time.monotonic()
+    targets = {unit: [(MONITOR, words)] for unit in range(1, units + 1)}
+    answered: list[list[float]] = [[] for _ in buses]
+    with ExitStack() as stack:
+        polls = [stack.enter_context(bus.poll(targets)) for bus in buses]
+        while time.monotonic() < clock.end:
+            time.sleep(LOOK)
+            for moments, poll in zip(answered, polls, strict=True):
+                for sample in poll.take():
+                    if sample:
+                        moments.append(sample.answered - unix)
+        assert not any(poll.dropped for poll in polls)
+    within = [[moment for moment in moments if clock.begin <= moment <= clock.end] for moments in answered]
+    return [(len(moments) - 1, moments[-1] - moments[0]) for moments in within]
+
+
+HOW = {"threads": by_threads, "bus.poll": by_poll}
+
+
 @contextmanager
 def opened(ports: Sequence[str], units: int) -> Iterator[list[drivebus.Bus]]:
     """A bus on each port, whose units answer at once."""
@@ -151,7 +176,7 @@ def opened(ports: Sequence[str], units: int) -> Iterator[list[drivebus.Bus]]:
         yield buses
 
 
-def measure(given: argparse.Namespace) -> Figures:
+def measure(given: argparse.Namespace, how: str) -> Figures:
     """One measurement."""
     line = drivebus.SerialFormat(BAUDRATE)
     shortest = (8 + 5 + 2 * given.words) * line.char_time + 2 * line.t35
@@ -168,14 +193,15 @@ def measure(given: argparse.Namespace) -> Figures:
 
             marker = threading.Thread(target=mark)
             marker.start()
-            results = by_threads(buses, clock, given.units, given.words)
+            results = HOW[how](buses, clock, given.units, given.words)
             marker.join()
             requests, violations, _ = lines.counts()
+            missing = sum(bus.stats().timeouts for bus in buses)
     finally:
         lines.close()
     (own_before, other_before), (own, other) = marks
     return Figures(
-        how="threads",
+        how=how,
         lines=given.lines,
         units=given.units,
         words=given.words,
@@ -183,13 +209,14 @@ def measure(given: argparse.Namespace) -> Figures:
         cores=(own - own_before) / given.seconds,
         simulator_cores=(other - other_before) / given.seconds,
         reads=sum(count for count, _ in results),
+        missing=missing,
         violations=violations,
         asked=requests,
     )
 
 
 HEAD = ["buses", "units each", "words", "polled by", "least share", "median share"]
-HEAD += ["cores", "cores of the simulator", "silence violations"]
+HEAD += ["cores", "cores of the simulator", "not answered", "silence violations"]
 
 
 def row(figures: Figures) -> list[str]:
@@ -203,6 +230,7 @@ def row(figures: Figures) -> list[str]:
         f"{statistics.median(figures.shares):.2f} %",
         f"{figures.cores:.2f}",
         f"{figures.simulator_cores:.2f}",
+        str(figures.missing),
         f"{figures.violations} of {figures.asked}",
     ]
 
@@ -215,6 +243,7 @@ def main() -> None:
     options.add_argument("--units", type=int, default=8, help="on each line")
     options.add_argument("--words", type=int, default=1, choices=range(1, 17))
     options.add_argument("--seconds", type=float, default=5.0)
+    options.add_argument("--how", action="append", choices=list(HOW))
     options.add_argument("--runs", type=int, default=1)
     options.add_argument("--idle", action="store_true", help="let the processor idle between, as it will")
     options.add_argument("--realtime", action="store_true", help="on a busy machine: all that is measured goes first")
@@ -229,7 +258,7 @@ def main() -> None:
     with ExitStack() as stack:
         if not given.idle:
             stack.enter_context(programs.beside("awake"))
-        runs = [measure(given) for _ in range(given.runs)]
+        runs = [measure(given, how) for _ in range(given.runs) for how in given.how or HOW]
     show(given.json, [each._asdict() for each in runs], markdown(HEAD, [row(each) for each in runs]))
 
 
