@@ -187,6 +187,12 @@ def test_a_simulation_that_makes_no_sense_is_named(arguments: tuple[Any, ...], m
         Simulator(*arguments, transport="process")
 
 
+@pytest.mark.parametrize("fifo", [0, 257])
+def test_a_fifo_has_room_for_a_character_and_not_for_ever(fifo: int) -> None:
+    with pytest.raises(NotAllowed, match=rf"fifo.*{fifo}.*1.*256"):
+        Simulator({1: "gd350"}, fifo=fifo)
+
+
 def test_virtual_time_is_for_this_process_only() -> None:
     with pytest.raises(NotAllowed, match='"process"'):
         Simulator({1: "gd350"}, clock="virtual")

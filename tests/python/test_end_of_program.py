@@ -369,3 +369,21 @@ with drivebus.Simulator({1: "gd350"}, link=sys.argv[1]) as simulator, drivebus.B
         check=False,
     )
     assert (child.stdout, child.returncode) == ("7 [3] True\n", 0), child.stderr
+
+
+def test_a_forked_child_has_simulators_of_its_own_and_those_of_its_parent_go_on() -> None:
+    program = """
+import os, drivebus
+simulators = [drivebus.Simulator({1: "gd350"}) for _ in range(2)]
+buses = [drivebus.Bus(simulator.port) for simulator in simulators]
+child = os.fork()
+if not child:
+    with drivebus.Simulator({1: "gd350"}) as own, drivebus.Bus(own.port) as bus:
+        print(bus.read(1, 0x2100), flush=True)
+    for simulator in simulators:
+        simulator.close()
+    os._exit(0)
+print(os.waitpid(child, 0)[1], [bus.read(1, 0x2100) for bus in buses])
+"""
+    child = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert (child.stdout, child.returncode) == ("[3]\n0 [[3], [3]]\n", 0), child.stderr

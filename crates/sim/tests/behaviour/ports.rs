@@ -90,6 +90,26 @@ fn a_pseudo_terminal_that_is_plugged_in_again_has_another_name_and_its_link_lead
     std::fs::remove_dir(&folder).unwrap();
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn all_ports_of_a_process_are_served_by_one_thread() {
+    let simulators: Vec<Simulator> = (0..6).map(|_| simulator()).collect();
+    let ptys: Vec<_> = simulators[..3].iter().map(|simulator| simulator.serve_pty().unwrap()).collect();
+    let tcps: Vec<_> = simulators[3..].iter().map(|simulator| simulator.serve_tcp().unwrap()).collect();
+    std::thread::scope(|scope| {
+        for (simulator, server) in simulators.iter().zip(&ptys) {
+            scope.spawn(|| ask_thrice(simulator, &mut open(server)));
+        }
+        for (simulator, server) in simulators[3..].iter().zip(&tcps) {
+            scope.spawn(|| ask_thrice(simulator, &mut TcpStream::connect(server.address()).unwrap()));
+        }
+    });
+    let threads = std::fs::read_dir("/proc/self/task").unwrap();
+    let names = threads.filter_map(|thread| std::fs::read_to_string(thread.unwrap().path().join("comm")).ok());
+    assert_eq!(names.filter(|name| name.trim_end() == "drivebus-sim").count(), 1);
+    assert!(simulators.iter().all(|simulator| simulator.wire().requests() == 3));
+}
+
 #[test]
 fn tcp_is_refused_while_it_is_unplugged() {
     let simulator = simulator();
