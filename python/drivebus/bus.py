@@ -45,7 +45,7 @@ class Bus(BusFace[_native.Bus]):
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.
         turnaround: Seconds that units are given to act on a broadcast; nothing is sent meanwhile.
         learn_timeout: Give a unit that is read no longer than its answers have taught: four times the longest delay of
-            its last 32 answers, at least 50 ms, beside the time the characters take; never longer than *timeout*. The
+            its last 32 answers, at least 100 ms, beside the time the characters take; never longer than *timeout*. The
             next read after silence waits the whole *timeout* again. What `poll` asks waits so in any case.
         low_latency: Whether an adapter that keeps what it receives (FTDI: 16 ms) is told to hurry while it is open.
 

@@ -39,7 +39,7 @@ pub struct BusOptions {
     /// How long units are given to act on a broadcast, in which nothing is sent.
     pub turnaround: Duration,
     /// Whether a read waits no longer than its unit's answers have taught: four times the longest delay of the last 32,
-    /// at least 50 ms, beside the time that the answer's characters take, and never longer than the time-out. What is
+    /// at least 100 ms, beside the time that the answer's characters take, and never longer than the time-out. What is
     /// polled waits so in any case.
     pub learn_timeout: bool,
 }

@@ -24,8 +24,8 @@ const ENOUGH: usize = 8;
 const MARGIN: u32 = 4;
 
 /// Never less than this, in addition to the time the answer's own characters take: an adapter holds bytes back for 16 ms,
-/// and a busy machine looks at them later still.
-const FLOOR: Duration = Duration::from_millis(50);
+/// and a machine that was busy for 50 ms has given up units that were there.
+const FLOOR: Duration = Duration::from_millis(100);
 
 /// The delays of the units of a line: from the end of a request to the first character of its answer.
 #[derive(Debug, Default)]

@@ -69,7 +69,7 @@ fn a_unit_gets_its_own_silence_and_its_own_time_out() {
 /// A GD350 answers 5 ms after the silence (P14.03), 7 ms after the request: four times that is below the floor.
 #[test]
 fn a_read_waits_as_long_as_answers_have_taught_and_once_longer_after_silence() {
-    let floor = Duration::from_millis(50) + FORMAT.chars(7);
+    let floor = Duration::from_millis(100) + FORMAT.chars(7);
     let all = Duration::from_millis(500);
     let polled = CallOptions { priority: Some(Priority::Poll), ..ONCE };
     for (learn_timeout, options, learned) in [(true, ONCE, floor), (false, ONCE, all), (false, polled, floor)] {
