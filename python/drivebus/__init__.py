@@ -28,7 +28,8 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
-from drivebus.poll import Batch, Poll, Sample
+from drivebus.poll import Poll
+from drivebus.polling import Batch, Sample
 from drivebus.profile import Profile, profiles
 from drivebus.sim import Simulator
 from drivebus.values import (

@@ -418,8 +418,12 @@ class Poller:
 
         Returns how many are there. A signal ends it at once.
         """
+    def ask(self, mailbox: Mailbox, count: int, timeout: float | None, /) -> Asked:
+        """As `wait`, for an event loop. On a real line without the *timeout*, which the loop keeps itself."""
     def take(self, max: int, /) -> Batch:  # noqa: A002
         """The oldest samples, *max* at most, without waiting."""
+    def stop(self) -> None:
+        """Ends it without waiting for the exchange that is under way."""
     def close(self) -> None:
         """Ends it; what is there can still be taken. Closing again does nothing."""
 

@@ -17,7 +17,8 @@ from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
 from drivebus.opening import BusFace, Opening
-from drivebus.poll import Poll, Sample
+from drivebus.poll import Poll
+from drivebus.polling import Sample
 from drivebus.profile import Profile
 from drivebus.values import Found, Link
 

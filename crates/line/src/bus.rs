@@ -77,6 +77,8 @@ pub struct Bus {
     options: BusOptions,
     units: Mutex<BTreeMap<UnitAddress, UnitOptions>>,
     name: String,
+    /// Whether frames are told apart by something else than silence; it stays so when the line is opened again.
+    gapless: bool,
     closed: AtomicBool,
     opened_by: Process,
     clock: Clock,
@@ -123,6 +125,7 @@ impl Bus {
         let (name, clock) =
             owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
+        let gapless = owner.line().is_some_and(|line| line.gapless());
         Ok(Self {
             queue: Arc::default(),
             stats: owner.shared_stats(),
@@ -133,6 +136,7 @@ impl Bus {
             options,
             units: Mutex::default(),
             name,
+            gapless,
             closed: AtomicBool::new(false),
             opened_by: Process::current(),
             clock,
@@ -339,9 +343,9 @@ impl Bus {
         }
     }
 
-    /// Whether frames are told apart by something else than silence. Not so while no line is open.
+    /// Whether frames are told apart by something else than silence.
     pub(crate) fn is_gapless(&self) -> bool {
-        self.lock().line().is_some_and(|line| line.gapless())
+        self.gapless
     }
 
     /// The least silence before a request to `unit`.

@@ -253,11 +253,13 @@ impl Poll {
     }
 
     /// Has `notify` called, once, when `count` samples are there or the poll has ended: at once, or by the thread that
-    /// asks, which it must not keep. That is for event loops, which cannot [`wait`](Self::wait); in virtual time somebody
-    /// has to, all the same.
-    pub fn call_when(&self, count: usize, notify: impl FnOnce() + Send + 'static) {
+    /// asks, which it must not keep. Not, once it is no longer `wanted`. That is for event loops, which cannot
+    /// [`wait`](Self::wait); in virtual time somebody has to, all the same.
+    pub fn call_when(&self, count: usize, wanted: Arc<AtomicBool>, notify: impl FnOnce() + Send + 'static) {
         if self.opened_by.is_current() {
-            self.samples.call_when(count, Box::new(notify));
+            self.samples.call_when(count, wanted, Box::new(notify));
+        } else {
+            notify();
         }
     }
 

@@ -1,7 +1,8 @@
 //! The samples of a poll between who puts them there and who waits for them.
 
 use std::fmt;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
@@ -18,6 +19,13 @@ const NEAR: Duration = Duration::from_millis(1);
 
 /// What is called when samples are there.
 pub(crate) type Notify = Box<dyn FnOnce() + Send>;
+
+/// Who is called, at how many samples, and whether it still wants to be.
+struct Call {
+    count: usize,
+    wanted: Arc<AtomicBool>,
+    notify: Notify,
+}
 
 /// The samples of a poll, and who waits for them.
 #[derive(Debug)]
@@ -37,8 +45,15 @@ struct State {
     over: bool,
     /// The least number of samples that somebody waits for. A wake-up costs as much as an exchange: none for nobody.
     wanted: usize,
-    /// Who is called, at how many samples.
-    calls: Vec<(usize, Notify)>,
+    calls: Vec<Call>,
+}
+
+impl Call {
+    fn make(self) {
+        if self.wanted.load(Ordering::Acquire) {
+            (self.notify)();
+        }
+    }
 }
 
 impl fmt::Debug for State {
@@ -49,13 +64,12 @@ impl fmt::Debug for State {
 
 impl State {
     /// Those of the calls that are to be made now.
-    fn due(&mut self) -> Vec<Notify> {
+    fn due(&mut self) -> Vec<Call> {
         let there = if self.over { usize::MAX } else { self.ring.len() };
-        let (due, later) = std::mem::take(&mut self.calls).into_iter().partition(|&(count, _)| count <= there);
+        let (due, later) = std::mem::take(&mut self.calls).into_iter().partition(|call| call.count <= there);
         self.calls = later;
-        self.wanted = self.calls.iter().map(|&(count, _)| count).min().unwrap_or(usize::MAX);
-        let due: Vec<(usize, Notify)> = due;
-        due.into_iter().map(|(_, notify)| notify).collect()
+        self.wanted = self.calls.iter().map(|call| call.count).min().unwrap_or(usize::MAX);
+        due
     }
 }
 
@@ -76,20 +90,22 @@ impl Samples {
             let due = state.due();
             drop(state);
             self.there.notify_all();
-            for notify in due {
-                notify();
+            for call in due {
+                call.make();
             }
         }
     }
 
-    /// Has `notify` called, once, when `count` are there or it is over: now, or by who puts them there.
-    pub(crate) fn call_when(&self, count: usize, notify: Notify) {
+    /// Has `notify` called, once, when `count` are there or it is over: now, or by who puts them there. Not, once it is no
+    /// longer `wanted`.
+    pub(crate) fn call_when(&self, count: usize, wanted: Arc<AtomicBool>, notify: Notify) {
         let mut state = self.lock();
         if state.over || state.ring.len() >= count {
             drop(state);
             return notify();
         }
-        state.calls.push((count, notify));
+        state.calls.retain(|call| call.wanted.load(Ordering::Acquire));
+        state.calls.push(Call { count, wanted, notify });
         state.wanted = state.wanted.min(count);
     }
 
@@ -159,8 +175,8 @@ impl Samples {
         state.over = true;
         let due = state.due();
         drop(state);
-        for notify in due {
-            notify();
+        for call in due {
+            call.make();
         }
         self.there.notify_all();
         self.ended.notify_all();

@@ -1,6 +1,7 @@
 //! `Poller` and its batches for Python: samples taken and decoded many at a time, without the GIL while they are waited for.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use drivebus_drives::{ReadPlan, Value};
 use drivebus_line::{Failure, Poll, PollBatch, PollError, PollSample, PollTarget};
@@ -11,8 +12,10 @@ use crate::arguments::duration;
 use crate::bus::{Bus, UnixClock, with_signals};
 use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{Class, call_error, not_allowed, refuse};
+use crate::mailbox::Mailbox;
 use crate::plan::Plan;
 use crate::profile::number;
+use crate::requests::{Asked, apart, nothing};
 
 /// What the words of a target mean.
 #[derive(Debug)]
@@ -26,7 +29,7 @@ enum Meaning {
 #[pyclass(frozen, module = "drivebus._native")]
 #[derive(Debug)]
 pub(crate) struct Poller {
-    core: Poll,
+    core: Arc<Poll>,
     bus: Py<Bus>,
     meanings: Arc<[Meaning]>,
 }
@@ -58,7 +61,7 @@ impl Poller {
             PollError::Bus(failure) => port_error(&failure),
             other => refuse(other),
         })?;
-        Ok(Self { core, bus: bus.clone().unbind(), meanings: meanings.into() })
+        Ok(Self { core: Arc::new(core), bus: bus.clone().unbind(), meanings: meanings.into() })
     }
 
     #[getter]
@@ -93,12 +96,40 @@ impl Poller {
         Batch { core, meanings: Arc::clone(&self.meanings), clock: self.bus.get().unix_clock(py) }
     }
 
+    /// As `wait`, for an event loop: it has a letter then.
+    #[pyo3(signature = (mailbox, count, timeout, /))]
+    fn ask(&self, mailbox: &Mailbox, count: usize, timeout: Option<f64>) -> PyResult<Asked> {
+        let timeout = timeout.map(|timeout| duration("timeout", timeout)).transpose()?;
+        if self.bus.get().core.is_virtual() {
+            let core = Arc::clone(&self.core);
+            return apart(&mailbox.inbox, move |wanted| {
+                let waited = core.wait(count, timeout, &mut || !wanted.load(Ordering::Acquire));
+                move |py: Python<'_>| waited.map_err(|failure| port_error(&failure)).and_then(|_| nothing(py))
+            });
+        }
+        let (number, wanted) = (mailbox.inbox.number(), Arc::new(AtomicBool::new(true)));
+        let inbox = Arc::clone(&mailbox.inbox);
+        self.core.call_when(count, Arc::clone(&wanted), move || inbox.post(number, nothing));
+        Ok(Asked::apart(number, wanted))
+    }
+
+    fn stop(&self, py: Python<'_>) {
+        py.detach(|| self.core.stop());
+    }
+
     fn close(&self, py: Python<'_>) {
         py.detach(|| self.core.close());
     }
 
     fn __repr__(&self) -> String {
         format!("<_native.Poller of {} targets>", self.meanings.len())
+    }
+}
+
+impl Drop for Poller {
+    /// Whoever still waits for it apart does not keep it going.
+    fn drop(&mut self) {
+        self.core.stop();
     }
 }
 

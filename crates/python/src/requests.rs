@@ -54,6 +54,13 @@ impl Asked {
     }
 }
 
+impl Asked {
+    /// What comes under `number` unless `wanted` was taken back by then.
+    pub(crate) fn apart(number: u64, wanted: Arc<AtomicBool>) -> Self {
+        Self { number, how: How::Apart(wanted) }
+    }
+}
+
 /// Opens a bus in a thread of its own; it comes as a letter.
 #[pyfunction]
 #[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
@@ -237,14 +244,14 @@ impl Requests {
 }
 
 /// Does `work` in a thread of its own, and posts the letter that it makes.
-fn apart<L>(inbox: &Arc<Inbox>, work: impl FnOnce(&AtomicBool) -> L + Send + 'static) -> PyResult<Asked>
+pub(crate) fn apart<L>(inbox: &Arc<Inbox>, work: impl FnOnce(&AtomicBool) -> L + Send + 'static) -> PyResult<Asked>
 where
     L: for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
 {
     let (number, wanted) = (inbox.number(), Arc::new(AtomicBool::new(true)));
     let (inbox, asked) = (Arc::clone(inbox), Arc::clone(&wanted));
     thread::Builder::new().name(String::from("drivebus-apart")).spawn(move || inbox.post(number, work(&asked)))?;
-    Ok(Asked { number, how: How::Apart(wanted) })
+    Ok(Asked::apart(number, wanted))
 }
 
 fn words(reply: &Reply) -> Vec<u16> {
@@ -256,7 +263,7 @@ fn words(reply: &Reply) -> Vec<u16> {
 
 /// `None`, for what has nothing to tell.
 #[expect(clippy::unnecessary_wraps, reason = "a letter, as the others are")]
-fn nothing(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+pub(crate) fn nothing(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     Ok(py.None().into_bound(py))
 }
 

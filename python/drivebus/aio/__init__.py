@@ -19,6 +19,7 @@ polls nothing. Works with any event loop of asyncio, uvloop's too, and so under 
 
 from drivebus.aio.bus import Bus
 from drivebus.aio.drive import Drive
+from drivebus.aio.poll import Poll
 from drivebus.aio.watchdog import Watchdog
 
-__all__ = ["Bus", "Drive", "Watchdog"]
+__all__ = ["Bus", "Drive", "Poll", "Watchdog"]

@@ -14,6 +14,7 @@ from drivebus import bus, checks, who
 from drivebus._native import SerialFormat
 from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
+from drivebus.aio.poll import Poll
 from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
 from drivebus.opening import BusFace, Opening
@@ -171,6 +172,11 @@ class Bus(BusFace[Line]):
         if profile is not None:
             return Drive(self, unit, Profile.find(profile))
         return Drive(self, unit, *await who.ask(self, unit))
+
+    def poll(self, targets: Mapping[Any, Any], interval: float | None = None, *, size: int = 10_000) -> Poll:
+        """As `drivebus.Bus.poll`, for `async with` and `async for`. It asks from now on, and keeps no event loop."""
+        self._check_open()
+        return Poll(self, self._native.native, targets, interval, size)
 
     @contextmanager
     def undisturbed(self) -> Iterator[Bus]:

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
@@ -349,16 +349,20 @@ fn who_cannot_wait_is_called_once() {
     let (_simulator, bus) = line();
     let poll = poll(&bus, vec![target(1, &[(STATE, 1)])], None);
     let (called, calls) = mpsc::channel();
-    for (name, count) in [("three", 3), ("two", 2), ("never", 99)] {
+    let call = |name: &'static str, count, wanted: bool| {
         let called = called.clone();
-        poll.call_when(count, move || called.send(name).unwrap());
-    }
+        let wanted = Arc::new(AtomicBool::new(wanted));
+        poll.call_when(count, wanted, move || called.send(name).unwrap());
+    };
+    call("three", 3, true);
+    call("two", 2, true);
+    call("not any more", 2, false);
+    call("never", 99, true);
     for (there, expected) in [(1, vec![]), (2, vec!["two"]), (5, vec!["three"])] {
         poll.wait(there, None, &mut || false).unwrap();
         assert_eq!(calls.try_iter().collect::<Vec<_>>(), expected, "{there} samples");
     }
-    let at_once = called.clone();
-    poll.call_when(5, move || at_once.send("at once").unwrap());
+    call("at once", 5, true);
     assert_eq!(calls.try_iter().collect::<Vec<_>>(), ["at once"]);
     poll.close();
     assert_eq!(calls.try_iter().collect::<Vec<_>>(), ["never"], "it has ended");
