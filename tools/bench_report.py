@@ -89,6 +89,13 @@ SECTIONS = [
         module("many_lines"),
     ),
     Section(
+        "aio_loop",
+        "Many lines in one event loop",
+        "The same lines, read by tasks of one asyncio loop. A tick is how much later than asked a task wakes up that "
+        "sleeps a millisecond beside them; `idle` is a loop without buses, the machine's own share.",
+        module("aio_loop"),
+    ),
+    Section(
         "rust",
         "Without Python",
         "Medians of criterion; CRCs in C (`cc -O2`, benches/c/crc_tables.c) from the same minutes. A read on "
