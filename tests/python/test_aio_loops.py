@@ -107,6 +107,21 @@ def test_under_anyio() -> None:
     anyio.run(main, backend="asyncio")
 
 
+def test_more_dead_units_than_threads_keep_nobody_from_the_line(run: Run) -> None:
+    async def main() -> None:
+        with line(clock="virtual") as simulator:
+            async with drivebus.aio.Bus(simulator, timeout=0.1) as bus:
+                dead = [asyncio.create_task(bus.read(unit, 0x2100)) for unit in range(10, 110) for _ in range(2)]
+                await asyncio.sleep(0)
+                for _ in range(20):
+                    assert await bus.read(1, 0x2100, urgent=True) == [3]
+                    assert await bus.read(2, 0x2100) == [3]
+                ends = await asyncio.gather(*dead, return_exceptions=True)
+                assert {type(end) for end in ends} == {drivebus.NoAnswer}
+
+    run(main())
+
+
 def test_one_bus_in_several_loops_at_once() -> None:
     with line(clock="virtual") as simulator:
 
