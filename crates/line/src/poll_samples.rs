@@ -80,9 +80,12 @@ impl Samples {
         Self { state: Mutex::new(state), there: Condvar::new(), ended: Condvar::new() }
     }
 
-    /// Adds one, as counted by `schedule`.
+    /// Adds one, as counted by `schedule`; not once it is over, for who ended it may have counted already.
     pub(crate) fn put(&self, sample: PollSample, words: &[u16], schedule: &Schedule) {
         let mut state = self.lock();
+        if state.over {
+            return;
+        }
         state.missing += u64::from(sample.missing.is_some());
         (state.cycles, state.late) = (schedule.cycles(), schedule.late());
         state.ring.push(sample, words);
