@@ -92,6 +92,14 @@ SECTIONS = [
         module("aio_loop"),
     ),
     Section(
+        "drives",
+        "10 000 drives in virtual time",
+        "On one core: every motor ramps all the time, every line is polled at wire speed (19200 bit/s) for its drives' "
+        "state words. How many requests a virtual second holds depends on how many lines the drives are on; processor "
+        "time includes the looks.",
+        module("drives"),
+    ),
+    Section(
         "rust",
         "Without Python",
         "Medians of criterion; CRCs in C (`cc -O2`, benches/c/crc_tables.c) from the same minutes. A read on "
