@@ -28,7 +28,7 @@ CRATES: dict[str, set[str]] = {
 }
 
 # The trait of `line` and what its methods speak of: all that `sim` may name.
-LINE_TRAIT = {"Line", "PortError", "PortErrorKind"}
+LINE_TRAIT = {"Line", "LineClock", "PortError", "PortErrorKind"}
 
 # What the pure crates must not know. Comments and strings do not count.
 FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {

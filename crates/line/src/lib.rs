@@ -57,7 +57,7 @@ pub use link::Link;
 pub use opener::Opener;
 pub use poll::{Poll, PollCounts, PollError, PollTarget};
 pub use poll_ring::{PollBatch, PollSample};
-pub use port::{Line, PortError, PortErrorKind};
+pub use port::{Line, LineClock, PortError, PortErrorKind};
 pub use queue::Priority;
 pub use stats::{Counters, Latency, Stats};
 pub use units::UnitOptions;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use drivebus_rtu::{Adu, Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, UnitAddress};
 
-use crate::Line;
 use crate::backoff::DeadUnits;
 use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
@@ -15,6 +14,7 @@ use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
 use crate::units::Delays;
+use crate::{Line, LineClock};
 
 /// What to do next for a request.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +37,8 @@ pub(crate) type Asked = (u64, u64);
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
+    /// The clock of the line that was open last.
+    clock: Option<LineClock>,
     opener: LineOpener,
     pub(crate) master: Master,
     /// What the user knows about the adapter.
@@ -71,6 +73,7 @@ impl Owner {
         let line = opener.open(give_up)?;
         let mut owner = Self {
             line: None,
+            clock: None,
             opener,
             master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
             given_echo: echo,
@@ -101,9 +104,13 @@ impl Owner {
         self.stats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Now, on the line's clock; its start while no line is open.
+    /// Now, on the line's clock; its start while no line is open and nobody else knows.
     pub(crate) fn now(&self) -> Instant {
-        self.line.as_ref().map_or(Instant::ZERO, |line| line.now())
+        match (&self.line, &self.clock) {
+            (Some(line), _) => line.now(),
+            (None, Some(clock)) => clock(),
+            (None, None) => Instant::ZERO,
+        }
     }
 
     /// What was asked of `unit` so far: who finds it unchanged knows that nobody else has asked it since.
@@ -158,6 +165,7 @@ impl Owner {
         if !line.gapless() {
             self.master.opened(line.now());
         }
+        self.clock = line.clock();
         self.line = Some(line);
     }
 

@@ -7,6 +7,9 @@ use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
+/// What tells the time of a line.
+pub type LineClock = Box<dyn Fn() -> Instant + Send>;
+
 /// A way for bytes to reach units and to come back, with a clock of its own.
 ///
 /// A line knows nothing about frames. It is used by one owner at a time, and no call blocks beyond the moment it is
@@ -56,6 +59,12 @@ pub trait Line: Send + fmt::Debug {
     /// Whether its clock is a simulation's, which only moves while somebody waits.
     fn is_virtual(&self) -> bool {
         false
+    }
+
+    /// This line's clock, which goes on when the line is gone: asked where it is a simulation's. `None` where only the line
+    /// knows; then no time passes while it is lost.
+    fn clock(&self) -> Option<LineClock> {
+        None
     }
 
     /// Whether an adapter might send our own bytes back to us.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_line::{Line, PortError, PortErrorKind};
+use drivebus_line::{Line, LineClock, PortError, PortErrorKind};
 use drivebus_rtu::Instant;
 
 use crate::simulator::Shared;
@@ -97,6 +97,12 @@ impl Line for SimLine {
 
     fn is_virtual(&self) -> bool {
         !self.shared.clock.is_real()
+    }
+
+    /// The simulation's, which goes on while the adapter is pulled out.
+    fn clock(&self) -> Option<LineClock> {
+        let shared = Arc::clone(&self.shared);
+        Some(Box::new(move || shared.now()))
     }
 }
 

@@ -8,8 +8,8 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use drivebus_line::{
-    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Failure, Line, Poll, PollBatch, PollError, PollSample,
-    PollTarget, PortError,
+    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Failure, Line, LineClock, Poll, PollBatch, PollError,
+    PollSample, PollTarget, PortError,
 };
 use drivebus_rtu::{
     BeginError, DataBits, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress,
@@ -65,6 +65,10 @@ impl Line for Cut {
 
     fn is_virtual(&self) -> bool {
         self.line.is_virtual()
+    }
+
+    fn clock(&self) -> Option<LineClock> {
+        self.line.clock()
     }
 }
 
@@ -281,6 +285,31 @@ fn a_poll_goes_on_when_the_port_is_back() {
 }
 
 #[test]
+fn while_the_port_is_lost_time_goes_on_and_ends_a_wait() {
+    for interval in [None, Some(millis(100))] {
+        let (simulator, bus) = line();
+        let poll = poll(&bus, vec![target(1, &[(MONITOR, 2), (STATE, 1)]), target(2, &[(STATE, 1)])], interval);
+        poll.wait(4, None, &mut || false).unwrap();
+        simulator.wire().unplug();
+        let (pulled, mut looks) = (simulator.now(), 0);
+        poll.wait(usize::MAX, Some(millis(500)), &mut || {
+            looks += 1;
+            looks > 20 // it does not end by itself
+        })
+        .unwrap();
+        assert!(bus.now() >= pulled + millis(500), "the bus tells the time without its line");
+        let batch = poll.take(usize::MAX);
+        assert!(batch.iter().any(|(sample, _)| sample.missing.is_some() && sample.sent >= pulled));
+        let mut last = Instant::ZERO;
+        for (sample, _) in batch.iter() {
+            assert!(last <= sample.sent && sample.sent <= sample.ended, "after {last:?} came {sample:?}");
+            last = sample.ended;
+        }
+        assert!(last < pulled + millis(600), "no longer than it was waited for");
+    }
+}
+
+#[test]
 fn closing_the_bus_or_the_poll_ends_it_and_leaves_what_is_there() {
     let (simulator, bus) = line();
     let first = poll(&bus, vec![target(1, &[(STATE, 1)])], None);
@@ -311,9 +340,11 @@ fn two_polls_share_a_line() {
         scope.spawn(|| samples(&slow, Duration::from_secs(10)));
         scope.spawn(|| samples(&fast, Duration::from_secs(10)));
     });
-    // Both move the same time.
-    assert!(slow.counts().cycles >= 10, "{:?}", slow.counts());
-    assert!(fast.counts().cycles >= 100, "{:?}", fast.counts());
+    // Both move the same time; which of them the system lets run how often, nobody knows.
+    let (slow, fast) = (slow.counts(), fast.counts());
+    assert!(slow.cycles > 0 && slow.cycles + slow.late >= 19, "{slow:?}");
+    assert!(fast.cycles > 0, "{fast:?}");
+    assert_eq!((slow.missing, fast.missing), (0, 0));
 }
 
 #[test]

@@ -9,6 +9,7 @@
 mod chance;
 mod hand;
 mod journal;
+mod poller;
 mod rig;
 mod roles;
 mod verdict;
@@ -20,6 +21,7 @@ pub use rig::{Rig, UNITS};
 pub use verdict::{Verdict, Wrong};
 
 use chance::Chance;
+use poller::Poller;
 use roles::{Commander, Reader, Role, Writer};
 
 /// What to run.
@@ -37,7 +39,7 @@ pub struct Plan {
     pub unplug_rate: f64,
     /// How long between two times that the adapter is pulled out by hand, on average.
     pub pull_every: Duration,
-    /// How many threads use the bus, 1..=6.
+    /// How many threads use the bus, 1..=7.
     pub threads: usize,
 }
 
@@ -51,7 +53,7 @@ impl Default for Plan {
             rate: 0.003,
             unplug_rate: 0.000_05,
             pull_every: Duration::from_secs(60),
-            threads: 6,
+            threads: 7,
         }
     }
 }
@@ -65,25 +67,26 @@ pub fn run(plan: &Plan) -> Result<Verdict, String> {
     let began = Instant::now();
     let rig = Rig::new(plan)?;
     let mut roles = roles(plan.seed);
-    let mut shares: Vec<Vec<Box<dyn Role>>> = (0..plan.threads.clamp(1, roles.len())).map(|_| Vec::new()).collect();
+    let threads = plan.threads.clamp(1, roles.len());
+    let mut shares: Vec<Vec<Box<dyn Role>>> = (0..threads).map(|_| Vec::new()).collect();
     for (index, role) in roles.drain(..).enumerate() {
         let thread = index % shares.len();
         shares[thread].push(role);
     }
     let verdicts: Vec<Verdict> = thread::scope(|scope| {
-        let threads: Vec<_> = shares.into_iter().map(|share| scope.spawn(|| work(&rig, share))).collect();
-        threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+        let workers: Vec<_> = shares.into_iter().map(|share| scope.spawn(|| work(&rig, share))).collect();
+        workers.into_iter().filter_map(|worker| worker.join().ok()).collect()
     });
     let finished = verdicts.len();
     let mut verdict = verdicts.into_iter().fold(Verdict::default(), Verdict::with);
-    verdict.panicked = (plan.threads.clamp(1, 6) - finished) as u64;
+    verdict.panicked = (threads - finished) as u64;
     rig.conclude(&mut verdict);
     verdict.wall = began.elapsed();
     verdict.seed = plan.seed;
     Ok(verdict)
 }
 
-/// Three readers, two writers for half of the units each, and one who commands all motors.
+/// Three readers, two writers for half of the units each, one who commands all motors, and one who polls.
 fn roles(seed: u64) -> Vec<Box<dyn Role>> {
     let chance = |number: u64| Chance::new(seed.wrapping_mul(16).wrapping_add(number));
     vec![
@@ -93,6 +96,7 @@ fn roles(seed: u64) -> Vec<Box<dyn Role>> {
         Box::new(Reader::new(chance(4))),
         Box::new(Writer::new(chance(5), &UNITS[UNITS.len() / 2..])),
         Box::new(Reader::new(chance(6))),
+        Box::new(Poller::new(chance(7))),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! The line under test: simulated drives with known words in them, a bus, and the clock that ends it all.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Line};
@@ -44,7 +44,7 @@ pub(crate) fn known(unit: u8, address: u16) -> u16 {
 /// The line under test.
 #[derive(Debug)]
 pub struct Rig {
-    pub(crate) bus: Bus,
+    pub(crate) bus: Arc<Bus>,
     pub(crate) journal: Journal,
     simulator: Simulator,
     wire: SimulatedLine,
@@ -71,7 +71,7 @@ impl Rig {
         let wire = simulator.wire();
         let hand = Hand::new(Chance::new(plan.seed ^ 0x4A4D), plan.pull_every, simulator.now());
         let mut rig = Self {
-            bus,
+            bus: Arc::new(bus),
             journal: Journal::new(drives),
             wire,
             hand: Mutex::new(hand),
@@ -136,6 +136,11 @@ impl Rig {
         // All units of the rig are 1..=8.
         let unit = UnitAddress::new(unit).unwrap_or(UnitAddress::MIN);
         self.bus.call(unit.into(), request, options, &mut || false, take)
+    }
+
+    /// So many calls were made by the bus itself.
+    pub(crate) fn called(&self, times: usize) {
+        self.calls.fetch_add(times as u64, Ordering::Relaxed);
     }
 
     /// Lets the hand do what is due, unless another thread does.

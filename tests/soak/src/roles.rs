@@ -95,7 +95,7 @@ fn words(
 }
 
 /// Whether `came` is one of the things that may be there.
-fn judge(rig: &Rig, unit: u8, address: u16, right: &[&[u16]], came: &[u16], verdict: &mut Verdict) {
+pub(crate) fn judge(rig: &Rig, unit: u8, address: u16, right: &[&[u16]], came: &[u16], verdict: &mut Verdict) {
     if right.contains(&came) {
         verdict.right += 1;
         return;
@@ -105,7 +105,7 @@ fn judge(rig: &Rig, unit: u8, address: u16, right: &[&[u16]], came: &[u16], verd
 }
 
 /// Counts an error by its kind. Everything asked here is allowed: a refusal was meant for something else.
-fn note(rig: &Rig, error: &CallError, verdict: &mut Verdict) {
+pub(crate) fn note(rig: &Rig, error: &CallError, verdict: &mut Verdict) {
     if matches!(error.failure, Failure::Refused { .. }) {
         verdict.false_refusals += 1;
         verdict.blame(format!("{error}, but no drive refuses that"), rig.trace());

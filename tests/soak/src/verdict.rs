@@ -43,6 +43,8 @@ pub struct Verdict {
     pub unasked: u64,
     /// Words in the drives' logs that nobody looked at.
     pub words_lost: u64,
+    /// Samples of a poll that were lost, came out of turn or were counted wrongly.
+    pub samples_lost: u64,
     /// Threads that ended by themselves.
     pub panicked: u64,
     /// Requests before the silence was over.
@@ -76,7 +78,7 @@ impl Verdict {
     /// Whether nothing happened that must not.
     pub fn is_true(&self) -> bool {
         let bad = [self.wrong_values, self.false_refusals, self.twice, self.not_done, self.unasked];
-        bad.iter().sum::<u64>() + self.words_lost + self.panicked == 0
+        bad.iter().sum::<u64>() + self.words_lost + self.samples_lost + self.panicked == 0
     }
 
     /// Both together.
@@ -85,6 +87,7 @@ impl Verdict {
         self.right += other.right;
         self.wrong_values += other.wrong_values;
         self.false_refusals += other.false_refusals;
+        self.samples_lost += other.samples_lost;
         self.done += other.done;
         self.twice += other.twice;
         self.not_done += other.not_done;
@@ -96,6 +99,12 @@ impl Verdict {
         self.details.extend(other.details);
         self.details.truncate(KEPT);
         self
+    }
+
+    /// Keeps what must not happen to the samples of a poll.
+    pub(crate) fn lost_samples(&mut self, what: String, trace: Vec<Transmission>) {
+        self.samples_lost += 1;
+        self.blame(what, trace);
     }
 
     /// Keeps what must not happen.
@@ -141,8 +150,9 @@ impl fmt::Display for Verdict {
                 writeln!(f, "  {kind:<30}{count}")?;
             }
         }
-        if self.words_lost + self.panicked > 0 {
-            writeln!(f, "words nobody wrote: {}, threads that panicked: {}", self.words_lost, self.panicked)?;
+        if self.words_lost + self.samples_lost + self.panicked > 0 {
+            let (words, samples, panicked) = (self.words_lost, self.samples_lost, self.panicked);
+            writeln!(f, "words nobody wrote: {words}, samples lost: {samples}, threads that panicked: {panicked}")?;
         }
         for wrong in &self.details {
             writeln!(f, "\n{}", wrong.what)?;

@@ -24,7 +24,7 @@ fn everything_is_true_with_one_thread() {
 }
 
 #[test]
-fn everything_is_true_with_six_threads() {
-    let verdict = run(&plan(2, 6)).unwrap();
+fn everything_is_true_with_a_thread_for_each() {
+    let verdict = run(&plan(2, 7)).unwrap();
     assert!(verdict.is_good(), "{verdict}");
 }
