@@ -10,6 +10,10 @@ use crate::Line;
 use crate::error::{CallError, Failure};
 use crate::queue::LOOK_UP;
 
+/// How long before an answer can be whole it is waited for again, in characters and on top of them: the first bytes may
+/// have been handed over so much after they came. A receiver hands over what fills its FIFO, a machine wakes up late.
+const EARLY: (u32, Duration) = (2, Duration::from_micros(150));
+
 /// One request on its way.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ask<'a> {
@@ -130,8 +134,8 @@ impl Pace {
         Self { char_time, count: 0, begun: Instant::from_nanos(u64::MAX) }
     }
 
-    /// Takes down that at `now` there were `came` bytes more. If two or more are still lacking: the moment at which only
-    /// the last of them is missing. That one is worth waking up for.
+    /// Takes down that at `now` there were `came` bytes more. If more than a few are still lacking: the moment from which on
+    /// the last of them are worth waking up for.
     fn nearly_whole(&mut self, now: Instant, came: usize, lacks: usize) -> Option<Instant> {
         let (came, lacks) = (u32::try_from(came).unwrap_or(u32::MAX), u32::try_from(lacks).unwrap_or(u32::MAX));
         if came == 0 {
@@ -140,8 +144,9 @@ impl Pace {
         self.count = self.count.saturating_add(came);
         let begun = now.saturating_duration_since(Instant::ZERO + self.char_time * self.count);
         self.begun = self.begun.min(Instant::ZERO + begun);
-        let chars = self.char_time * self.count.saturating_add(lacks);
-        (lacks > 1).then(|| self.begun + chars.saturating_sub(self.char_time / 2))
+        let (chars, time) = EARLY;
+        let all = self.char_time * self.count.saturating_add(lacks).saturating_sub(chars);
+        (lacks > chars).then(|| self.begun + all.saturating_sub(time))
     }
 }
 

@@ -70,7 +70,7 @@ impl Line for Paced {
 fn an_answer_is_there_at_its_last_character_after_few_looks() {
     let unit = UnitAddress::new(1).unwrap();
     for (baud, words, looks_at_most) in
-        [(9_600, 1, 4), (9_600, 16, 4), (115_200, 1, 4), (115_200, 16, 4), (115_200, 125, 4), (9_600, 0, 3)]
+        [(9_600, 1, 7), (9_600, 16, 9), (115_200, 1, 7), (115_200, 16, 9), (115_200, 125, 9), (9_600, 0, 5)]
     {
         let format = SerialFormat::new(baud, DataBits::Eight, Parity::Even, StopBits::One, Silence::Spec).unwrap();
         let values = vec![0x1234; words];
