@@ -7,13 +7,12 @@ use std::time::Duration;
 
 use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
 
-use crate::Line;
 use crate::call::{Call, CallOptions};
 use crate::clock::{monotonic, sleep_until};
 use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::link::Link;
+use crate::link::{Link, Links};
 use crate::opener::Opener;
 use crate::owner::Owner;
 use crate::process::Process;
@@ -22,6 +21,7 @@ use crate::queue::{LOOK_UP, NoTurn, Priority, Queue};
 use crate::resync::FreshWords;
 use crate::stats::Stats;
 use crate::units::UnitOptions;
+use crate::{Line, LineClock};
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]
@@ -70,6 +70,7 @@ pub struct Bus {
     owner: Mutex<Owner>,
     /// What can be asked for while somebody waits on the line.
     stats: Arc<Mutex<Stats>>,
+    links: Arc<Mutex<Links>>,
     words: Arc<FreshWords>,
     notes: Mutex<Vec<String>>,
     /// What the system refused to the threads of the bus's own.
@@ -85,27 +86,32 @@ pub struct Bus {
 }
 
 /// How to tell the line's time without the line, which another thread may be waiting on.
-#[derive(Debug, Clone, Copy)]
 enum Clock {
     /// It runs as the system's does; both stood so at one moment.
     Real { line: Instant, system: Instant },
-    /// Only the line knows: its time moves only while somebody waits.
-    Virtual,
+    /// A simulation's: its time moves only while somebody waits. `None`: only the line knows.
+    Virtual(Option<LineClock>),
+}
+
+impl std::fmt::Debug for Clock {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if matches!(self, Self::Real { .. }) { "Real" } else { "Virtual" })
+    }
 }
 
 impl Clock {
     fn of(line: &dyn Line) -> Self {
         if line.is_virtual() {
-            return Self::Virtual;
+            return Self::Virtual(line.clock());
         }
         Self::Real { line: line.now(), system: monotonic() }
     }
 
     /// Now on the line's clock; `None` where only the line knows.
-    fn now(self) -> Option<Instant> {
+    fn now(&self) -> Option<Instant> {
         match self {
-            Self::Real { line, system } => Some(line + monotonic().saturating_duration_since(system)),
-            Self::Virtual => None,
+            Self::Real { line, system } => Some(*line + monotonic().saturating_duration_since(*system)),
+            Self::Virtual(clock) => clock.as_ref().map(|clock| clock()),
         }
     }
 }
@@ -123,12 +129,13 @@ impl Bus {
         let words = Arc::new(FreshWords::new());
         let mut owner = Owner::open(opener, options.format, options.echo, Arc::clone(&words), give_up)?;
         let (name, clock) =
-            owner.line().map_or_else(|| (String::new(), Clock::Virtual), |line| (line.name(), Clock::of(line)));
+            owner.line().map_or_else(|| (String::new(), Clock::Virtual(None)), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         let gapless = owner.line().is_some_and(|line| line.gapless());
         Ok(Self {
             queue: Arc::default(),
             stats: owner.shared_stats(),
+            links: owner.shared_links(),
             words,
             notes: Mutex::new(notes),
             priority_refused: OnceLock::new(),
@@ -170,7 +177,7 @@ impl Bus {
 
     /// Whether the line's clock is a simulation's.
     pub fn is_virtual(&self) -> bool {
-        matches!(self.clock, Clock::Virtual)
+        matches!(self.clock, Clock::Virtual(_))
     }
 
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
@@ -257,7 +264,10 @@ impl Bus {
 
     /// Of the last ten exchanges with `unit`, how many brought an answer.
     pub fn link(&self, unit: UnitAddress) -> Link {
-        if self.opened_by.is_current() { self.lock().link(unit) } else { Link::default() }
+        if !self.opened_by.is_current() {
+            return Link::default(); // a thread of the parent's may have held it
+        }
+        self.links.lock().unwrap_or_else(PoisonError::into_inner).of(unit)
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
@@ -285,7 +295,9 @@ impl Bus {
             }
             let slice = end.saturating_duration_since(now).min(LOOK_UP);
             match self.clock {
-                Clock::Virtual => match self.lock().line() {
+                // It would wait for itself, inside a `give_up` of its own.
+                Clock::Virtual(_) if self.queue.has_this_thread() => return,
+                Clock::Virtual(_) => match self.lock().line() {
                     Some(line) => line.sleep(now + slice),
                     None => return,
                 },

@@ -12,8 +12,8 @@ use crate::queue::{LOOK_UP, Priority};
 impl Bus {
     /// Gives `hear` what comes within `time`, each piece with the moment it was handed over. Nothing is sent.
     ///
-    /// Others may ask in between, and wait 50 ms at most; the answers to their requests are theirs and are not heard here. What is heard belongs to
-    /// no request of ours, and is counted so.
+    /// Others may ask in between, and wait 50 ms at most; the answers to their requests are theirs and are not heard here.
+    /// What is heard belongs to no request of ours, and is counted so.
     ///
     /// # Errors
     ///
@@ -28,6 +28,20 @@ impl Bus {
         if self.is_closed() {
             return Err(Failure::Closed);
         }
+        let result = self.listen_in_turns(time, give_up, hear);
+        // Closed from inside `give_up`, where it could not wait for itself.
+        if self.is_shut() {
+            self.close();
+        }
+        result
+    }
+
+    fn listen_in_turns(
+        &self,
+        time: Duration,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut dyn FnMut(Instant, &[u8]),
+    ) -> Result<(), Failure> {
         let end = self.now() + time;
         loop {
             let _turn = self.queue.turn(Priority::Poll, None, give_up).map_err(|why| self.no_turn(why))?;

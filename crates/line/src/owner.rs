@@ -9,7 +9,7 @@ use crate::backoff::DeadUnits;
 use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
-use crate::link::{Link, Links};
+use crate::link::Links;
 use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
@@ -46,7 +46,7 @@ pub(crate) struct Owner {
     /// What is known by now about the one that is plugged in.
     pub(crate) echo: AdapterEcho,
     resync: Resync,
-    links: Links,
+    links: Arc<Mutex<Links>>,
     delays: Delays,
     format: SerialFormat,
     /// Units that do not answer.
@@ -79,7 +79,7 @@ impl Owner {
             given_echo: echo,
             echo,
             resync: Resync::default(),
-            links: Links::default(),
+            links: Arc::default(),
             delays: Delays::default(),
             format,
             dead: DeadUnits::default(),
@@ -97,6 +97,11 @@ impl Owner {
     /// What is counted, to be read while somebody waits for the line.
     pub(crate) fn shared_stats(&self) -> Arc<Mutex<Stats>> {
         Arc::clone(&self.stats)
+    }
+
+    /// How well each unit could be reached lately, to be read while somebody waits for the line.
+    pub(crate) fn shared_links(&self) -> Arc<Mutex<Links>> {
+        Arc::clone(&self.links)
     }
 
     /// A thread that panicked cannot have left the figures inconsistent enough to matter.
@@ -117,11 +122,6 @@ impl Owner {
     pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
         let stats = self.stats();
         (stats.units.get(&unit).map_or(0, |counters| counters.requests), stats.reconnects)
-    }
-
-    /// How well `unit` could be reached lately.
-    pub(crate) fn link(&self, unit: UnitAddress) -> Link {
-        self.links.of(unit)
     }
 
     /// The line, if it is open.
@@ -272,7 +272,7 @@ impl Owner {
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);
         if let Some(unit) = unit {
-            self.links.note(unit, &result);
+            self.links.lock().unwrap_or_else(PoisonError::into_inner).note(unit, &result);
             match &result {
                 Ok(_) => self.resync.answered(unit, ask.request, false),
                 Err(error) if matches!(error.failure, Failure::Refused { .. }) => {

@@ -83,6 +83,14 @@ pub enum PollError {
     /// The bus cannot be used.
     #[error("{0}")]
     Bus(Failure),
+    /// So many samples cannot be kept.
+    #[error("there is no memory for {size} samples of {words} words; keep fewer")]
+    NoRoom {
+        /// How many were to be kept.
+        size: usize,
+        /// The most words of a sample.
+        words: usize,
+    },
     /// The system gives no thread.
     #[error("the system gives no thread to poll in: {message}")]
     NoThread {
@@ -135,7 +143,8 @@ impl Poll {
         }
         let (stop, is_virtual) = (Arc::new(AtomicBool::new(false)), bus.is_virtual());
         let runner = Runner::new(Arc::clone(&bus), targets, interval);
-        let samples = Arc::new(Samples::new(size, runner.most_words()));
+        let words = runner.most_words();
+        let samples = Arc::new(Samples::new(size, words).ok_or(PollError::NoRoom { size, words })?);
         let (runner, thread) = if is_virtual {
             (Some(Mutex::new(runner)), None)
         } else {
@@ -302,12 +311,10 @@ fn shortest_cycle(
     targets: &[PollTarget],
     silence: impl Fn(UnitAddress) -> Duration,
 ) -> Duration {
-    let cycle_of = |target: &PollTarget| -> Duration {
-        let words = |count: u16| 5 + 2 * u32::from(count);
-        let read = |count| silence(target.unit) + format.chars(8) + format.t35() + format.chars(words(count));
-        target.reads.iter().map(|&(_, count)| read(count)).sum()
-    };
-    targets.iter().map(cycle_of).sum()
+    let words = |count: u16| 5 + 2 * u32::from(count);
+    let read = |count| format.chars(8) + format.t35() + format.chars(words(count));
+    let reads = targets.iter().flat_map(|target| target.reads.iter().map(|&(_, count)| (target.unit, count)));
+    reads.fold(Duration::ZERO, |cycle, (unit, count)| cycle.saturating_add(silence(unit)).saturating_add(read(count)))
 }
 
 /// Seconds in whole microseconds, no fewer than `time` has.
@@ -335,6 +342,7 @@ mod tests {
         let slow = Duration::from_millis(20);
         let with_gap = shortest_cycle(&format, &targets, |unit| if unit.get() == 2 { slow } else { format.t35() });
         assert_eq!(with_gap + format.t35(), cycle + slow, "a unit that needs a longer gap");
+        assert_eq!(shortest_cycle(&format, &targets, |_| Duration::MAX), Duration::MAX, "for ever");
     }
 
     #[test]

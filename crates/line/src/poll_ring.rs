@@ -63,17 +63,15 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// For `size` samples, at least one, of at most `stride` words each.
-    pub(crate) fn new(size: usize, stride: usize) -> Self {
+    /// For `size` samples, at least one, of at most `stride` words each; `None` where the system has no room for them.
+    pub(crate) fn new(size: usize, stride: usize) -> Option<Self> {
         let size = size.max(1);
-        Self {
-            size,
-            samples: VecDeque::with_capacity(size),
-            words: vec![0; size * stride],
-            first: 0,
-            stride,
-            dropped: 0,
-        }
+        let mut samples = VecDeque::new();
+        samples.try_reserve_exact(size).ok()?;
+        let count = size.checked_mul(stride)?;
+        // Only to see whether there is room: zeros that the system hands out take none until they are written to.
+        Vec::<u16>::new().try_reserve_exact(count).ok()?;
+        Some(Self { size, samples, words: vec![0; count], first: 0, stride, dropped: 0 })
     }
 
     /// Adds a sample with its words; where there is no room left the oldest gives way.
@@ -127,7 +125,7 @@ mod tests {
 
     #[test]
     fn words_of_a_shorter_target_are_not_those_of_the_sample_before() {
-        let mut ring = Ring::new(1, 3);
+        let mut ring = Ring::new(1, 3).unwrap();
         ring.push(sample(0), &[1, 2, 3]);
         ring.push(sample(1), &[4]);
         let batch = ring.take(9);
@@ -138,6 +136,13 @@ mod tests {
         assert_eq!(ring.dropped(), 1);
     }
 
+    #[test]
+    fn what_there_is_no_room_for_is_no_panic() {
+        for (size, stride) in [(usize::MAX, 1), (1 << 40, 1 << 40), (1 << 40, 1 << 20)] {
+            assert!(Ring::new(size, stride).is_none());
+        }
+    }
+
     proptest! {
         #[test]
         fn what_comes_out_is_what_went_in_but_for_the_oldest(
@@ -145,7 +150,7 @@ mod tests {
             stride in 0_usize..3,
             moves in prop::collection::vec((0_usize..9, 0_usize..9), 0..40),
         ) {
-            let mut ring = Ring::new(size, stride);
+            let mut ring = Ring::new(size, stride).unwrap();
             let (mut model, mut next, mut dropped) = (VecDeque::new(), 0_u16, 0);
             for (pushes, takes) in moves {
                 for _ in 0..pushes {

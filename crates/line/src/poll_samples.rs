@@ -74,10 +74,11 @@ impl State {
 }
 
 impl Samples {
-    pub(crate) fn new(size: usize, stride: usize) -> Self {
-        let ring = Ring::new(size, stride);
+    /// `None` where there is no room for them.
+    pub(crate) fn new(size: usize, stride: usize) -> Option<Self> {
+        let ring = Ring::new(size, stride)?;
         let state = State { ring, cycles: 0, late: 0, missing: 0, over: false, wanted: usize::MAX, calls: Vec::new() };
-        Self { state: Mutex::new(state), there: Condvar::new(), ended: Condvar::new() }
+        Some(Self { state: Mutex::new(state), there: Condvar::new(), ended: Condvar::new() })
     }
 
     /// Adds one, as counted by `schedule`; not once it is over, for who ended it may have counted already.

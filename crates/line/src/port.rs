@@ -3,12 +3,13 @@
 //! Serial ports, TCP connections and the simulated line implement it; the bus owner uses nothing else of them.
 
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
-/// What tells the time of a line.
-pub type LineClock = Box<dyn Fn() -> Instant + Send>;
+/// What tells the time of a line, from any thread and without waiting.
+pub type LineClock = Arc<dyn Fn() -> Instant + Send + Sync>;
 
 /// A way for bytes to reach units and to come back, with a clock of its own.
 ///

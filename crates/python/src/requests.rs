@@ -170,12 +170,9 @@ impl Requests {
 
     #[pyo3(signature = (unit, /))]
     fn link(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        let (core, unit) = (Arc::clone(&self.core), unit_address(unit)?);
-        // Apart, because it waits for who uses the line.
-        apart(&self.inbox, move |_| {
-            let link = core.link(unit);
-            move |py: Python<'_>| Ok((link.good, link.asked).into_pyobject(py)?.into_any())
-        })
+        let (link, number) = (self.core.link(unit_address(unit)?), self.inbox.number());
+        self.inbox.post(number, move |py| Ok((link.good, link.asked).into_pyobject(py)?.into_any()));
+        Ok(Asked { number, how: How::Errand(None) })
     }
 
     #[pyo3(signature = (seconds, /))]

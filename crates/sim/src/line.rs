@@ -102,7 +102,7 @@ impl Line for SimLine {
     /// The simulation's, which goes on while the adapter is pulled out.
     fn clock(&self) -> Option<LineClock> {
         let shared = Arc::clone(&self.shared);
-        Some(Box::new(move || shared.now()))
+        Some(Arc::new(move || shared.now()))
     }
 }
 

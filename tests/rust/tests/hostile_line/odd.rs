@@ -98,6 +98,10 @@ fn a_handler_may_use_the_bus_it_interrupts() {
     let mut handler = || {
         assert_eq!((bus.stats().reconnects, bus.notes().len()), (0, 0));
         assert_ne!(bus.fresh_word(), bus.fresh_word());
+        assert_eq!(bus.link(unit(1)).asked, 0);
+        let now = bus.now();
+        bus.sleep(millis(5), &mut || false); // not here, where it would wait for itself
+        assert_eq!(bus.now(), now);
         inside = Some(rig.ask(&Request::write(0x2000, 5)));
         bus.close();
         false
@@ -107,4 +111,20 @@ fn a_handler_may_use_the_bus_it_interrupts() {
     let inside = inside.unwrap().unwrap_err();
     assert_eq!((inside.failure, inside.sent), (Failure::NotBegun(BeginError::OutOfTurn), None));
     assert!(matches!(rig.read(100, 1).unwrap_err().failure, Failure::Closed));
+}
+
+#[test]
+fn who_closes_the_bus_from_inside_listening_lets_go_of_the_port() {
+    let rig = Rig::new(|_, _| Vec::new());
+    let held = Arc::strong_count(&rig.wire);
+    let ended = rig.bus.listen(
+        millis(500),
+        &mut || {
+            rig.bus.close();
+            false
+        },
+        &mut |_, _| (),
+    );
+    assert_eq!(ended, Err(Failure::Closed));
+    assert_eq!(Arc::strong_count(&rig.wire), held - 1, "the line is gone");
 }

@@ -5,7 +5,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Line, PortError, PortErrorKind};
+use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Line, LineClock, PortError, PortErrorKind};
 use drivebus_rtu::{Adu, Answer, Destination, FIRST_CONTACT, Frame, Instant, Request, SerialFormat, UnitAddress};
 
 pub(crate) const FORMAT: SerialFormat = SerialFormat::DEFAULT;
@@ -143,6 +143,11 @@ impl Line for Scripted {
 
     fn is_virtual(&self) -> bool {
         true
+    }
+
+    fn clock(&self) -> Option<LineClock> {
+        let wire = Arc::clone(&self.0);
+        Some(Arc::new(move || wire.lock().unwrap().now))
     }
 
     fn may_echo(&self) -> bool {
