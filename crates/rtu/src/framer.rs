@@ -7,23 +7,20 @@
 //! How bytes are cut by the operating system changes nothing: the same bytes at the same moments give the same
 //! frames.
 
+mod look;
+
 use core::fmt;
 use core::ops::Range;
 use core::time::Duration;
 
 use crate::answer::Expected;
-use crate::frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
-use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::frame::{Adu, Frame, FrameError, MAX_ADU};
 use crate::{Instant, UnitAddress};
+
+use look::Look;
 
 /// Twice the longest frame: one that is being received, and whatever came before it.
 const CAPACITY: usize = 2 * MAX_ADU;
-const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
-/// Address, function code, exception code or byte count, CRC.
-const EXCEPTION_ADU: usize = 5;
-/// Address, function code, two words, CRC.
-const SHORT_ADU: usize = 8;
-
 /// Finds frames in a stream of bytes.
 ///
 /// Three verbs: [`receive`](Self::receive) takes bytes, [`poll`](Self::poll) hands out frames and noise,
@@ -54,13 +51,6 @@ pub struct Framer {
     own: Adu,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
     overrun: bool,
-}
-
-/// What may stand at one place of the stream.
-enum Look {
-    Frame(usize),
-    Wait,
-    Nothing(Option<FrameError>),
 }
 
 /// One step of the framer, without borrowing from it.
@@ -227,151 +217,6 @@ impl Framer {
         self.overrun = !quiet && found.is_none() && give_up > self.ended;
         self.take(give_up);
         Some(Step::Skipped { range, error, expected })
-    }
-
-    /// What stands at `start`. `quiet`: no more bytes will come.
-    fn look(&self, start: usize, quiet: bool) -> Look {
-        let expected = self.is_expected(start);
-        // An expected answer may come in lumps; anything else ends where the line fell silent.
-        let cut = start < self.ended && !expected;
-        let end = if cut { self.ended } else { self.len };
-        let closed = cut || quiet;
-        let here = &self.bytes[start..end];
-        let fresh = start == 0 && !self.overrun;
-
-        if expected && let Some(look) = self.look_for_own(here) {
-            return look;
-        }
-        let mut error = None;
-        let mut incomplete = false;
-        for len in self.lengths(here, expected, fresh).into_iter().flatten() {
-            match here.get(..len).map(Frame::parse) {
-                Some(Ok(_)) => return Look::Frame(len),
-                Some(Err(why)) => error = error.or(Some(why)),
-                None => incomplete = true,
-            }
-        }
-        let by_silence = if expected { self.answer_len().is_none() } else { fresh };
-        if closed && by_silence && (MIN_ADU..=MAX_ADU).contains(&here.len()) {
-            match Frame::parse(here) {
-                Ok(_) => return Look::Frame(here.len()),
-                Err(why) => error = error.or(Some(why)),
-            }
-        }
-        let patient = expected && self.is_beginning_of_answer(here);
-        if patient || (incomplete && !closed) { Look::Wait } else { Look::Nothing(error) }
-    }
-
-    /// Whether `here` is our own request, sent back to us.
-    ///
-    /// Told by its bytes, not by its length: eight bytes of a longer answer have a right CRC by chance, once in 65 536.
-    /// Like an answer it may come in lumps.
-    fn look_for_own(&self, here: &[u8]) -> Option<Look> {
-        let own = self.own.as_bytes();
-        if own.is_empty() {
-            None
-        } else if here.starts_with(own) {
-            Some(Look::Frame(own.len()))
-        } else if own.starts_with(here) {
-            Some(Look::Wait)
-        } else {
-            None
-        }
-    }
-
-    /// Lengths that a frame beginning with `here` can have, shortest first. One that is longer than what is there
-    /// means: wait.
-    fn lengths(&self, here: &[u8], expected: bool, fresh: bool) -> [Option<usize>; 3] {
-        let [first, second] = if expected { Self::answer_lengths(here) } else { self.known_lengths(here) };
-        // The longest frame is whole only when nothing follows it.
-        let more = Some(here.len() + 1).filter(|_| here.len() <= MAX_ADU);
-        let asked = match *here {
-            [_, function, ..] if expected && function & EXCEPTION_BIT == 0 => self.answer_len().or(more),
-            // Only silence can tell where an unknown function ends, and a master that did not ask for it does not
-            // care.
-            [..=HIGHEST_UNIT, 1..EXCEPTION_BIT, ..] if fresh && self.expect.is_none() && first.is_none() => more,
-            _ => None,
-        };
-        let mut lengths = [first, second, asked];
-        lengths.sort_unstable();
-        lengths
-    }
-
-    /// Length that the answer looked for has by its own account.
-    fn answer_lengths(here: &[u8]) -> [Option<usize>; 2] {
-        let len = match *here {
-            [_, READ_HOLDING, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
-            [_] | [_, READ_HOLDING] => here.len() + 1,
-            [_, WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => SHORT_ADU,
-            [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
-            _ => return [None, None],
-        };
-        [Some(len).filter(|&len| len <= MAX_ADU), None]
-    }
-
-    /// Lengths that a frame of either direction can have whose function is known.
-    fn known_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
-        let more = Some(here.len() + 1);
-        let lowest = u8::from(self.expect.is_some());
-        match *here {
-            [address, ..] if !(lowest..=HIGHEST_UNIT).contains(&address) => [None, None],
-            [_] | [_, READ_HOLDING] => [more, None],
-            // A request has 8 bytes; an answer begins with its byte count.
-            [_, READ_HOLDING, bytes @ 2..=250, ..] if bytes % 2 == 0 => {
-                [Some(SHORT_ADU), Some(EXCEPTION_ADU + usize::from(bytes))]
-            }
-            // An answer has 8 bytes; a request has its byte count after address and count.
-            [_, WRITE_MULTIPLE, _, _, _, _, bytes @ 2..=246, ..] if bytes % 2 == 0 => {
-                [Some(SHORT_ADU), Some(SHORT_ADU + 1 + usize::from(bytes))]
-            }
-            [_, READ_HOLDING | WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => [Some(SHORT_ADU), None],
-            [_, function, ..] if function > EXCEPTION_BIT => [Some(EXCEPTION_ADU), None],
-            _ => [None, None],
-        }
-    }
-
-    /// How long the answer looked for is; `None` where only silence tells, or none is looked for.
-    fn answer_len(&self) -> Option<usize> {
-        self.expect?.1.adu_len()
-    }
-
-    /// Whether `here`, which begins as the answer looked for, only lacks its end.
-    fn is_beginning_of_answer(&self, here: &[u8]) -> bool {
-        match *here {
-            [_, function, ..] if function & EXCEPTION_BIT != 0 => here.len() < EXCEPTION_ADU,
-            // Another number of words than asked for: no use waiting for the rest of it.
-            [_, READ_HOLDING, bytes, ..] if self.answer_len() != Some(EXCEPTION_ADU + usize::from(bytes)) => false,
-            _ => self.answer_len().is_some_and(|len| here.len() < len),
-        }
-    }
-
-    /// Whether the answer that is waited for may begin at `start`.
-    fn is_expected(&self, start: usize) -> bool {
-        match (self.expect, &self.bytes[start..self.len]) {
-            (Some((unit, _)), [address]) => *address == unit.get(),
-            (Some((unit, expected)), [address, function, ..]) => {
-                *address == unit.get() && function & !EXCEPTION_BIT == expected.function()
-            }
-            _ => false,
-        }
-    }
-
-    /// How many bytes the answer looked for, or our own request before it, lacks at least; 0 where nothing of it is
-    /// there, or where silence would tell more.
-    pub(crate) fn lacks(&self) -> usize {
-        let here = self.pending();
-        if !self.is_expected(self.taken) {
-            return 0;
-        }
-        let own = self.own.as_bytes();
-        let own = own.starts_with(here).then_some(own.len());
-        let answer = self.is_beginning_of_answer(here).then(|| match *here {
-            // It may be a refusal.
-            [_] => EXCEPTION_ADU,
-            [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
-            _ => self.answer_len().unwrap_or_default(),
-        });
-        own.into_iter().chain(answer).min().map_or(0, |len| len.saturating_sub(here.len()))
     }
 
     fn is_quiet(&self, now: Instant) -> bool {

@@ -6,13 +6,15 @@
 //! what no answer still to come could be mistaken for, an echo (08H/0000) of a fresh word or a read of another length.
 //! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
+mod judge;
+
 use core::time::Duration;
 
-use crate::answer::{Answer, AnswerError, Expected};
+use crate::answer::Expected;
 use crate::doubt::{Attribution, Doubts};
 use crate::event::{BeginError, Event, Tally};
 use crate::frame::Adu;
-use crate::framer::{Framer, Step};
+use crate::framer::Framer;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
@@ -331,110 +333,5 @@ impl Master {
 
     fn quiet_time(&self) -> Duration {
         self.silence.max(self.gap)
-    }
-
-    fn await_answer(
-        &mut self,
-        now: Instant,
-        unit: UnitAddress,
-        expected: Expected,
-        until: Instant,
-    ) -> Option<Event<'_>> {
-        while let Some(step) = self.framer.step(now) {
-            match step {
-                Step::Skipped { range, expected: false, .. } => self.tally.add_noise(self.framer.held(range)),
-                Step::Skipped { range, error, expected: true } => {
-                    self.state = State::Idle;
-                    self.doubts.left_open(now, unit, expected);
-                    return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
-                }
-                Step::Frame(range) if self.is_own_echo(&range, expected) => {
-                    self.tally.own_echo += 1;
-                    self.echo_due = false;
-                    self.framer.forget_own();
-                }
-                Step::Frame(range) => {
-                    let judged = expected.judge_frame(unit, &self.framer.frame(range.clone()));
-                    let doubted = self.in_quarantine(now, unit);
-                    let apart = self.doubts.sorts_out(now, unit, expected);
-                    match judged {
-                        Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
-                            self.count_other(range, unit, doubted);
-                        }
-                        // Another word than the fresh one, another length than the one chosen: an earlier request's.
-                        Err(_) if apart => self.tally.late += 1,
-                        // Refusals of reads look alike.
-                        Ok(Answer::Exception { .. }) if apart && expected.is_read() => self.tally.late += 1,
-                        // So do those of writes, and what went out in doubt was not refused because another was.
-                        Ok(Answer::Exception { .. })
-                            if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
-                        {
-                            self.tally.late += 1;
-                        }
-                        outcome => {
-                            let refused = matches!(outcome, Ok(Answer::Exception { .. }));
-                            let right = outcome.is_ok();
-                            self.state = State::Idle;
-                            // The answer proves that the request has left the wire, whatever was computed; but not one
-                            // that may be late.
-                            if apart || !doubted {
-                                self.busy = Some(now);
-                            }
-                            match (right, refused, expected.is_echo()) {
-                                (false, ..) => self.doubts.left_open(now, unit, expected),
-                                (true, true, true) => self.doubts.refused_echo(now, unit),
-                                (true, false, echo) if echo || apart => self.doubts.settle(unit, echo),
-                                (true, refused, _) => self.doubts.taken(now, unit, expected, refused),
-                            }
-                            return Some(self.tell(expected, range));
-                        }
-                    }
-                }
-            }
-        }
-        if now < until {
-            return None;
-        }
-        self.state = State::Idle;
-        self.doubts.left_open(now, unit, expected);
-        Some(Event::NoAnswer { bytes: self.framer.pending() })
-    }
-
-    /// The frame that ends the request.
-    fn tell(&self, expected: Expected, range: core::ops::Range<usize>) -> Event<'_> {
-        let frame = self.framer.frame(range);
-        // Judged again, because the first verdict could not be kept beside the change of state.
-        match expected.judge(frame.pdu()) {
-            Ok(answer) => Event::Answer(answer),
-            Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
-        }
-    }
-
-    /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
-    fn is_own_echo(&self, range: &core::ops::Range<usize>, expected: Expected) -> bool {
-        (self.echo_due || !expected.may_repeat_request()) && self.framer.held(range.clone()) == self.request.as_bytes()
-    }
-
-    /// Counts a whole frame that is not the answer.
-    fn count_other(&mut self, range: core::ops::Range<usize>, unit: UnitAddress, doubted: bool) {
-        if doubted && self.framer.held(range).first() == Some(&unit.get()) {
-            self.tally.late += 1;
-        } else {
-            self.tally.foreign += 1;
-        }
-    }
-
-    /// Counts what came while nothing was waited for.
-    fn count_strays(&mut self, now: Instant) {
-        let broadcast = matches!(self.state, State::Turnaround { .. });
-        while let Some(step) = self.framer.step(now) {
-            match step {
-                Step::Frame(range) if broadcast && self.framer.held(range.clone()) == self.request.as_bytes() => {
-                    self.tally.own_echo += 1;
-                }
-                Step::Frame(_) => self.tally.late += 1,
-                Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
-            }
-        }
     }
 }
