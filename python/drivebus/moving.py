@@ -32,8 +32,8 @@ class Moving:
         self._start = start
         self._end = end
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
-        elsewhere = drive.over(drive.bus.blocking())
-        self._guard = Guard(lambda: at_once(self._end_by_all_means(elsewhere)))
+        self._elsewhere = drive.over(drive.bus.blocking())
+        self._guard = Guard(self._end_at_once)
         self._started = False
 
     async def begin(self) -> None:
@@ -45,6 +45,9 @@ class Moving:
 
     async def fail(self, reason: BaseException) -> None:
         """The block, or its beginning, ended with *reason*, which is to be raised after this."""
+        if isinstance(reason, GeneratorExit):
+            self._leave()
+            return
         with self._drive.bus.undisturbed() as bus:
             # Of this package's errors, only Unconfirmed comes from a start once its command was sent.
             if self._started or isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError):
@@ -62,7 +65,23 @@ class Moving:
                 raise failure
 
     async def _stop(self, bus: AwaitableBus) -> BaseException | None:
-        return await self._end_by_all_means(self._drive.over(bus)) if self._guard.begin_to_end() else None
+        if not self._guard.begin_to_end():
+            return None
+        try:
+            return await self._end_by_all_means(self._drive.over(bus))
+        except GeneratorExit:
+            self._leave()
+            raise
+
+    def _leave(self) -> None:
+        """Ends it where nothing can be awaited any more: the block was thrown away, as its event loop may be."""
+        failure = self._end_at_once() if self._guard.begin_to_end() else None
+        self._guard.disarm()
+        if failure is not None:
+            raise failure
+
+    def _end_at_once(self) -> BaseException | None:
+        return at_once(self._end_by_all_means(self._elsewhere))
 
     async def _end_by_all_means(self, drive: Operations) -> BaseException | None:
         """Ends it, or coasts where that fails. Returns what is left to raise: a failure, or a Ctrl-C that came."""

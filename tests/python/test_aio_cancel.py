@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import random
+import sys
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from typing import Any
@@ -258,6 +260,41 @@ class TestMotor:
                     assert commands(simulator) == [FORWARD, STOP]
 
         asyncio.run(main())
+
+    @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+    @pytest.mark.parametrize("stopping", [False, True], ids=["inside", "while it stops"])
+    def test_it_is_stopped_at_once_where_the_loop_is_gone(
+        self, stopping: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # Its scopes keep their task for ever, also where its loop is closed.
+        monkeypatch.delitem(sys.modules, "anyio", raising=False)
+        inside: list[bool] = []
+
+        async def work(simulator: Simulator) -> None:
+            bus = await drivebus.aio.Bus(simulator, timeout=1.0)
+            drive = await bus.drive(1)
+            await drive.prepare_control()
+            async with drive.running(10.0):
+                inside.append(True)
+                if not stopping:
+                    await asyncio.Event().wait()
+                simulator.line.drop_answers(1)
+
+        with line() as simulator:
+            loop = asyncio.new_event_loop()
+            task = loop.create_task(work(simulator))
+            while not inside or (stopping and commands(simulator) == [FORWARD]):
+                loop.run_until_complete(asyncio.sleep(0))
+            loop.close()
+            del task
+            # The next loop lets go of what waits in one that is closed.
+            asyncio.run(drivebus.aio.Bus.open("sim://gd350?clock=virtual"))
+            gc.collect()
+            sent = commands(simulator)
+            assert sent[:2] == [FORWARD, STOP]
+            # The first one was not confirmed.
+            assert set(sent[2:]) == ({STOP} if stopping else set())
+            assert simulator.drive(1).state in ("forward", "stopped")
 
     def test_a_cancelled_watchdog_gives_back_what_the_drive_had(self) -> None:
         async def main() -> None:

@@ -41,7 +41,7 @@ class Mailbox:
             if mailbox is None:
                 # What a loop left behind that was closed with requests open would keep it for ever.
                 for other in [other for other in _mailboxes if other.is_closed()]:
-                    del _mailboxes[other]
+                    _mailboxes.pop(other)._waiting.clear()
                 mailbox = _mailboxes[loop] = cls(loop)
         return mailbox
 
