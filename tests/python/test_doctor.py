@@ -95,6 +95,15 @@ def test_each_fault_of_the_line_is_named(faults: dict[str, float], expected: str
         assert all(finding.error is not None for finding in findings if finding.wrong)
 
 
+@pytest.mark.parametrize("lost", [1, 2, 3])
+def test_whose_first_answers_are_lost_is_found_where_no_other_settings_can_be_tried(lost: int) -> None:
+    with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
+        simulator.line.drop_answers(lost)
+        findings = list(examine("socket://server:1", open=lambda _, **options: Bus(simulator, **options)))
+    assert wrong(findings) == set()
+    assert {finding.unit for finding in findings} == {None, 1}
+
+
 def test_an_adapter_that_echoes_is_no_fault() -> None:
     with line(echo=True) as simulator:
         findings = list(examine(simulator, 1))

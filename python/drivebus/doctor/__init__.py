@@ -140,6 +140,9 @@ def _examine(
             return
         asked = units_to_ask(unit, full)
         found = look(bus, asked, tell, _TIMES)
+        if not found and unit is None:
+            # One question each may have been lost on a bad line: who is likely to be there is asked again.
+            found = [each for likely in units_to_ask(None, full, True) for each in look(bus, [likely], tell, _TIMES)]
         noise = _noise(bus)
     settings = given
     if not _whole(found):
