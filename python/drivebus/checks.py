@@ -13,7 +13,7 @@ from typing import SupportsIndex
 
 from drivebus.errors import NotAllowed
 
-__all__ = ["address", "closest", "number", "one_of", "payload", "unit", "whole"]
+__all__ = ["address", "closest", "flag", "number", "one_of", "payload", "unit", "whole"]
 
 
 def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = False) -> int:
@@ -67,6 +67,13 @@ def number(what: str, value: object, low: float, high: float = math.inf, *, abov
     if not math.isfinite(result) or not low <= result <= high or (above and result == low):
         raise NotAllowed(f"{what} {value} is out of range; allowed is {allowed}")
     return result
+
+
+def flag(what: str, value: object) -> bool:
+    """*value*, if it is True or False."""
+    if isinstance(value, bool):
+        return value
+    raise NotAllowed(f"{what} {value!r} is neither True nor False")
 
 
 def one_of(what: str, value: object, allowed: Sequence[str]) -> str:

@@ -45,12 +45,12 @@ class Opening:
         self.keywords: dict[str, Any] = {
             "timeout": self.timeout,
             "retries": checks.whole("retries", retries, 0, 100),
-            "read_only": read_only,
+            "read_only": checks.flag("read_only", read_only),
             "rs485": None if rs485 is None else dict(rs485),
-            "echo": echo,
+            "echo": checks.one_of("echo", echo, ("auto", "yes", "no")),
             "turnaround": checks.number("turnaround", turnaround, 0.0, 3600.0),
-            "learn_timeout": learn_timeout,
-            "low_latency": low_latency,
+            "learn_timeout": checks.flag("learn_timeout", learn_timeout),
+            "low_latency": checks.flag("low_latency", low_latency),
         }
         target = ports.resolve(port, line)
         self.format = ports.format_of(target, line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import shutil
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 import drivebus
+import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, PortError, Profile, Simulator
 
 SHIPPED = Path(__file__).resolve().parent.parent.parent / "crates/drives/profiles/gd350"
@@ -131,12 +133,21 @@ def test_a_bad_format_is_named(arguments: dict[str, Any], message: str) -> None:
         ({"retries": -1}, r"retries -1 .*0\.\.100"),
         ({"retries": 1.5}, r"retries 1\.5"),
         ({"echo": "maybe"}, "maybe"),
+        ({"echo": None}, "echo None .*auto"),
+        ({"turnaround": -1}, r"turnaround -1 .*0\.\.3600"),
+        ({"read_only": "no"}, "read_only 'no' .*True"),
+        ({"learn_timeout": 0.1}, r"learn_timeout 0\.1 .*True"),
+        ({"low_latency": 1}, "low_latency 1 .*True"),
+        ({"rs485": {"mode": "rts"}}, "rs485 is for a serial port"),
     ],
     ids=str,
 )
-def test_a_bad_policy_is_named(arguments: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize("port", ["sim://gd350", "socket://127.0.0.1:1"])
+def test_a_bad_policy_is_named(port: str, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(NotAllowed, match=message):
-        Bus("sim://gd350", **arguments)
+        Bus(port, **arguments)
+    with pytest.raises(NotAllowed, match=message):
+        asyncio.run(drivebus.aio.Bus.open(port, **arguments))
 
 
 @pytest.mark.parametrize(

@@ -323,7 +323,10 @@ class TestTheAdapter:
 
 
 class TestDirection:
-    @pytest.mark.parametrize("rs485", [{"mode": "other"}, {"mode": 1}, {"delay": 1}, {"rts_on_send": "x"}, 5])
+    @pytest.mark.parametrize(
+        "rs485",
+        [{"mode": "other"}, {"mode": 1}, {"delay": 1}, {"rts_on_send": "x"}, {"delay_after_ms": 101}, {1: 1}, 5],
+    )
     def test_what_is_no_setting_is_refused(self, rs485: Any) -> None:
         with pytest.raises(NotAllowed, match="rs485"):
             Bus("/dev/null", rs485=rs485)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
-use drivebus_line::rs485::{RTS_MARGIN_MS, Rs485, Switch};
+use drivebus_line::rs485::{MAX_DELAY_MS, RTS_MARGIN_MS, Rs485, Switch};
 use drivebus_line::tcp::RtuOverTcp;
 use drivebus_line::tty::{Adapter, TtyOptions};
 use drivebus_line::{Line, Opener, Places};
@@ -33,7 +33,7 @@ pub(crate) fn opener(
         return Ok((named(text.to_str()?, format, options)?, format));
     }
     if rs485.is_some() {
-        return Err(not_allowed(String::from("rs485 is for a serial port given by its path")));
+        return Err(no_rs485());
     }
     if let Ok(simulator) = port.cast::<Simulator>() {
         let simulator = simulator.clone().unbind();
@@ -53,6 +53,9 @@ pub(crate) fn opener(
 fn named(port: &str, format: SerialFormat, options: TtyOptions) -> PyResult<Opener> {
     let port = port.to_owned();
     let (scheme, rest) = port.split_once("://").unwrap_or(("", &port));
+    if !scheme.is_empty() && options.rs485.is_some() {
+        return Err(no_rs485());
+    }
     match scheme {
         "" => {
             let mut adapter = Adapter::new(port, format, options);
@@ -68,6 +71,11 @@ fn named(port: &str, format: SerialFormat, options: TtyOptions) -> PyResult<Open
         }
         other => Err(not_allowed(format!("port {port:?}: {other}:// is not socket:// or tcp://"))),
     }
+}
+
+/// Nobody would move an RTS there.
+fn no_rs485() -> PyErr {
+    not_allowed(String::from("rs485 is for a serial port given by its path"))
 }
 
 /// `host:port`, `[ipv6]:port`, or only the host where the scheme has a usual port.
@@ -102,14 +110,15 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
         }
     }
     for (key, value) in given {
-        let key: String = key.extract()?;
+        let key: String = key.extract().map_err(|_| not_allowed(format!("rs485: {key} is not known")))?;
         let bad = |_| not_allowed(format!("rs485: {key} cannot be {value}"));
+        let too_long = || not_allowed(format!("rs485: {key} cannot be {value}; allowed is 0..{MAX_DELAY_MS}"));
         match key.as_str() {
             "mode" => {}
             "enabled" => options.enabled = value.extract().map_err(bad)?,
             "rts_on_send" => options.rts_on_send = value.extract().map_err(bad)?,
-            "delay_before_ms" => options.delay_before_ms = value.extract().map_err(bad)?,
-            "delay_after_ms" => options.delay_after_ms = value.extract().map_err(bad)?,
+            "delay_before_ms" => options.delay_before_ms = delay(&value).ok_or_else(too_long)?,
+            "delay_after_ms" => options.delay_after_ms = delay(&value).ok_or_else(too_long)?,
             _ => {
                 return Err(not_allowed(format!(
                     "rs485: {key:?} is not known; known are mode, enabled, rts_on_send, delay_before_ms, delay_after_ms"
@@ -118,6 +127,11 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
         }
     }
     Ok(options)
+}
+
+/// Milliseconds that can be kept.
+fn delay(given: &Bound<'_, PyAny>) -> Option<u32> {
+    given.extract().ok().filter(|&delay| delay <= MAX_DELAY_MS)
 }
 
 /// What the system tells of the port at `path`; `by_id` and `tty_class` are other folders than this machine's, for tests.
