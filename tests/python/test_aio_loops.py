@@ -172,6 +172,9 @@ def test_a_bus_that_is_not_open_says_so() -> None:
         await bus.close()
         async with bus:
             assert await bus.read(1, 0x2100) == [3]
+            native = bus._native
+            assert await bus is bus
+            assert bus._native is native, "it is opened once"
         with pytest.raises(drivebus.PortError):
             await drivebus.aio.Bus.open("/dev/drivebus-no-such-port")
         with pytest.raises(drivebus.NotAllowed):

@@ -95,7 +95,7 @@ class Bus(BusFace[Line]):
         return await cls(port, **keywords)
 
     def __await__(self) -> Generator[Any, None, Bus]:
-        return self._open().__await__()
+        return self.__aenter__().__await__()
 
     async def _open(self) -> Bus:
         try:
