@@ -277,7 +277,8 @@ with drivebus.Simulator({{1: "gd350"}}) as simulator, drivebus.Bus(simulator) as
     @needs_pty
     def test_a_forked_child_leaves_the_poll_to_its_parent(self) -> None:
         program = """
-import os, sys, drivebus
+import os, sys, warnings, drivebus
+warnings.simplefilter("ignore", DeprecationWarning)  # CPython 3.12 warns of any fork beside threads
 with drivebus.Simulator({1: "gd350"}) as simulator, drivebus.Bus(simulator) as bus:
     with bus.poll({1: [(0x2100, 1)]}) as poll:
         poll.batch(3)
