@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use drivebus_line::{
     AdapterEcho, Bus, BusOptions, CallError, CallOptions, Failure, Line, LineClock, Poll, PollBatch, PollError,
-    PollSample, PollTarget, PortError,
+    PollSample, PollTarget, PortError, UnitOptions,
 };
 use drivebus_rtu::{
     BeginError, DataBits, FIRST_CONTACT, Instant, Parity, Request, SerialFormat, Silence, StopBits, UnitAddress,
@@ -180,6 +180,32 @@ fn a_rate_that_the_wire_cannot_carry_is_refused_with_the_shortest_interval() {
     let poll = poll(&bus, targets(), Some(shortest));
     samples(&poll, Duration::from_secs(1));
     assert_eq!(poll.counts().late, 0, "the shortest interval can be kept");
+}
+
+#[test]
+fn a_unit_that_needs_a_longer_silence_makes_the_shortest_cycle_longer() {
+    let (_simulator, bus) = line();
+    let (t35, gap) = (bus.options().format.t35(), millis(20));
+    let targets = || vec![target(1, &[(STATE, 1)]), target(2, &[(STATE, 1)])];
+    let usual = poll(&bus, targets(), None).shortest();
+    bus.configure(unit(1), UnitOptions { gap: Some(gap), ..UnitOptions::default() });
+    let (poll, cycle) = (poll(&bus, targets(), None), usual.saturating_sub(t35) + gap);
+    assert_eq!(poll.shortest(), cycle);
+    for pair in sent(&samples(&poll, Duration::from_secs(1)), 0).windows(2) {
+        assert_eq!(pair[1].saturating_duration_since(pair[0]), cycle);
+    }
+}
+
+#[test]
+fn a_sample_begins_with_its_first_request() {
+    let (_simulator, bus) = line();
+    let format = bus.options().format;
+    let poll = poll(&bus, vec![target(1, &[(STATE, 1), (MONITOR, 2)])], None);
+    let read = |words: u32| format.chars(8) + format.t35() + format.chars(5 + 2 * words);
+    for (sample, _) in samples(&poll, Duration::from_secs(1)).iter() {
+        let time = sample.ended.saturating_duration_since(sample.sent);
+        assert_eq!(time, read(1) + format.t35() + read(2));
+    }
 }
 
 #[test]

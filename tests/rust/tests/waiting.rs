@@ -107,3 +107,27 @@ fn units_are_given_the_turnaround_of_the_bus_after_a_broadcast() {
     let done = bus.call(Destination::Broadcast, &stop, ONCE, &mut || false, &mut |_| ()).unwrap();
     assert_eq!(done.ended.saturating_duration_since(done.sent), FORMAT.chars(8) + turnaround);
 }
+
+#[test]
+fn what_was_learned_makes_no_wait_longer_than_the_time_out() {
+    let timeout = Duration::from_millis(60);
+    let (simulator, bus) = pair(BusOptions { learn_timeout: true, timeout, ..BusOptions::new(FORMAT) });
+    for _ in 0..8 {
+        read(&bus, 1, ONCE).unwrap();
+    }
+    assert_eq!(waited(&simulator, &bus, ONCE), timeout);
+}
+
+/// A unit may take long to write to its EEPROM, and its reads teach nothing about that.
+#[test]
+fn a_write_waits_the_whole_time_out_whatever_reads_have_taught() {
+    let (simulator, bus) = pair(BusOptions { learn_timeout: true, ..BusOptions::new(FORMAT) });
+    for _ in 0..8 {
+        read(&bus, 1, ONCE).unwrap();
+    }
+    simulator.wire().drop_answers(1);
+    let write = Request::write(0x800B, 100); // P00.11 in RAM
+    let error = bus.call(unit(1).into(), &write, ONCE, &mut || false, &mut |_| ()).unwrap_err();
+    let sent = error.sent.unwrap() + FORMAT.chars(8);
+    assert_eq!(error.ended.saturating_duration_since(sent), Duration::from_millis(500), "{error}");
+}
