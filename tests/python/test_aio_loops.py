@@ -169,8 +169,11 @@ def test_a_bus_that_is_not_open_says_so() -> None:
         assert "not open" in repr(bus)
         with pytest.raises(drivebus.PortError, match="is not open yet"):
             await bus.read(1, 0x2100)
+        with pytest.raises(drivebus.PortError, match="is not open yet"):
+            bus.stats()
         await bus.close()
         async with bus:
+            assert bus.stats().requests == 0
             assert await bus.read(1, 0x2100) == [3]
             native = bus._native
             assert await bus is bus

@@ -8,7 +8,7 @@ import os
 from collections.abc import AsyncIterator, Callable, Coroutine, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus import bus, checks, who
 from drivebus._native import SerialFormat
@@ -117,7 +117,15 @@ class Bus(BusFace[Line]):
 
     @property
     def _is_open(self) -> bool:
-        return hasattr(self, "_native")
+        return "_native" in self.__dict__
+
+    if not TYPE_CHECKING:  # a type checker knows what there is
+
+        def __getattr__(self, name: str) -> Any:
+            # What is missing before the bus was opened is there afterwards.
+            if not self._is_open and not name.startswith("__"):
+                self._check_open()
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def _check_open(self) -> None:
         if not self._is_open:
