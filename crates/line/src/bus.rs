@@ -222,7 +222,7 @@ impl Bus {
             return Err(ask.failed(Failure::Forked, None, Instant::ZERO, &[]));
         }
         if self.options.read_only && request.is_write() {
-            return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now_at_hand(), &[]));
+            return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now_if_known(), &[]));
         }
         let mut give_up = || self.is_shut() || give_up();
         let result = Call::new(self, ask, options).run(&mut give_up, take);
@@ -336,11 +336,6 @@ impl Bus {
         {
             self.priority_refused.get_or_init(|| refused);
         }
-    }
-
-    /// As [`now`](Self::now), without waiting for anybody; the start of time where only the line knows.
-    pub(crate) fn now_at_hand(&self) -> Instant {
-        self.clock.now().unwrap_or_default()
     }
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.

@@ -133,7 +133,7 @@ impl<'b, 'r> Call<'b, 'r> {
         self.bus
             .queue
             .turn(self.priority, self.unit, give_up)
-            .map_err(|why| self.ask.failed(self.bus.no_turn(why), None, self.bus.now_at_hand(), &[]))
+            .map_err(|why| self.ask.failed(self.bus.no_turn(why), None, self.bus.now_if_known(), &[]))
     }
 
     /// An error of a request that was not sent.

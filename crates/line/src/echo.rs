@@ -3,7 +3,7 @@
 //! A write and an echo are confirmed by the very bytes of the request, so an adapter that echoes would confirm what no
 //! unit has heard.
 
-use drivebus_rtu::{Adu, Destination, Request, Tally};
+use drivebus_rtu::{Destination, Request, Tally};
 
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
@@ -102,7 +102,7 @@ impl Owner {
         if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
             return;
         }
-        let length = Adu::request(ask.destination, ask.request).as_bytes().len();
+        let length = ask.request.adu_len();
         // Bytes that are no frame might be what is left of an echo.
         let clean = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= length)
             && match result {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, UnitAddress};
 
 use crate::backoff::DeadUnits;
 use crate::echo::AdapterEcho;
@@ -327,7 +327,7 @@ impl Owner {
 
     /// How long the unit took: from the last character of the request to the first of the answer.
     fn delay(&self, ask: &Ask<'_>, done: &Done) -> Duration {
-        let request = Adu::request(ask.destination, ask.request).as_bytes().len();
+        let request = ask.request.adu_len();
         let on_the_wire = self.format.chars(u32::try_from(request).unwrap_or(u32::MAX)) + self.answer_time(ask);
         done.ended.saturating_duration_since(done.sent).saturating_sub(on_the_wire)
     }

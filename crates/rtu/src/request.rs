@@ -6,6 +6,7 @@ use core::fmt;
 
 use crate::Words;
 use crate::answer::Expected;
+use crate::frame::AROUND_PDU;
 
 /// Most bytes of a PDU: 256 of the ADU less address and CRC.
 pub const MAX_PDU: usize = 253;
@@ -199,6 +200,16 @@ impl<'a> Request<'a> {
     /// What a right answer must look like, without borrowing from the request.
     pub fn expected(&self) -> Expected {
         Expected::of(self)
+    }
+
+    /// How many bytes the request has on the wire, with address and CRC.
+    pub const fn adu_len(&self) -> usize {
+        let pdu = match self {
+            Self::ReadHolding { .. } | Self::WriteSingle { .. } | Self::Echo { .. } => 5,
+            Self::WriteMultiple { words, .. } => 6 + 2 * words.len(),
+            Self::Custom { pdu, .. } => pdu.len(),
+        };
+        AROUND_PDU + pdu
     }
 
     /// Writes the PDU into `target` and returns its length.

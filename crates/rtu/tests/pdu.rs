@@ -14,6 +14,7 @@ proptest! {
         let adu = Adu::request(Destination::Broadcast, &request);
         let frame = Frame::parse(adu.as_bytes()).unwrap();
         prop_assert_eq!(Request::parse(frame.pdu()), Ok(request));
+        prop_assert_eq!(request.adu_len(), adu.as_bytes().len());
     }
 
     #[test]
