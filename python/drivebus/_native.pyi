@@ -500,10 +500,13 @@ class SimulatedDrive:
         """Trips the drive with fault *code*."""
     def power_cycle(self) -> None:
         """Switches the drive off and on: RAM is lost, EEPROM stays."""
+    def factory_reset(self) -> None:
+        """Gives every parameter its factory value. NotAllowed while the motor is fed."""
     def register(self, address: int, /) -> int:
         """The word at *address* as the drive would answer it now. NotAllowed where it would refuse."""
     @property
     def eeprom_writes(self) -> int: ...
+    def eeprom_writes_of(self, address: int, /) -> int: ...
     def writes(self) -> list[tuple[float, int, int]]:
         """Every word the drive took from the bus: seconds, address, value. The last 100 000."""
     def take_writes(self) -> list[tuple[float, int, int]]:

@@ -45,7 +45,7 @@ class SimulatedDrive:
 
     @property
     def state(self) -> str:
-        """What it does, in the words of `drivebus.State`."""
+        """What it does, in the words of `drivebus.State`; a rectifier that feeds is "running"."""
         return self._native.state
 
     @property
@@ -98,14 +98,25 @@ class SimulatedDrive:
         """Switches the drive off and on: RAM is lost, EEPROM stays."""
         self._native.power_cycle()
 
+    def factory_reset(self) -> None:
+        """Gives every parameter its factory value, as the keypad does. It does not count as a write from the bus.
+
+        The address on the line and the history of faults stay. NotAllowed while the motor is fed.
+        """
+        self._native.factory_reset()
+
     def register(self, address: int) -> int:
         """The word at *address* as the drive would answer it now. NotAllowed where it would refuse."""
         return self._native.register(checks.address(address))
 
     @property
     def eeprom_writes(self) -> int:
-        """How often EEPROM was written since the simulation began."""
+        """How many words the bus has written to EEPROM since the simulation began."""
         return self._native.eeprom_writes
+
+    def eeprom_writes_of(self, address: int) -> int:
+        """How many of them went to the parameter at *address*, with or without the bit for the other memory."""
+        return self._native.eeprom_writes_of(checks.address(address))
 
     def writes(self) -> list[tuple[float, int, int]]:
         """The last 100 000 words the drive took from the bus: seconds since the simulation began, address, value."""

@@ -172,7 +172,7 @@ impl SimulatedDrive {
     }
 
     #[getter]
-    fn profile(&self) -> String {
+    fn profile(&self) -> &'static str {
         self.0.profile()
     }
 
@@ -225,6 +225,10 @@ impl SimulatedDrive {
         self.0.power_cycle();
     }
 
+    fn factory_reset(&self) -> PyResult<()> {
+        self.0.factory_reset().map_err(refuse)
+    }
+
     #[pyo3(signature = (address, /))]
     fn register(&self, address: &Bound<'_, PyAny>) -> PyResult<u16> {
         let address = one_word("address", address)?;
@@ -237,6 +241,11 @@ impl SimulatedDrive {
     #[getter]
     fn eeprom_writes(&self) -> u64 {
         self.0.eeprom_writes()
+    }
+
+    #[pyo3(signature = (address, /))]
+    fn eeprom_writes_of(&self, address: &Bound<'_, PyAny>) -> PyResult<u64> {
+        Ok(self.0.eeprom_writes_of(one_word("address", address)?))
     }
 
     fn writes(&self) -> Vec<(f64, u16, u16)> {

@@ -3,8 +3,8 @@
 use drivebus_drives::ProfileError;
 use drivebus_rtu::AddressError;
 
+use crate::drive::Family;
 use crate::faults::FaultKind;
-use crate::simulator::SIMULATED;
 
 /// Why a simulation cannot be as asked.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +17,7 @@ pub enum SimError {
     #[error(transparent)]
     Profile(#[from] ProfileError),
     /// There is a profile, but no behaviour for it.
-    #[error("no simulated drive behaves like \"{profile}\"; \"{SIMULATED}\" is simulated")]
+    #[error("no simulated drive behaves like \"{profile}\"; simulated are {}", Family::names().collect::<Vec<_>>().join(", "))]
     NotSimulated {
         /// The profile asked for.
         profile: String,
@@ -47,6 +47,18 @@ pub enum SimError {
     Load {
         /// What was given.
         load: f64,
+    },
+    /// A rectifier has no shaft.
+    #[error("{profile} drives no motor, so it has no load to set")]
+    NoMotor {
+        /// The family.
+        profile: &'static str,
+    },
+    /// Parameters get their factory values at standstill only.
+    #[error("unit {unit} is running; stop it before its parameters get their factory values")]
+    Running {
+        /// Its address.
+        unit: u8,
     },
     /// The digital inputs are six bits.
     #[error("inputs {inputs:#x} are not in 0x00..=0x3f; bit 0 is S1, bit 5 HDIB")]

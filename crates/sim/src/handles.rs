@@ -31,11 +31,11 @@ impl SimulatedDrive {
     }
 
     /// The name of its profile.
-    pub fn profile(&self) -> String {
-        self.with(|drive| drive.profile().to_owned()).unwrap_or_default()
+    pub fn profile(&self) -> &'static str {
+        self.with(|drive| drive.family().name).unwrap_or_default()
     }
 
-    /// What the motor does: `forward`, `reverse`, `stopped` or `fault`.
+    /// What the motor does: `forward`, `reverse`, `stopped` or `fault`; of a rectifier `running` instead of the first two.
     pub fn state(&self) -> &'static str {
         self.with(|drive| drive.state()).unwrap_or("unknown")
     }
@@ -64,10 +64,13 @@ impl SimulatedDrive {
     ///
     /// # Errors
     ///
-    /// [`SimError::Load`]: out of range.
+    /// [`SimError::Load`]: out of range. [`SimError::NoMotor`]: it is a rectifier.
     pub fn set_load(&self, load: f64) -> Result<(), SimError> {
         if !(0.0..=MAX_LOAD).contains(&load) {
             return Err(SimError::Load { load });
+        }
+        if !self.with(|drive| drive.has_motor()).unwrap_or(true) {
+            return Err(SimError::NoMotor { profile: self.profile() });
         }
         self.with(|drive| drive.set_load(load));
         Ok(())
@@ -147,6 +150,19 @@ impl SimulatedDrive {
         }
     }
 
+    /// Gives every parameter its factory value, as the keypad does. The bus's own counters do not see it; the address
+    /// on the line and the history of faults stay.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Running`]: the motor is fed.
+    pub fn factory_reset(&self) -> Result<(), SimError> {
+        match self.with(Drive::factory_reset) {
+            Some(false) => Err(SimError::Running { unit: self.unit() }),
+            _ => Ok(()),
+        }
+    }
+
     /// The word at `address` as the drive would answer it now.
     ///
     /// # Errors
@@ -170,7 +186,7 @@ impl SimulatedDrive {
         self.with(|drive| drive.eeprom_writes()).unwrap_or(0)
     }
 
-    /// Words written to one EEPROM address from the bus.
+    /// Words written to the EEPROM of one parameter from the bus; its address with or without bit 15.
     pub fn eeprom_writes_of(&self, address: u16) -> u64 {
         self.with(|drive| drive.eeprom_writes_of(address)).unwrap_or(0)
     }

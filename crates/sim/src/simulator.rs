@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use drivebus_drives::Profile;
 use drivebus_line::{PortError, PortErrorKind};
 use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 
 use crate::clock::Clock;
-use crate::drive::{Drive, Drives, Map};
+use crate::drive::{Drive, Drives, Family, Map};
 use crate::error::SimError;
 use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
@@ -19,9 +20,6 @@ use crate::world::World;
 
 /// How long a vain attempt to open the line takes in virtual time, so that whoever tries again comes to its end.
 const OPENING: Duration = Duration::from_millis(10);
-
-/// The family whose behaviour is simulated.
-pub(crate) const SIMULATED: &str = "gd350";
 
 /// How a simulation runs: by default at 19 200 bit/s 8E1, in virtual time, with seed 0, and lenient.
 #[derive(Debug, Clone, Copy, Default)]
@@ -151,7 +149,7 @@ impl Simulator {
                 return Err(SimError::Twice { unit });
             }
         }
-        let named: Vec<String> = drives.iter().map(|(unit, drive)| format!("{unit}={}", drive.profile())).collect();
+        let named: Vec<String> = drives.iter().map(|(unit, drive)| format!("{unit}={}", drive.family().name)).collect();
         let units = drives.keys().copied().collect();
         let world = World::new(options.format, options.strict_silence, options.seed, Drives::new(drives));
         let shared = Shared {
@@ -283,6 +281,12 @@ impl Simulator {
 }
 
 fn load(profile: &str) -> Result<Map, SimError> {
-    let map = Map::builtin(profile)?;
-    if map.profile() == SIMULATED { Ok(map) } else { Err(SimError::NotSimulated { profile: profile.to_owned() }) }
+    match Family::named(profile) {
+        Some(family) => Ok(Map::new(family)?),
+        // The profile's own error says that there is none, and what comes near.
+        None => match Profile::builtin(profile) {
+            Ok(_) => Err(SimError::NotSimulated { profile: profile.to_owned() }),
+            Err(error) => Err(error.into()),
+        },
+    }
 }

@@ -197,7 +197,7 @@ impl World {
 
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.
     fn hear(&mut self, bytes: &[u8], silent: Instant) {
-        let Ok(frame) = Frame::parse(bytes) else { return };
+        let Ok(frame) = Frame::parse(bytes) else { return self.drives.iter_mut().for_each(Drive::hear_garbage) };
         match Destination::from_wire(frame.address()) {
             Ok(Destination::Broadcast) => {
                 for drive in self.drives.iter_mut() {
@@ -211,7 +211,7 @@ impl World {
                     self.wire.faults.happened(FaultKind::Deaf);
                     return;
                 }
-                let answer = drive.handle(silent, frame.pdu());
+                let answer = drive.answer(silent, frame.pdu());
                 let ready = silent + drive.response_delay();
                 if hits.has(FaultKind::Unplug) && self.plug.is_in {
                     self.wire.faults.happened(FaultKind::Unplug);
@@ -245,10 +245,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::drive::Map;
+    use crate::drive::{Family, Map};
 
     fn world(strict_silence: bool) -> World {
-        let map = Arc::new(Map::builtin("gd350").unwrap());
+        let map = Arc::new(Map::new(Family::named("gd350").unwrap()).unwrap());
         let drive = |unit| (unit, Drive::new(UnitAddress::new(unit).unwrap(), Arc::clone(&map), Instant::ZERO));
         World::new(SerialFormat::default(), strict_silence, 7, Drives::new(BTreeMap::from([1, 2].map(drive))))
     }

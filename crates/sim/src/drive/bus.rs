@@ -5,27 +5,39 @@
 
 use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Words, function};
 
-use super::addresses as at;
-use super::machine::Command;
-use super::map::Access;
+use super::family::{Memory, Range};
+use super::map::{Access, Word};
 use super::refusal::Refusal;
+use super::settings::is_speed;
 use super::{Drive, WRITES_KEPT, WriteRecord};
 
-/// Most words of one read or write (operation manual, sections 9.4.1 and 9.4.4).
+/// Most words of one read or write: GD350 operation manual, sections 9.4.1 and 9.4.4; VFD500 manual, appendix A.
+///
+/// Assumption: the same in the families whose manuals at hand do not say.
 const MAX_WORDS: u16 = 16;
+
+/// With it a parameter's address reaches another memory than without.
+pub(super) const MEMORY_BIT: u16 = 0x8000;
 
 /// Where a word goes.
 #[derive(Debug, Clone, Copy)]
 enum Target {
-    /// The 2000H block.
+    /// A register of the bus.
     Control,
     /// A parameter, in RAM and EEPROM.
-    Parameter,
+    Eeprom,
     /// A parameter, in RAM only.
     Ram,
 }
 
 impl Drive {
+    /// As [`handle`](Self::handle), for a request that is for this unit alone: its answer goes on the line.
+    pub(crate) fn answer(&mut self, now: Instant, pdu: &[u8]) -> Option<Adu> {
+        let answer = self.handle(now, pdu)?;
+        self.frames.sent = self.frames.sent.wrapping_add(1);
+        Some(answer)
+    }
+
     /// Carries out the request in `pdu` at `now`; returns the frame that answers it.
     ///
     /// `None`: the PDU is empty or an exception, so that it is somebody's answer and no request.
@@ -33,30 +45,33 @@ impl Drive {
         self.advance(now);
         let function = *pdu.first().filter(|&&code| code & function::EXCEPTION_BIT == 0)?;
         self.last_heard = Some(now);
+        self.frames.received = self.frames.received.wrapping_add(1);
         let mut words = [0; MAX_WORDS as usize];
         let answer = match Request::parse(pdu) {
+            _ if !self.family().functions.contains(&function) => Err(Refusal::Function),
             Ok(request) => self.carry_out(now, &request, &mut words),
             // A range beyond FFFFH is a combination of address and quantity that leaves the valid area.
             Err(RequestError::Range { .. }) => Err(Refusal::Address),
             Err(RequestError::Function { .. }) => Err(Refusal::Function),
             Err(_) => Err(Refusal::Structure),
         };
-        let answer = answer.unwrap_or_else(|refusal| Answer::exception(function, refusal.code()));
+        let answer = answer.unwrap_or_else(|refusal| Answer::exception(function, self.exception(refusal)));
         Some(Adu::answer(self.unit, &answer))
     }
 
     /// The word at `address` as the bus would read it at this moment, or the exception code.
     pub(crate) fn read(&self, address: u16) -> Result<u16, ExceptionCode> {
-        self.check_unlocked().and_then(|()| self.word(address).ok_or(Refusal::Address)).map_err(Refusal::code)
+        self.check_unlocked().and_then(|()| self.word(address)).map_err(|refusal| self.exception(refusal))
     }
 
     /// Sets a parameter at the keypad, for good: checked as on the bus, but no password is asked, and neither the
     /// record of writes nor the EEPROM counter moves.
     pub(crate) fn set_parameter(&mut self, address: u16, word: u16) -> Result<(), ExceptionCode> {
-        if !self.map.is_parameter(address) {
-            return Err(Refusal::Address.code());
+        let refused = |refusal| self.exception(refusal);
+        if !self.map.word(address).is_some_and(Word::is_parameter) {
+            return Err(refused(Refusal::Address));
         }
-        self.check_write(address, word).map_err(Refusal::code)?;
+        self.check_word(address, word).map_err(refused)?;
         self.store.keep(address, word);
         self.settings_may_have_changed();
         Ok(())
@@ -74,7 +89,7 @@ impl Drive {
                 self.check_unlocked()?;
                 let words = &mut words[..usize::from(count)];
                 for (word, offset) in words.iter_mut().zip(0..) {
-                    *word = self.word(address.wrapping_add(offset)).ok_or(Refusal::Address)?;
+                    *word = self.word(address.wrapping_add(offset))?;
                 }
                 return Answer::read(words).map_err(|_| Refusal::Structure);
             }
@@ -91,13 +106,13 @@ impl Drive {
     }
 
     fn write(&mut self, now: Instant, address: u16, words: Words<'_>) -> Result<(), Refusal> {
-        if let (Some(password), at::PASSWORD, 1) = (words.get(0), address & !at::RAM_BIT, words.len()) {
-            self.check_password(password)?;
-        } else {
-            self.check_unlocked()?;
+        match words.get(0) {
+            Some(password) if words.len() == 1 && self.is_password(address) => self.check_password(password)?,
+            _ => self.check_unlocked()?,
         }
         for (address, word) in (address..).zip(words.iter()) {
-            self.check_write(address, word)?;
+            self.target(address).ok_or(Refusal::Address)?;
+            self.check_word(address & !MEMORY_BIT, word)?;
         }
         for (address, word) in (address..).zip(words.iter()) {
             self.take(now, address, word);
@@ -106,14 +121,22 @@ impl Drive {
     }
 
     /// Assumption: a drive with a password is locked from the moment it is set, and unlocked by writing the right one
-    /// to P07.00 (which address takes it is not printed). A write of P07.00 to an unlocked drive sets a new one; 0
-    /// removes it.
+    /// to the parameter that holds it (which address takes it is not printed). A write to an unlocked drive sets a new
+    /// one; 0 removes it.
     fn check_password(&self, password: u16) -> Result<(), Refusal> {
-        if self.is_locked() && password != self.parameter(at::PASSWORD) { Err(Refusal::Password) } else { Ok(()) }
+        if self.is_locked() && password != self.password() { Err(Refusal::Password) } else { Ok(()) }
+    }
+
+    fn is_password(&self, address: u16) -> bool {
+        self.family().roles.password == Some(address & !MEMORY_BIT)
+    }
+
+    fn password(&self) -> u16 {
+        self.role(self.family().roles.password)
     }
 
     fn is_locked(&self) -> bool {
-        self.parameter(at::PASSWORD) != 0 && !self.unlocked
+        !self.unlocked && self.password() != 0
     }
 
     fn check_unlocked(&self) -> Result<(), Refusal> {
@@ -121,27 +144,40 @@ impl Drive {
     }
 
     fn target(&self, address: u16) -> Option<Target> {
-        let parameter = address & !at::RAM_BIT;
-        match (self.map.has(parameter), address) {
-            (false, _) => None,
-            (true, at::CONTROL_COMMAND..=at::CONTROL_BLOCK_END) => Some(Target::Control),
-            (true, _) if address == parameter => Some(Target::Parameter),
-            (true, _) => self.map.is_parameter(parameter).then_some(Target::Ram),
+        let plain = address & !MEMORY_BIT;
+        match (self.map.word(plain)?, self.family().memory, address == plain) {
+            (Word::Register(_), _, true) => Some(Target::Control),
+            (Word::Register(_), _, false) | (Word::Parameter(_), Memory::EepromOnly, false) => None,
+            (Word::Parameter(_), Memory::BitMeansRam, false) | (Word::Parameter(_), Memory::BitMeansEeprom, true) => {
+                Some(Target::Ram)
+            }
+            (Word::Parameter(_), _, _) => Some(Target::Eeprom),
         }
     }
 
-    fn check_write(&self, address: u16, word: u16) -> Result<(), Refusal> {
-        self.target(address).ok_or(Refusal::Address)?;
-        let plain = address & !at::RAM_BIT;
-        match self.map.access(plain) {
+    /// Whether `word` may be written to what stands at `address`, which is a plain one.
+    fn check_word(&self, address: u16, word: u16) -> Result<(), Refusal> {
+        let target = self.map.word(address).ok_or(Refusal::Address)?;
+        match target.access() {
             Access::ReadOnly => return Err(Refusal::ReadOnly),
             Access::Stopped if self.machine.is_running() => return Err(Refusal::Running),
-            Access::Stopped | Access::Always => {}
+            Access::Stopped | Access::Always | Access::WriteOnly => {}
         }
-        if self.map.allows(plain, word, |bound| self.parameter(bound)) { Ok(()) } else { Err(Refusal::Value) }
+        let family = self.family();
+        let fits = match target {
+            Word::Parameter(parameter) => parameter.allows(word, |bound| self.parameter(bound)),
+            Word::Register(_) if family.command == Some(address) => (family.commands)(word).is_some(),
+            Word::Register(register) => match register.range {
+                Range::Words(low, high) => (low..=high).contains(&word),
+                Range::UpTo(high, bound) => word <= high.min(self.parameter(bound)),
+                Range::Signed(low, high) => (low..=high).contains(&word.cast_signed()),
+                Range::Speed => is_speed(family.roles.speed_unit.and_then(|unit| self.store.get(unit)), word),
+            },
+        };
+        if fits { Ok(()) } else { Err(Refusal::Value) }
     }
 
-    /// Does what `check_write` found right.
+    /// Does what was found right.
     fn take(&mut self, now: Instant, address: u16, word: u16) {
         if self.writes.len() == WRITES_KEPT {
             self.writes.pop_front();
@@ -149,28 +185,29 @@ impl Drive {
         self.words_written += 1;
         self.writes.push_back(WriteRecord { at: now, address, value: word });
 
-        if address & !at::RAM_BIT == at::PASSWORD && self.is_locked() {
+        if self.is_password(address) && self.is_locked() {
             self.unlocked = true;
             return;
         }
         match self.target(address) {
             Some(Target::Control) => {
-                if let Some(control) = self.control.get_mut(usize::from(address - at::CONTROL_COMMAND)) {
+                let place = usize::from(address.wrapping_sub(self.family().control));
+                if let Some(control) = self.control.get_mut(place) {
                     *control = word;
                 }
             }
-            Some(Target::Parameter) => self.store.write_eeprom(address, word),
-            Some(Target::Ram) => self.store.write_ram(address & !at::RAM_BIT, word),
+            Some(Target::Eeprom) => self.store.write_eeprom(address & !MEMORY_BIT, word),
+            Some(Target::Ram) => self.store.write_ram(address & !MEMORY_BIT, word),
             None => {}
         }
-        if address & !at::RAM_BIT == at::PASSWORD {
+        if self.is_password(address) {
             self.unlocked = false;
         }
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
-        if address == at::CONTROL_COMMAND
+        if self.family().command == Some(address)
             && self.obeys_bus()
-            && let Some(command) = Command::from_code(word)
+            && let Some(command) = (self.family().commands)(word)
         {
             self.machine.command(command, &self.settings);
         }

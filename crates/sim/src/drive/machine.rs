@@ -10,7 +10,8 @@
 //! - Assumption: while it ramps down to stop, a drive still reports the direction it turns in; it reports "stopped"
 //!   when the output reaches 0 Hz, and at once when it coasts.
 //! - Assumption: a run command to a shaft that still turns catches it: the output starts at the shaft's speed.
-//! - Assumption: the motor overload (OL1) builds up with the square of the current above 110 % of its rating and
+//! - Assumption: an immediate stop holds the shaft where it is: it stands still at once.
+//! - Assumption: the motor overload builds up with the square of the current above 110 % of its rating and
 //!   trips after about six seconds at 150 % load; heat goes away evenly in ten seconds. A real drive takes about a
 //!   minute; nobody wants to wait for that.
 //! - Assumption: the cause of an overload is gone once the output is off, so that it can be reset at once. Its heat
@@ -23,8 +24,6 @@ use drivebus_rtu::Instant;
 use crate::motor::{self, UNFED, WorkingPoint};
 use crate::ramp::{Ramp, Slopes};
 
-/// Fault number of the motor overload.
-pub(crate) const OL1: u16 = 11;
 /// Current above which heat builds up, as a share of the rated current.
 const OVERLOAD_CURRENT: f64 = 1.1;
 /// Heat at which the drive trips, in seconds times squared shares.
@@ -33,6 +32,8 @@ const TRIP_HEAT: f64 = 5.0;
 const ALARM_HEAT: f64 = 1.0;
 /// Heat lost per second while the current is below [`OVERLOAD_CURRENT`].
 const COOLING: f64 = 0.5;
+/// What the energy meter counts in an hour at rated power. Assumption: watt-hours of a 4 kW motor.
+const METERED_PER_HOUR: f64 = 4_000.0;
 
 /// Which way the shaft turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,38 +51,24 @@ impl Direction {
     }
 }
 
-/// What the motor may be told (2000H).
+/// What the motor may be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Command {
     Run(Direction),
     Jog(Direction),
     Stop,
     Coast,
+    StopAtOnce,
     ResetFault,
     JogStop,
-}
-
-impl Command {
-    /// The command with this code; `None` for all but 1..=8.
-    pub(crate) fn from_code(code: u16) -> Option<Self> {
-        Some(match code {
-            1 => Self::Run(Direction::Forward),
-            2 => Self::Run(Direction::Reverse),
-            3 => Self::Jog(Direction::Forward),
-            4 => Self::Jog(Direction::Reverse),
-            5 => Self::Stop,
-            6 => Self::Coast,
-            7 => Self::ResetFault,
-            8 => Self::JogStop,
-            _ => return None,
-        })
-    }
+    /// Taken, and nothing comes of it.
+    Nothing,
 }
 
 /// What the parameters and setpoints ask of the machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Settings {
-    /// Frequency to run at, Hz, within its limits.
+    /// Frequency to run at, Hz, within its limits; below zero the motor turns the other way round.
     pub(crate) setpoint: f64,
     pub(crate) run_slopes: Slopes,
     pub(crate) jog: f64,
@@ -114,7 +101,7 @@ enum Output {
     },
 }
 
-/// The run state as state word 1 knows it.
+/// What the motor does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RunState {
     Forward,
@@ -123,12 +110,28 @@ pub(crate) enum RunState {
     Fault,
 }
 
+/// Which way the output frequency goes, as status words number it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ramping {
+    /// Output off, or at 0 Hz.
+    Stopped = 0,
+    Faster = 1,
+    Slower = 2,
+    Even = 3,
+}
+
 /// Output, shaft, overload and present fault of one drive.
 #[derive(Debug)]
 pub(crate) struct Machine {
     now: Instant,
     output: Output,
     load: f64,
+    /// Fault number of the motor overload.
+    overload: u16,
+    /// What the motor took from the beginning until `metered`, as shares of its rated power times seconds.
+    taken: f64,
+    /// Since then nothing has changed but the frequency, along one line.
+    metered: Instant,
     heat: f64,
     /// How fast heat builds up (or goes, below zero). Between two events neither the torque nor the current changes.
     heating: f64,
@@ -138,9 +141,15 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    pub(crate) fn new(now: Instant, load: f64) -> Self {
+    pub(crate) fn new(now: Instant, load: f64, overload: u16) -> Self {
         let output = Output::Off { rpm: 0.0, since: now };
-        Self { now, output, load, heat: 0.0, heating: -COOLING, fault: None, held: false }
+        let (taken, heat, heating) = (0.0, 0.0, -COOLING);
+        Self { now, output, load, overload, taken, metered: now, heat, heating, fault: None, held: false }
+    }
+
+    /// The same after a loss of power at `now`, of which only the energy meter knows nothing.
+    pub(crate) fn after_power_loss(&self, now: Instant) -> Self {
+        Self { taken: self.taken + self.unmetered(), ..Self::new(now, self.load, self.overload) }
     }
 
     /// Lets time pass until `to`; returns the fault that tripped the drive on the way, if one did.
@@ -157,9 +166,10 @@ impl Machine {
             self.heat = (self.heat + self.heating * seconds).max(0.0);
             self.now = next;
             if overload == Some(next) {
-                self.trip(OL1);
-                tripped = Some(OL1);
+                self.trip(self.overload);
+                tripped = Some(self.overload);
             } else if turn == Some(next) {
+                self.meter();
                 self.finish_stop();
                 self.heating = self.heating();
             }
@@ -188,11 +198,16 @@ impl Machine {
                 self.turn_on(Purpose::Stop { jog: true }, settings);
             }
             (Command::Coast, Some(_)) => self.turn_off(),
+            (Command::StopAtOnce, Some(_)) => {
+                self.turn_off();
+                self.output = Output::Off { rpm: 0.0, since: self.now };
+            }
             (Command::Run(_), Some(Purpose::Jog(_)))
             | (Command::Jog(_), Some(Purpose::Run(_) | Purpose::Stop { jog: false }))
             | (Command::Stop, None | Some(Purpose::Stop { .. }))
             | (Command::JogStop, None | Some(Purpose::Run(_) | Purpose::Stop { .. }))
-            | (Command::Coast, None) => {}
+            | (Command::Coast | Command::StopAtOnce, None)
+            | (Command::Nothing, _) => {}
         }
     }
 
@@ -216,6 +231,7 @@ impl Machine {
 
     /// Sets the load as a share of rated torque.
     pub(crate) fn set_load(&mut self, load: f64) {
+        self.meter();
         if let Output::Off { rpm, since } = &mut self.output {
             *rpm = motor::coast(*rpm, self.load, self.now.saturating_duration_since(*since).as_secs_f64());
             *since = self.now;
@@ -235,6 +251,26 @@ impl Machine {
     /// Whether the output is on.
     pub(crate) fn is_running(&self) -> bool {
         matches!(self.output, Output::On { .. })
+    }
+
+    /// Whether it jogs, or comes to a stop out of a jog.
+    pub(crate) fn is_jogging(&self) -> bool {
+        matches!(self.purpose(), Some(Purpose::Jog(_) | Purpose::Stop { jog: true }))
+    }
+
+    pub(crate) fn ramping(&self) -> Ramping {
+        let Output::On { ramp, .. } = self.output else { return Ramping::Stopped };
+        match ramp.slope(self.now) {
+            slope if slope > 0.0 => Ramping::Faster,
+            slope if slope < 0.0 => Ramping::Slower,
+            _ if ramp.at(self.now) == 0.0 => Ramping::Stopped,
+            _ => Ramping::Even,
+        }
+    }
+
+    /// What the energy meter has counted.
+    pub(crate) fn energy(&self) -> f64 {
+        (self.taken + self.unmetered()) / 3_600.0 * METERED_PER_HOUR
     }
 
     pub(crate) fn overload_alarm(&self) -> bool {
@@ -288,7 +324,23 @@ impl Machine {
         }
     }
 
+    /// What the motor took since `metered`. Its torque has not changed since, so its power has moved along a line;
+    /// what flows back goes to the brake.
+    fn unmetered(&self) -> f64 {
+        let Output::On { ramp, .. } = self.output else { return 0.0 };
+        let slope = ramp.slope(self.metered);
+        let power = |at| WorkingPoint::new(ramp.at(at).abs(), slope, self.load).power;
+        let seconds = self.now.saturating_duration_since(self.metered).as_secs_f64();
+        (f64::midpoint(power(self.metered), power(self.now)) * seconds).max(0.0)
+    }
+
+    fn meter(&mut self) {
+        self.taken += self.unmetered();
+        self.metered = self.now;
+    }
+
     fn turn_on(&mut self, purpose: Purpose, settings: &Settings) {
+        self.meter();
         let from = match self.output {
             Output::On { ramp, .. } => ramp.at(self.now),
             Output::Off { .. } => motor::synchronous_hz(self.speed()),
@@ -305,6 +357,7 @@ impl Machine {
     }
 
     fn turn_off(&mut self) {
+        self.meter();
         self.output = Output::Off { rpm: self.speed(), since: self.now };
         self.heating = self.heating();
     }

@@ -1,42 +1,35 @@
-//! What a profile says about each word of a drive, with factory values where the manuals print none.
+//! Every word of a family's drives: the registers that the family describes, and the parameters of family and profile.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use drivebus_drives::{Access as ProfileAccess, Entry, Kind, Profile, ProfileError, Quantity, Value};
+use drivebus_drives::{Access as ProfileAccess, Entry, Kind, Profile, ProfileError, Value};
 use drivebus_rtu::UnitAddress;
 
-use super::addresses as at;
+use super::family::{Family, Parameter, Register};
 use super::places::Places;
 
-/// When a word may be written.
+/// When a word may be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Access {
     Always,
+    /// Written at standstill only.
     Stopped,
     ReadOnly,
+    WriteOnly,
 }
 
-/// One word: who may write what into it.
+/// One word.
 #[derive(Debug)]
-struct Word {
-    access: Access,
-    parameter: bool,
-    factory: u16,
-    /// In counts; `None` where nothing is printed.
-    low: Option<i32>,
-    high: Option<i32>,
-    /// Parameters that bound it as well, by address.
-    low_from: Option<u16>,
-    high_from: Option<u16>,
-    quantity: Quantity,
+pub(crate) enum Word {
+    Register(Register),
+    Parameter(Parameter),
 }
 
 /// Every word of one family's drives. Shared by the drives of a family.
 #[derive(Debug)]
 pub(crate) struct Map {
-    profile: String,
-    identification: u16,
+    family: &'static Family,
     /// By address.
     words: Vec<(u16, Word)>,
     places: Places,
@@ -45,22 +38,31 @@ pub(crate) struct Map {
 }
 
 impl Map {
-    /// The words of the shipped profile `name`.
-    pub(crate) fn builtin(name: &str) -> Result<Self, ProfileError> {
-        let profile = Profile::builtin(name)?;
-        let words: BTreeMap<u16, Word> =
-            profile.entries().map(|entry| (entry.address(), word(&profile, entry))).collect();
-        // A profile lists its siblings' codes too; the first of its own name is the plain model.
-        let own = profile.identifications().iter().find(|listed| listed.family == profile.name());
-        let identification = own.map_or(0, |listed| listed.code);
+    /// The words of `family`, with the plain parameters of its profile.
+    pub(crate) fn new(family: &'static Family) -> Result<Self, ProfileError> {
+        let mut words = BTreeMap::new();
+        // A family may be simulated before it has a profile: then with the parameters it describes itself.
+        if Profile::builtin_names().any(|name| name == family.name) {
+            let profile = Profile::builtin(family.name)?;
+            for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
+                words.insert(entry.address(), Word::Parameter(parameter(family, &profile, entry)));
+            }
+        }
+        words.extend(family.parameters.iter().map(|&known| (known.address, Word::Parameter(known))));
+        let registers = family.registers.iter().copied().flatten();
+        words.extend(registers.map(|&register| (register.address, Word::Register(register))));
+
         let places = Places::new(words.keys().copied());
-        let of_parameters = words.iter().filter(|(_, word)| word.parameter).map(|(&address, _)| address);
-        let parameters = Arc::new(Places::new(of_parameters));
-        let words = words.into_iter().collect();
-        Ok(Self { profile: profile.name().to_owned(), identification, words, places, parameters })
+        let of_parameters = words.iter().filter(|(_, word)| matches!(word, Word::Parameter(_)));
+        let parameters = Arc::new(Places::new(of_parameters.map(|(&address, _)| address)));
+        Ok(Self { family, words: words.into_iter().collect(), places, parameters })
     }
 
-    fn word(&self, address: u16) -> Option<&Word> {
+    pub(crate) fn family(&self) -> &'static Family {
+        self.family
+    }
+
+    pub(crate) fn word(&self, address: u16) -> Option<&Word> {
         self.places.of(address).and_then(|place| self.words.get(place)).map(|(_, word)| word)
     }
 
@@ -69,99 +71,63 @@ impl Map {
         Arc::clone(&self.parameters)
     }
 
-    pub(crate) fn profile(&self) -> &str {
-        &self.profile
-    }
-
-    /// What 2103H says.
-    pub(crate) fn identification(&self) -> u16 {
-        self.identification
-    }
-
-    pub(crate) fn has(&self, address: u16) -> bool {
-        self.places.of(address).is_some()
-    }
-
-    pub(crate) fn is_parameter(&self, address: u16) -> bool {
-        self.word(address).is_some_and(|word| word.parameter)
-    }
-
-    pub(crate) fn access(&self, address: u16) -> Access {
-        self.word(address).map_or(Access::ReadOnly, |word| word.access)
-    }
-
-    /// Whether `raw` is in range; `parameter` tells the parameters that the range depends on.
-    pub(crate) fn allows(&self, address: u16, raw: u16, parameter: impl Fn(u16) -> u16) -> bool {
-        let Some(word) = self.word(address) else { return false };
-        let count = |raw| word.quantity.decode(raw).count();
-        let value = count(raw);
-        let bound = |address: Option<u16>| address.map(|address| count(parameter(address)));
-        let above = [word.low, bound(word.low_from)].into_iter().flatten().all(|low| low <= value);
-        let below = [word.high, bound(word.high_from)].into_iter().flatten().all(|high| value <= high);
-        above && below
-    }
-
     /// The factory value of every parameter, in a drive with the address `unit`.
     pub(crate) fn factory(&self, unit: UnitAddress) -> impl Iterator<Item = u16> {
-        self.words.iter().filter(|(_, word)| word.parameter).map(move |(address, word)| match *address {
-            at::UNIT_ADDRESS => u16::from(unit.get()),
-            _ => word.factory,
+        let own = self.family.roles.unit_address;
+        self.words.iter().filter_map(move |(address, word)| match word {
+            Word::Register(_) => None,
+            Word::Parameter(_) if own == Some(*address) => Some(u16::from(unit.get())),
+            Word::Parameter(parameter) => Some(parameter.factory),
         })
     }
 }
 
-fn word(profile: &Profile, entry: &Entry) -> Word {
-    let quantity = entry.quantity().clone();
+impl Word {
+    /// Whether it is a parameter: in RAM and EEPROM, and at two addresses where bit 15 tells them apart.
+    pub(crate) fn is_parameter(&self) -> bool {
+        matches!(self, Self::Parameter(_))
+    }
+
+    pub(crate) fn access(&self) -> Access {
+        match self {
+            Self::Register(register) => register.access,
+            Self::Parameter(parameter) => parameter.access,
+        }
+    }
+}
+
+impl Parameter {
+    /// Whether `raw` is in range; `value_of` tells the parameters that the range depends on.
+    pub(crate) fn allows(&self, raw: u16, value_of: impl Fn(u16) -> u16) -> bool {
+        let count = |raw: u16| if self.signed { i32::from(raw.cast_signed()) } else { i32::from(raw) };
+        let value = count(raw);
+        let bound = |address: Option<u16>| address.map(|address| count(value_of(address)));
+        let above = [self.low, bound(self.low_from)].into_iter().flatten().all(|low| low <= value);
+        let below = [self.high, bound(self.high_from)].into_iter().flatten().all(|high| value <= high);
+        above && below
+    }
+}
+
+/// A row of the profile.
+fn parameter(family: &Family, profile: &Profile, entry: &Entry) -> Parameter {
+    let (address, quantity) = (entry.address(), entry.quantity());
     let address_of = |code: &str| profile.find(code).ok().map(Entry::address);
     let low = quantity.low().map(Value::count);
     let lowest = low.and_then(|low| u16::try_from(low).ok()).unwrap_or(0);
-    Word {
+    let assumed = || family.factory.iter().find(|&&(known, _)| known == address).map(|&(_, value)| value);
+    let cap = if family.capped.contains(&address) { family.roles.max_frequency } else { None };
+    Parameter {
+        address,
         access: match entry.access() {
             ProfileAccess::Ro => Access::ReadOnly,
             ProfileAccess::Stop => Access::Stopped,
             _ => Access::Always,
         },
-        parameter: entry.kind() == Kind::Parameter,
-        factory: entry.default_raw().or_else(|| assumed_factory_value(entry.address())).unwrap_or(lowest),
         low,
         high: quantity.high().map(Value::count),
         low_from: quantity.low_from().and_then(address_of),
-        high_from: quantity.high_from().and_then(address_of).or_else(|| assumed_ceiling(entry.address())),
-        quantity,
-    }
-}
-
-/// Factory values that no manual at hand prints.
-///
-/// Assumption: all of them, and the lowest value (mostly 0) for whatever is not named here. P00.01, P00.02 and P00.06
-/// are 0, so a drive fresh from the factory obeys its keypad; P00.11 and P00.12 depend on the model.
-///
-/// | parameter | value |
-/// | --- | --- |
-/// | P00.04, P00.10 | 50.00 Hz |
-/// | P00.11, P00.12 | 10.0 s |
-/// | P00.14 | 4.0 kHz |
-/// | P02.01 | 4.0 kW |
-/// | P05.26 | 10.00 V |
-/// | P08.06 | 500, taken as 5.00 Hz |
-/// | P08.07, P08.08 | 100, taken as 10.0 s |
-fn assumed_factory_value(address: u16) -> Option<u16> {
-    Some(match address {
-        at::UPPER_FREQUENCY | at::KEYPAD_FREQUENCY => 5_000,
-        at::ACCELERATION_TIME | at::DECELERATION_TIME | at::JOG_ACCELERATION | at::JOG_DECELERATION => 100,
-        at::CARRIER_FREQUENCY | at::MOTOR_POWER => 40,
-        at::AI1_UPPER => 1_000,
-        at::JOG_FREQUENCY => 500,
-        _ => return None,
-    })
-}
-
-/// Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
-fn assumed_ceiling(address: u16) -> Option<u16> {
-    match address {
-        at::UPPER_FREQUENCY | at::KEYPAD_FREQUENCY | at::JOG_FREQUENCY | at::FORWARD_CEILING | at::REVERSE_CEILING => {
-            Some(at::MAX_FREQUENCY)
-        }
-        _ => None,
+        high_from: quantity.high_from().and_then(address_of).or(cap),
+        signed: quantity.is_signed(),
+        factory: entry.default_raw().or_else(assumed).unwrap_or(lowest),
     }
 }

@@ -1,15 +1,16 @@
-//! One simulated drive: a Goodrive350 with a motor and a machine on it.
+//! One simulated drive: a drive of some family with a motor and a machine on it.
 //!
-//! It follows the GD350 operation manual, section 9.4. What the manual leaves open is marked "Assumption:" where it is
-//! decided: here, in the files of this folder, and in `motor`. In general:
+//! What a family does otherwise than the others stands in `family`. What the manuals leave open is marked "Assumption:"
+//! where it is decided: there, in the files of this folder, and in `motor`. In general:
 //!
+//! - Assumption: every inverter has the same small motor.
 //! - Assumption: parameters whose access class is not printed can be changed at any time; those whose range is not
 //!   printed take any word.
-//! - Assumption: baud rate, format and address (P14.00 to P14.02) are stored, and change nothing.
+//! - Assumption: baud rate, format and address (in P14 or P30) are stored, and change nothing.
 
-mod addresses;
 mod all;
 mod bus;
+mod family;
 mod machine;
 mod map;
 mod places;
@@ -22,22 +23,25 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_rtu::{Instant, UnitAddress};
+use drivebus_rtu::{ExceptionCode, Instant, UnitAddress};
 
-use addresses as at;
 pub(crate) use all::Drives;
+pub(crate) use family::Family;
+use family::Kind;
 use machine::{Command, Machine, RunState, Settings};
 pub(crate) use map::Map;
+use refusal::Refusal;
+use settings::all_are;
 use store::Store;
 
 /// How many writes a drive remembers.
 const WRITES_KEPT: usize = 100_000;
 /// Load of a drive nobody has set one for, as a share of rated torque.
 const USUAL_LOAD: f64 = 0.3;
-/// Number of words from 2000H on.
-const CONTROL_WORDS: usize = (at::CONTROL_BLOCK_END - at::CONTROL_COMMAND + 1) as usize;
-/// Fault number of a silent bus.
-const CE: u16 = 18;
+/// The most words that the bus sets in one drive.
+const CONTROL_WORDS: usize = 15;
+/// How long a drive takes to answer that has no parameter for it. Assumption: what most have from the factory.
+const USUAL_DELAY: u16 = 5;
 
 /// A word that the drive took from the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +61,7 @@ pub(crate) struct Drive {
     unit: UnitAddress,
     map: Arc<Map>,
     store: Store,
-    /// 2000H to 200EH.
+    /// The words that the bus sets.
     control: [u16; CONTROL_WORDS],
     machine: Machine,
     /// What the machine was last told; compared, so that only a change bends a ramp.
@@ -71,6 +75,17 @@ pub(crate) struct Drive {
     last_heard: Option<Instant>,
     writes: VecDeque<WriteRecord>,
     words_written: u64,
+    frames: Frames,
+}
+
+/// Frames counted since the power came, over and over from 65 535.
+///
+/// Assumption: those that are for this unit or for all, those it answered, and those of anybody with a wrong CRC.
+#[derive(Debug, Default)]
+struct Frames {
+    received: u16,
+    sent: u16,
+    spoilt: u16,
 }
 
 impl Drive {
@@ -78,13 +93,15 @@ impl Drive {
     pub(crate) fn new(unit: UnitAddress, map: Arc<Map>, now: Instant) -> Self {
         let store = Store::new(map.parameters(), map.factory(unit));
         let control = [0; CONTROL_WORDS];
-        let settings = settings::settings(&store, &control);
+        let family = map.family();
+        let settings = settings::settings(family, &store, 0);
+        let load = if family.kind == Kind::Inverter { USUAL_LOAD } else { 0.0 };
         Self {
             unit,
-            map,
             store,
             control,
-            machine: Machine::new(now, USUAL_LOAD),
+            machine: Machine::new(now, load, family.faults.overload),
+            map,
             settings,
             unlocked: false,
             inputs: 0,
@@ -92,6 +109,7 @@ impl Drive {
             last_heard: None,
             writes: VecDeque::new(),
             words_written: 0,
+            frames: Frames::default(),
         }
     }
 
@@ -124,7 +142,7 @@ impl Drive {
         self.machine.hold_fault(false);
     }
 
-    /// Switches the drive off and on at `now`: RAM, the words of the 2000H block and the run state are lost.
+    /// Switches the drive off and on at `now`: RAM, the words that the bus set and the run state are lost.
     ///
     /// Assumption: a fault does not outlive the power, its place in the history does; a password locks again.
     pub(crate) fn power_cycle(&mut self, now: Instant) {
@@ -132,8 +150,28 @@ impl Drive {
         self.control = [0; CONTROL_WORDS];
         self.unlocked = false;
         self.last_heard = None;
-        self.machine = Machine::new(now, self.machine.load());
-        self.settings = settings::settings(&self.store, &self.control);
+        self.frames = Frames::default();
+        self.machine = self.machine.after_power_loss(now);
+        self.settings = settings::settings(self.family(), &self.store, 0);
+    }
+
+    /// Gives every parameter its factory value, as the keypad does; a password goes too. Nothing else changes.
+    ///
+    /// Assumption: the unit's address on the line and the history of its faults stay. False, and nothing done, while
+    /// the motor is fed.
+    pub(crate) fn factory_reset(&mut self) -> bool {
+        if self.machine.is_running() {
+            return false;
+        }
+        let kept = self.family().roles.fault_history.iter().map(|&address| (address, self.parameter(address)));
+        let kept: Vec<(u16, u16)> = kept.collect();
+        self.store.reset(self.map.factory(self.unit));
+        for (address, word) in kept {
+            self.store.keep(address, word);
+        }
+        self.unlocked = false;
+        self.settings_may_have_changed();
+        true
     }
 
     pub(crate) fn set_load(&mut self, load: f64) {
@@ -151,8 +189,13 @@ impl Drive {
         }
     }
 
-    pub(crate) fn profile(&self) -> &str {
-        self.map.profile()
+    /// What is typed of its family; its name is that of the profile.
+    pub(crate) fn family(&self) -> &'static Family {
+        self.map.family()
+    }
+
+    pub(crate) fn has_motor(&self) -> bool {
+        self.family().kind == Kind::Inverter
     }
 
     pub(crate) fn load(&self) -> f64 {
@@ -163,9 +206,10 @@ impl Drive {
         self.inputs
     }
 
-    /// The state by its name in the profile.
+    /// The state by its name in profiles.
     pub(crate) fn state(&self) -> &'static str {
         match self.machine.state() {
+            RunState::Forward if !self.has_motor() => "running",
             RunState::Forward => "forward",
             RunState::Reverse => "reverse",
             RunState::Stopped => "stopped",
@@ -190,7 +234,7 @@ impl Drive {
     }
 
     pub(crate) fn eeprom_writes_of(&self, address: u16) -> u64 {
-        self.store.eeprom_writes_of(address)
+        self.store.eeprom_writes_of(address & !bus::MEMORY_BIT)
     }
 
     pub(crate) fn writes(&self) -> Vec<WriteRecord> {
@@ -205,26 +249,44 @@ impl Drive {
         self.words_written
     }
 
-    /// How long after a request's silence the answer begins: P14.03, or the drive's own processing time if longer.
+    /// How long after a request's silence the answer begins: what its parameter says, or the drive's own processing
+    /// time if longer.
     ///
     /// Assumption: the time counts from the end of the silence, because only then is the request received; the
     /// drive's own processing takes no time.
     pub(crate) fn response_delay(&self) -> Duration {
-        Duration::from_millis(u64::from(self.parameter(at::RESPONSE_DELAY)))
+        let delay = self.family().roles.response_delay;
+        Duration::from_millis(u64::from(delay.map_or(USUAL_DELAY, |delay| self.parameter(delay))))
     }
 
-    /// A parameter's value in force; 0 where the profile does not have it.
+    /// Something was on the line that is no frame.
+    pub(crate) fn hear_garbage(&mut self) {
+        self.frames.spoilt = self.frames.spoilt.wrapping_add(1);
+    }
+
+    fn exception(&self, refusal: Refusal) -> ExceptionCode {
+        ExceptionCode((self.family().exception)(refusal))
+    }
+
+    /// A parameter's value in force; 0 where there is none.
     fn parameter(&self, address: u16) -> u16 {
         self.store.get(address).unwrap_or(0)
     }
 
+    /// The value in force of a parameter that not every family has; 0 where there is none.
+    fn role(&self, address: Option<u16>) -> u16 {
+        address.map_or(0, |address| self.parameter(address))
+    }
+
     fn control_word(&self, address: u16) -> u16 {
-        self.control.get(usize::from(address.wrapping_sub(at::CONTROL_COMMAND))).copied().unwrap_or(0)
+        let place = usize::from(address.wrapping_sub(self.family().control));
+        self.control.get(place).copied().unwrap_or(0)
     }
 
     /// Tells the machine what a parameter or setpoint now asks of it.
     fn settings_may_have_changed(&mut self) {
-        let settings = settings::settings(&self.store, &self.control);
+        let [_, speed, ..] = self.control;
+        let settings = settings::settings(self.family(), &self.store, speed);
         if settings != self.settings {
             self.settings = settings;
             self.machine.update(&settings);
@@ -237,39 +299,37 @@ impl Drive {
         }
     }
 
-    /// Assumption: the newest fault stands in P07.27 and stays there after its reset.
+    /// Assumption: the newest fault stands first in the history and stays there after its reset.
     fn remember_fault(&mut self, code: u16) {
         let mut newer = code;
-        for address in at::FAULT_HISTORY {
+        for &address in self.family().roles.fault_history {
             let older = self.parameter(address);
             self.store.keep(address, newer);
             newer = older;
         }
     }
 
-    /// When P14.04 runs out, if it is set.
+    /// When the time for a silent bus runs out, if it is set.
     ///
     /// Assumption: only frames for this unit count (broadcasts too), and the time runs from the first one on.
     fn bus_timeout_at(&self) -> Option<Instant> {
-        let tenths = self.parameter(at::BUS_TIMEOUT);
+        let tenths = self.role(self.family().roles.bus_timeout);
         let last = self.last_heard?;
         (tenths > 0).then(|| last + Duration::from_millis(u64::from(tenths) * 100))
     }
 
-    /// What P14.05 says to do about a silent bus: 0 alarm and coast, 1 nothing, 2 and 3 stop without alarm.
+    /// What is set to be done about a silent bus: 0 alarm and coast, 1 nothing, 2 and 3 stop without alarm.
     fn miss_the_bus(&mut self) {
-        match self.parameter(at::BUS_TIMEOUT_ACTION) {
-            0 => self.trip(CE),
+        match self.role(self.family().roles.bus_timeout_action) {
+            0 => self.trip(self.family().faults.silent_bus),
             2 if self.obeys_bus() => self.machine.command(Command::Stop, &self.settings),
             3 => self.machine.command(Command::Stop, &self.settings),
             _ => {}
         }
     }
 
-    /// Whether commands at 2000H move the motor.
-    ///
-    /// Assumption: 0 in P00.02 is Modbus; the digit is not printed.
+    /// Whether commands from the bus move the motor.
     fn obeys_bus(&self) -> bool {
-        self.parameter(at::RUN_CHANNEL) == 2 && self.parameter(at::RUN_BUS) == 0
+        all_are(&self.store, self.family().roles.obeys)
     }
 }

@@ -7,8 +7,8 @@ use super::places::Places;
 
 /// All parameters of one drive, by address.
 ///
-/// Assumption: each word written to a plain address wears the EEPROM, also where it changes nothing. What the drive
-/// keeps by itself (its fault history) is not counted.
+/// Assumption: each word written to the EEPROM wears it, also where it changes nothing. What the drive keeps by itself
+/// (its fault history) is not counted.
 #[derive(Debug)]
 pub(crate) struct Store {
     /// Where a parameter stands in the lists; all drives of a family share it.
@@ -31,7 +31,7 @@ impl Store {
         self.places.of(address).and_then(|place| self.ram.get(place)).copied()
     }
 
-    /// As a plain address does: both memories.
+    /// From the bus, for good: both memories.
     pub(crate) fn write_eeprom(&mut self, address: u16, word: u16) {
         if self.places.of(address).is_some() {
             self.keep(address, word);
@@ -39,7 +39,7 @@ impl Store {
         }
     }
 
-    /// As an address with the top bit does: lost with the power.
+    /// To RAM only: lost with the power.
     pub(crate) fn write_ram(&mut self, address: u16, word: u16) {
         if let Some(cell) = self.places.of(address).and_then(|place| self.ram.get_mut(place)) {
             *cell = word;
@@ -54,6 +54,13 @@ impl Store {
         }
     }
 
+    /// The drive itself takes factory values, in the order of the places.
+    pub(crate) fn reset(&mut self, factory: impl IntoIterator<Item = u16>) {
+        self.ram.clear();
+        self.ram.extend(factory);
+        self.eeprom.copy_from_slice(&self.ram);
+    }
+
     /// Power off and on: what was only in RAM is lost.
     pub(crate) fn power_cycle(&mut self) {
         self.ram.copy_from_slice(&self.eeprom);
@@ -64,7 +71,7 @@ impl Store {
         self.writes.values().sum()
     }
 
-    /// Words written to one EEPROM address from the bus.
+    /// Words written to the EEPROM of one parameter from the bus.
     pub(crate) fn eeprom_writes_of(&self, address: u16) -> u64 {
         self.writes.get(&address).copied().unwrap_or(0)
     }

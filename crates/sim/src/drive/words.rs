@@ -1,86 +1,104 @@
-//! What the drive shows: state words, monitor block, fault and identification.
+//! What the drive shows: state words, measured values, fault and identification.
 
 use super::Drive;
-use super::addresses as at;
+use super::family::{Bit, Count, Measure, Shows};
 use super::machine::RunState;
+use super::map::{Access, Word};
+use super::refusal::Refusal;
 
-/// P09.00 = 6: the PID setpoint comes from 2002H.
-const PID_SETPOINT_FROM_BUS: u16 = 6;
-/// P09.02 = 4: the PID feedback comes from 2003H.
-const PID_FEEDBACK_FROM_BUS: u16 = 4;
-/// Bits 11 and 10 of state word 2: the motor model is a V/F one.
-const SVPWM: u16 = 0b11 << 10;
-/// The inputs that the terminals of 300AH have: HDIB, HDIA, S4 to S1.
+/// The inputs that a drive has terminals for: HDIB, HDIA, S4 to S1.
 const LOCAL_INPUTS: u16 = 0x3F;
-/// RO1 in 300BH.
+/// Relay 1 among the digital outputs.
 const RELAY_1: u16 = 1 << 2;
 
 impl Drive {
-    /// The word at `address`, as 03H would read it; `None` where there is none.
+    /// The word at `address`, as 03H would read it.
     ///
-    /// - Assumption: 2000H reads as the last command. The password (P07.00) reads as 0.
-    /// - Assumption: 3005H shows the shaft's speed also while the motor coasts.
-    /// - Assumption: power and torque are positive while the motor drives and negative while it brakes, whichever way
-    ///   it turns.
-    /// - Assumption: relay 1 is on while the motor runs; the other outputs show 200BH.
-    pub(super) fn word(&self, address: u16) -> Option<u16> {
-        if !self.map.has(address) {
-            return None;
+    /// Assumption: a password reads as 0.
+    pub(super) fn word(&self, address: u16) -> Result<u16, Refusal> {
+        match self.map.word(address) {
+            None => Err(Refusal::Address),
+            Some(Word::Register(register)) if register.access == Access::WriteOnly => Err(Refusal::Unreadable),
+            Some(Word::Register(register)) => Ok(self.shown(register.address, register.shows)),
+            Some(Word::Parameter(_)) if self.family().roles.password == Some(address) => Ok(0),
+            Some(Word::Parameter(_)) => self.store.get(address).ok_or(Refusal::Address),
         }
-        let offset = address.wrapping_sub(at::MONITOR);
-        Some(match address {
-            at::CONTROL_COMMAND..=at::CONTROL_BLOCK_END => self.control_word(address),
-            at::STATUS_WORD_1 => match self.machine.state() {
-                RunState::Forward => 1,
-                RunState::Reverse => 2,
-                RunState::Stopped => 3,
-                RunState::Fault => 4,
+    }
+
+    fn shown(&self, address: u16, shows: Shows) -> u16 {
+        match shows {
+            Shows::Written => self.control_word(address),
+            Shows::WrittenTo(register) => self.control_word(register),
+            Shows::WrittenIf { parameter, is, register, otherwise } => {
+                if self.store.get(parameter) == Some(is) {
+                    self.control_word(register)
+                } else {
+                    otherwise.map_or(0, |parameter| self.parameter(parameter))
+                }
+            }
+            Shows::State([forward, reverse, stopped, fault]) => match self.machine.state() {
+                RunState::Forward => forward,
+                RunState::Reverse => reverse,
+                RunState::Stopped => stopped,
+                RunState::Fault => fault,
             },
-            at::STATUS_WORD_2 => self.status_word_2(),
-            at::FAULT_CODE | at::FAULT_CODE_COMPAT => self.fault(),
-            at::IDENTIFICATION => self.map.identification(),
-            at::PASSWORD => 0,
-            _ if offset <= 0x16 => self.monitor_word(offset),
-            _ => self.store.get(address)?,
-        })
-    }
-
-    fn monitor_word(&self, offset: u16) -> u16 {
-        let point = self.machine.working_point();
-        match offset {
-            0x00 => word(self.machine.frequency().abs() * 100.0),
-            0x01 => word(self.settings.setpoint * 100.0),
-            0x02 => word(point.bus_volts * 10.0),
-            0x03 => word(point.volts),
-            0x04 => word(point.amperes * 10.0),
-            0x05 => word(self.machine.speed().abs()),
-            0x06 => word((point.power * 1_000.0).clamp(-3_000.0, 3_000.0)),
-            0x07 => word((point.torque * 1_000.0).clamp(-2_500.0, 2_500.0)),
-            0x08 if self.parameter(at::PID_SOURCE) == PID_SETPOINT_FROM_BUS => self.control_word(at::PID_REFERENCE),
-            0x08 => self.parameter(at::PID_PRESET),
-            0x09 if self.parameter(at::PID_FEEDBACK_SOURCE) == PID_FEEDBACK_FROM_BUS => {
-                self.control_word(at::PID_FEEDBACK)
-            }
-            0x0A => (self.inputs | self.control_word(at::VIRTUAL_INPUT)) & LOCAL_INPUTS,
-            0x0B => {
+            Shows::Bits(bits) => bits.iter().fold(0, |word, &bit| word | self.bit(bit)),
+            Shows::Measured(measure, counts) => word(self.measured(measure) * counts),
+            Shows::Fault => self.fault(),
+            Shows::Identification => self.family().identification,
+            Shows::Inputs(set) => (self.inputs | set.map_or(0, |set| self.control_word(set))) & LOCAL_INPUTS,
+            Shows::Outputs(set) => {
                 let relay = if self.machine.is_running() { RELAY_1 } else { 0 };
-                self.control_word(at::VIRTUAL_OUTPUT) | relay
+                self.control_word(set) | relay
             }
-            0x0C..=0x0F => self.analog[usize::from(offset - 0x0C)],
-            0x15 => self.control_word(at::TORQUE_SETTING),
-            0x16 => self.map.identification(),
-            // Pulse inputs, multi-step speed, length and count: nothing is connected.
-            _ => 0,
+            Shows::Analog(index) => self.analog.get(index).copied().unwrap_or(0),
+            Shows::Energy(half) => half_of(self.machine.energy(), half),
+            Shows::Count(Count::Received) => self.frames.received,
+            Shows::Count(Count::Sent) => self.frames.sent,
+            Shows::Count(Count::Spoilt) => self.frames.spoilt,
+            Shows::Zero => 0,
         }
     }
 
-    fn status_word_2(&self) -> u16 {
-        let ready = u16::from(self.machine.fault().is_none());
-        let motor = self.control_word(at::SPECIAL_CONTROL) & 0b11;
-        let alarm = u16::from(self.machine.overload_alarm());
-        let channel = self.parameter(at::RUN_CHANNEL) & 0b11;
-        ready | motor << 1 | alarm << 4 | channel << 5 | SVPWM
+    fn measured(&self, measure: Measure) -> f64 {
+        let point = || self.machine.working_point();
+        match measure {
+            Measure::Frequency => self.machine.frequency().abs(),
+            Measure::Setpoint => self.settings.setpoint.abs(),
+            Measure::BusVoltage => point().bus_volts,
+            Measure::Voltage => point().volts,
+            Measure::Current => point().amperes,
+            Measure::Speed => self.machine.speed().abs(),
+            Measure::Power => point().power.clamp(-3.0, 3.0),
+            Measure::Torque => point().torque.clamp(-2.5, 2.5),
+        }
     }
+
+    fn bit(&self, bit: Bit) -> u16 {
+        let machine = &self.machine;
+        let (value, place) = match bit {
+            Bit::Ready(place) => (u16::from(machine.fault().is_none()), place),
+            Bit::NotReady(place) | Bit::Fault(place) => (u16::from(machine.fault().is_some()), place),
+            Bit::Running(place) => (u16::from(machine.is_running()), place),
+            Bit::Reverse(place) => (u16::from(machine.frequency() < 0.0), place),
+            Bit::ReverseSetpoint(place) => (u16::from(self.settings.setpoint < 0.0), place),
+            Bit::Jogging(place) => (u16::from(machine.is_jogging()), place),
+            Bit::Ramp(place) => (machine.ramping() as u16, place),
+            Bit::OverloadAlarm(place) => (u16::from(machine.overload_alarm()), place),
+            Bit::Channel(place) => {
+                (self.family().roles.channel.map_or(0, |channel| self.parameter(channel)) & 0b11, place)
+            }
+            Bit::Motor(place, register) => (self.control_word(register) & 0b11, place),
+            Bit::Always(bits) => (bits, 0),
+        };
+        value << place
+    }
+}
+
+/// Bits 0 to 15 (0) or 16 to 31 (1) of a meter of 32 bits.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a meter wraps; it never runs backwards")]
+fn half_of(counts: f64, half: u8) -> u16 {
+    (counts as u64 >> (16 * u32::from(half))) as u16
 }
 
 /// The nearest word to `counts`; negative ones as two's complement, those that do not fit as the nearest that does.
@@ -100,6 +118,14 @@ mod tests {
         let table = [(10.4, 10), (10.5, 11), (-1.0, 0xFFFF), (-300.0, 0xFED4), (-40_000.0, 0x8000), (70_000.0, 0xFFFF)];
         for (counts, expected) in table {
             assert_eq!(word(counts), expected, "{counts}");
+        }
+    }
+
+    #[test]
+    fn a_meter_shows_its_low_word_and_its_high_word() {
+        for (counts, low, high) in [(0.0, 0, 0), (65_535.9, 0xFFFF, 0), (100_000.0, 0x86A0, 1), (4_294_967_297.0, 1, 0)]
+        {
+            assert_eq!((half_of(counts, 0), half_of(counts, 1)), (low, high), "{counts}");
         }
     }
 }

@@ -1,0 +1,96 @@
+//! Goodrive600: inverter and rectifier units on one line, each with an address of its own.
+//!
+//! Of the inverter's registers only 2000H, 2001H, 2002H and 2100H are in the manual's pages at hand (131 to 140); there
+//! is no other word here, so 2101H, 2102H and 2103H are refused with 02H.
+//!
+//! - Assumption: the codes of state word 1 are those of Goodrive350. An example prints 0003H, of a stopped drive.
+//! - Assumption: exceptions 07H to 09H, which the pages print for PROFINET only, are sent here too.
+//! - Assumption: no address has bit 15. No page tells of a way to RAM, and over PROFINET every write goes to EEPROM.
+//! - Assumption: the ranges of P00.03, P00.04 and P00.10, and that P00.04 and P00.05 are the limits they are in sister
+//!   series. An example writes two words to 0004H.
+//! - Ramps, jog and answers have no parameters in the pages at hand; the times are fixed.
+//! - Assumption: the motor overload has the number it has in Goodrive350; fault 1 is the only one printed.
+
+use super::{Family, Faults, Kind, Memory, Parameter, Range, Register, Roles, Shows, gd350};
+use crate::drive::machine::{Command, Direction};
+
+const RUN_CHANNEL: u16 = 0x0001;
+pub(super) const MAX_FREQUENCY: u16 = 0x0003;
+pub(super) const UPPER_FREQUENCY: u16 = 0x0004;
+pub(super) const LOWER_FREQUENCY: u16 = 0x0005;
+const SPEED_SOURCE: u16 = 0x0006;
+const KEYPAD_FREQUENCY: u16 = 0x000A;
+pub(super) const PASSWORD: u16 = 0x0700;
+
+pub(crate) static GD600: Family = FAMILY;
+
+const FAMILY: Family = Family {
+    name: "gd600",
+    kind: Kind::Inverter,
+    functions: &[0x03, 0x06, 0x08, 0x10],
+    exception: gd350::exception,
+    memory: Memory::EepromOnly,
+    identification: 0,
+    control: 0x2000,
+    command: Some(0x2000),
+    commands: gd350::commands,
+    registers: &[&[
+        Register::set(0x2000, Range::Words(1, 8)),
+        Register::set(0x2001, Range::UpTo(63_000, MAX_FREQUENCY)),
+        Register::set(0x2002, Range::Words(0, 1_000)),
+        Register::read(0x2100, Shows::State([1, 2, 3, 4])),
+    ]],
+    parameters: &[
+        Parameter::new(RUN_CHANNEL, 0, 2, 0),
+        Parameter::new(MAX_FREQUENCY, 1_000, 63_000, 5_000).not_below(UPPER_FREQUENCY).at_standstill(),
+        Parameter::new(UPPER_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
+        Parameter::new(LOWER_FREQUENCY, 0, 63_000, 0).not_above(UPPER_FREQUENCY),
+        Parameter::new(SPEED_SOURCE, 0, 15, 0),
+        Parameter::new(KEYPAD_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
+        // P01.20, P10.00, P10.01.
+        Parameter::new(0x0114, 0, 36_000, 0),
+        Parameter::new(PASSWORD, 0, u16::MAX, 0),
+        Parameter::new(0x0A00, 0, 2, 0),
+        Parameter::new(0x0A01, 0, 1, 0),
+    ],
+    factory: &[],
+    capped: &[],
+    roles: Roles {
+        obeys: &[(RUN_CHANNEL, 2)],
+        speed_source: Some((SPEED_SOURCE, 8)),
+        keypad_frequency: Some(KEYPAD_FREQUENCY),
+        max_frequency: Some(MAX_FREQUENCY),
+        upper_frequency: Some(UPPER_FREQUENCY),
+        password: Some(PASSWORD),
+        ..Roles::NONE
+    },
+    faults: Faults { overload: 11, silent_bus: 18 },
+};
+
+/// Assumption: all of it. No page about this unit is at hand; it is taken to have the run byte that Goodrive3000's
+/// rectifier has over PROFIBUS, at the inverter's addresses, and no parameters.
+pub(crate) static RECTIFIER: Family = Family {
+    name: "gd600-rectifier",
+    kind: Kind::Rectifier,
+    command: Some(0x2000),
+    commands: rectifier_commands,
+    registers: &[RECTIFIER_REGISTERS],
+    parameters: &[],
+    roles: Roles::NONE,
+    ..FAMILY
+};
+
+/// Fed and stopped like a motor, at no frequency. Pre-charging takes no time and nothing waits for it.
+pub(super) fn rectifier_commands(code: u16) -> Option<Command> {
+    Some(match code {
+        1 => Command::Run(Direction::Forward),
+        5 => Command::Stop,
+        7 => Command::ResetFault,
+        9 => Command::Nothing,
+        _ => return None,
+    })
+}
+
+/// Assumption: a rectifier's state has the codes of the inverters' for running, stopped and fault.
+pub(super) const RECTIFIER_REGISTERS: &[Register] =
+    &[Register::set(0x2000, Range::Words(1, 9)), Register::read(0x2100, Shows::State([1, 1, 3, 4]))];

@@ -1,0 +1,176 @@
+//! How a family describes its words: who may write what, and what is read.
+
+use crate::drive::map::Access;
+
+/// A register of the bus.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Register {
+    pub(crate) address: u16,
+    pub(crate) access: Access,
+    pub(crate) range: Range,
+    pub(crate) shows: Shows,
+}
+
+/// What may be written.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Range {
+    /// Words from..=to.
+    Words(u16, u16),
+    /// From 0 to this word, and not above the parameter at that address.
+    UpTo(u16, u16),
+    /// Two's complement from..=to.
+    Signed(i16, i16),
+    /// As a speed in the unit that the drive is set to.
+    Speed,
+}
+
+/// What is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shows {
+    /// What was last written there.
+    Written,
+    /// What was last written to another register.
+    WrittenTo(u16),
+    /// What was last written to a register while a parameter has a value, and another parameter otherwise.
+    WrittenIf {
+        parameter: u16,
+        is: u16,
+        register: u16,
+        otherwise: Option<u16>,
+    },
+    /// A code each for forward, reverse, stopped and fault.
+    State([u16; 4]),
+    Bits(&'static [Bit]),
+    /// Counts per unit.
+    Measured(Measure, f64),
+    Fault,
+    Identification,
+    /// The digital inputs, together with those that the bus sets at an address.
+    Inputs(Option<u16>),
+    /// The digital outputs that the bus sets at an address, and relay 1 while the motor runs.
+    Outputs(u16),
+    /// An analog input, from 0.
+    Analog(usize),
+    /// Bits 0 to 15 (0) or 16 to 31 (1) of the energy meter.
+    Energy(u8),
+    Count(Count),
+    /// Nothing is connected there.
+    Zero,
+}
+
+/// Something of the machine.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Measure {
+    /// Hz, without sign.
+    Frequency,
+    /// Hz, without sign.
+    Setpoint,
+    /// V.
+    BusVoltage,
+    /// V.
+    Voltage,
+    /// A.
+    Current,
+    /// rpm, without sign.
+    Speed,
+    /// Share of the rating.
+    Power,
+    /// Share of the rating.
+    Torque,
+}
+
+/// Counted frames.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Count {
+    Received,
+    Sent,
+    Spoilt,
+}
+
+/// Something that stands from a bit of a status word on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Bit {
+    /// 1 without a fault.
+    Ready(u8),
+    /// 1 with a fault.
+    NotReady(u8),
+    Fault(u8),
+    Running(u8),
+    /// 1 while the output frequency is below zero.
+    Reverse(u8),
+    /// 1 while the setpoint is below zero.
+    ReverseSetpoint(u8),
+    Jogging(u8),
+    /// Two bits: 0 at a stop, 1 faster, 2 slower, 3 even.
+    Ramp(u8),
+    OverloadAlarm(u8),
+    /// Two bits: who gives the commands.
+    Channel(u8),
+    /// Two bits: the motor that the low bits of a register choose.
+    Motor(u8, u16),
+    /// The same bits always.
+    Always(u16),
+}
+
+/// A parameter.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Parameter {
+    pub(crate) address: u16,
+    pub(crate) access: Access,
+    /// In counts; `None` where nothing is printed.
+    pub(crate) low: Option<i32>,
+    pub(crate) high: Option<i32>,
+    /// Parameters that bound it as well, by address.
+    pub(crate) low_from: Option<u16>,
+    pub(crate) high_from: Option<u16>,
+    pub(crate) signed: bool,
+    pub(crate) factory: u16,
+}
+
+impl Register {
+    /// One that the bus sets and may read back.
+    pub(crate) const fn set(address: u16, range: Range) -> Self {
+        Self { address, access: Access::Always, range, shows: Shows::Written }
+    }
+
+    /// One that the bus sets and cannot read.
+    pub(crate) const fn write_only(address: u16, range: Range) -> Self {
+        Self { address, access: Access::WriteOnly, range, shows: Shows::Written }
+    }
+
+    /// One that can only be read.
+    pub(crate) const fn read(address: u16, shows: Shows) -> Self {
+        Self { address, access: Access::ReadOnly, range: Range::Words(0, u16::MAX), shows }
+    }
+}
+
+impl Parameter {
+    /// From..=to, in counts, with its factory value; to be changed at any time.
+    pub(crate) const fn new(address: u16, low: u16, high: u16, factory: u16) -> Self {
+        Self {
+            address,
+            access: Access::Always,
+            low: Some(low as i32),
+            high: Some(high as i32),
+            low_from: None,
+            high_from: None,
+            signed: false,
+            factory,
+        }
+    }
+
+    /// The same, to be changed at standstill only.
+    pub(crate) const fn at_standstill(self) -> Self {
+        Self { access: Access::Stopped, ..self }
+    }
+
+    /// The same, never below another parameter.
+    pub(crate) const fn not_below(self, address: u16) -> Self {
+        Self { low_from: Some(address), ..self }
+    }
+
+    /// The same, never above another parameter.
+    pub(crate) const fn not_above(self, address: u16) -> Self {
+        Self { high_from: Some(address), ..self }
+    }
+}
