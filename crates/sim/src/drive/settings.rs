@@ -29,10 +29,10 @@ pub(super) fn settings(family: &Family, store: &Store, speed: u16) -> Settings {
     let seconds = |role| of(role).map_or(USUAL_RAMP, |counts| counts / 10.0);
 
     let max = hertz(roles.max_frequency).unwrap_or(USUAL_MAX_HZ);
-    let from_bus = roles
-        .speed_source
-        .as_ref()
-        .map_or_else(|| all_are(store, roles.obeys), |source| all_are(store, std::slice::from_ref(source)));
+    let from_bus = match roles.speed_source {
+        Some(source) => all_are(store, &[source]),
+        None => family.command.is_some() && all_are(store, roles.obeys),
+    };
     let asked = if from_bus {
         speed_in_hertz(roles.speed_unit.and_then(|address| store.get(address)), speed, max)
     } else {

@@ -4,6 +4,7 @@ use drivebus_line::Line;
 use drivebus_rtu::Frame;
 use proptest::collection::vec;
 use proptest::prelude::*;
+use proptest::sample::select;
 
 use crate::bench::{Bench, framed, pdu};
 
@@ -15,6 +16,11 @@ fn any_pdu() -> impl Strategy<Value = Vec<u8>> {
         0x0E00..0x0E06_u16,
         0x1FFE..0x2012_u16,
         0x2FFE..0x3019_u16,
+        0x0AFE..0x0B07_u16,
+        0x18FE..0x1902_u16,
+        0x1AFE..0x1B15_u16,
+        0x1DFE..0x1E10_u16,
+        0x6FFE..0x700D_u16,
         any::<u16>()
     ];
     let words = (prop_oneof![Just(0x03), Just(0x06), Just(0x08), Just(0x10)], address, vec(0..20_u16, 0..4));
@@ -31,8 +37,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn every_request_gets_a_right_frame_or_silence(pdus in vec(any_pdu(), 1..30)) {
-        let mut bench = Bench::obedient();
+    fn every_request_gets_a_right_frame_or_silence(
+        family in select(vec!["gd350", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a"]),
+        pdus in vec(any_pdu(), 1..30)
+    ) {
+        let mut bench = Bench::of(family);
+        for (address, value) in [(0x0001, 2), (0x0002, 2 * u16::from(family == "vfd500")), (0x0006, 8)] {
+            bench.ask(1, &pdu(0x06, &[address, value]));
+        }
         for pdu in pdus {
             let answer = bench.exchange(&framed(1, &pdu));
             if pdu[0] & 0x80 != 0 {

@@ -21,7 +21,17 @@ impl Bench {
     }
 
     pub(crate) fn with(options: Options) -> Self {
-        let simulator = Simulator::new([(1, "gd350"), (3, "gd350")], options).unwrap();
+        Self::line_of(&[(1, "gd350"), (3, "gd350")], options)
+    }
+
+    /// One drive, with the address 1.
+    pub(crate) fn of(family: &str) -> Self {
+        Self::line_of(&[(1, family)], Options::default())
+    }
+
+    /// Any drives.
+    pub(crate) fn line_of(units: &[(u8, &str)], options: Options) -> Self {
+        let simulator = Simulator::new(units.iter().copied(), options).unwrap();
         let line = simulator.line();
         Self { simulator, line }
     }
@@ -72,8 +82,27 @@ impl Bench {
 
     /// 06H to drive 1, which must take it.
     pub(crate) fn write(&mut self, address: u16, value: u16) {
+        self.write_to(1, address, value);
+    }
+
+    /// 06H to a drive, which must take it.
+    pub(crate) fn write_to(&mut self, unit: u8, address: u16, value: u16) {
         let pdu = pdu(0x06, &[address, value]);
-        assert_eq!(self.ask(1, &pdu), Some(pdu));
+        assert_eq!(self.ask(unit, &pdu), Some(pdu));
+    }
+
+    /// 06H to drive 1, which must refuse it with this code.
+    #[track_caller]
+    pub(crate) fn refuses_write(&mut self, address: u16, value: u16, code: u8) {
+        let answer = self.ask(1, &pdu(0x06, &[address, value]));
+        assert_eq!(answer, Some(vec![0x86, code]), "{address:04X} = {value:04X}");
+    }
+
+    /// 03H to drive 1, which must refuse it with this code.
+    #[track_caller]
+    pub(crate) fn refuses_read(&mut self, address: u16, count: u16, code: u8) {
+        let answer = self.ask(1, &pdu(0x03, &[address, count]));
+        assert_eq!(answer, Some(vec![0x83, code]), "{count} from {address:04X}");
     }
 
     /// 10H to drive 1, which must take it.

@@ -7,9 +7,12 @@
 
 mod anything;
 mod bench;
+mod families;
 mod faults;
+mod goodrives;
 mod memory;
 mod ports;
 mod refusals;
 mod running;
+mod vfd500;
 mod wire;

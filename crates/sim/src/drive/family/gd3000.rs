@@ -3,8 +3,9 @@
 //! 06H is printed and 10H is not (section 8.4 has no place for it), so 10H is refused with 01H. Of the registers only
 //! code 1 at 2000H and the address 2100H are printed.
 //!
-//! - Assumption: the other command codes and the states are those of Goodrive350, and the speed stands at 2001H in
-//!   hundredths of a hertz. It counts whenever the bus is obeyed: no page names a source for it.
+//! - Assumption: the other command codes and the states are those of Goodrive350, and so are 2001H (the speed, in
+//!   hundredths of a hertz, while P00.06 = 8), 2102H (the fault), 3000H and 3001H (running and set frequency). Nothing
+//!   else of its registers is here.
 //! - Assumption: 2 in P00.01 obeys the bus. 0 to 2 are allowed, their meanings are not printed.
 //! - Assumption: no address has bit 15; no page tells of a way to RAM over Modbus.
 //! - Assumption: P00.04 and P00.05 are the limits they are in sister series (an example reads two words from 0004H), and
@@ -12,8 +13,8 @@
 //! - Assumption: a silent bus has fault number 18 and a motor overload 11, as in Goodrive350; only the letters CE are
 //!   printed.
 
-use super::gd600::{LOWER_FREQUENCY, MAX_FREQUENCY, PASSWORD, RECTIFIER_REGISTERS, UPPER_FREQUENCY};
-use super::{Family, Faults, Kind, Memory, Parameter, Range, Register, Roles, Shows, gd350, gd600};
+use super::gd600::{LOWER_FREQUENCY, MAX_FREQUENCY, PASSWORD, RECTIFIER_REGISTERS, SPEED_SOURCE, UPPER_FREQUENCY};
+use super::{Family, Faults, Kind, Memory, Parameter, Range, Register, Roles, gd350, gd600};
 
 const RUN_CHANNEL: u16 = 0x0001;
 
@@ -29,16 +30,16 @@ const FAMILY: Family = Family {
     control: 0x2000,
     command: Some(0x2000),
     commands: gd350::commands,
-    registers: &[&[
-        Register::set(0x2000, Range::Words(1, 8)),
-        Register::set(0x2001, Range::UpTo(40_000, MAX_FREQUENCY)),
-        Register::read(0x2100, Shows::State([1, 2, 3, 4])),
-    ]],
+    registers: &[
+        &[Register::set(0x2000, Range::Words(1, 8)), Register::set(0x2001, Range::UpTo(40_000, MAX_FREQUENCY))],
+        gd600::STATE,
+    ],
     parameters: &[
         Parameter::new(RUN_CHANNEL, 0, 2, 0),
         Parameter::new(MAX_FREQUENCY, 0, 40_000, 5_000).not_below(UPPER_FREQUENCY).at_standstill(),
         Parameter::new(UPPER_FREQUENCY, 0, 40_000, 5_000).not_above(MAX_FREQUENCY),
         Parameter::new(LOWER_FREQUENCY, 0, 40_000, 0).not_above(UPPER_FREQUENCY),
+        Parameter::new(SPEED_SOURCE, 0, 15, 0),
         // P01.19, P01.20, P01.21.
         Parameter::new(0x0113, 0, 2, 0),
         Parameter::new(0x0114, 0, 36_000, 0),
@@ -55,6 +56,7 @@ const FAMILY: Family = Family {
     capped: &[],
     roles: Roles {
         obeys: &[(RUN_CHANNEL, 2)],
+        speed_source: Some((SPEED_SOURCE, 8)),
         max_frequency: Some(MAX_FREQUENCY),
         upper_frequency: Some(UPPER_FREQUENCY),
         password: Some(PASSWORD),

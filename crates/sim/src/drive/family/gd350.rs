@@ -166,14 +166,16 @@ pub(super) const MONITOR: &[Register] = &[
 ///
 /// | parameter | value |
 /// | --- | --- |
-/// | P00.04, P00.10 | 50.00 Hz |
+/// | P00.03, where it has none; P00.04, P00.10 | 50.00 Hz |
 /// | P00.11, P00.12 | 10.0 s |
 /// | P00.14 | 4.0 kHz |
 /// | P02.01 | 4.0 kW |
 /// | P05.26 | 10.00 V |
 /// | P08.06 | 500, taken as 5.00 Hz |
 /// | P08.07, P08.08 | 100, taken as 10.0 s |
+/// | P14.01, P14.02, P14.03, where they have none | 19 200 bit/s, 8E1, 5 ms |
 const FACTORY: &[(u16, u16)] = &[
+    (MAX_FREQUENCY, 5_000),
     (UPPER_FREQUENCY, 5_000),
     (KEYPAD_FREQUENCY, 5_000),
     (ACCELERATION, 100),
@@ -184,4 +186,7 @@ const FACTORY: &[(u16, u16)] = &[
     (JOG_FREQUENCY, 500),
     (JOG_ACCELERATION, 100),
     (JOG_DECELERATION, 100),
+    (0x0E01, 4),
+    (0x0E02, 1),
+    (0x0E03, 5),
 ];

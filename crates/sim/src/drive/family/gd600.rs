@@ -1,8 +1,9 @@
 //! Goodrive600: inverter and rectifier units on one line, each with an address of its own.
 //!
-//! Of the inverter's registers only 2000H, 2001H, 2002H and 2100H are in the manual's pages at hand (131 to 140); there
-//! is no other word here, so 2101H, 2102H and 2103H are refused with 02H.
+//! Of the inverter's registers only 2000H, 2001H, 2002H and 2100H are in the manual's pages at hand (131 to 140).
 //!
+//! - Assumption: the present fault and the running and the set frequency stand at 2102H, 3000H and 3001H, as in
+//!   Goodrive350. Nothing else of its registers is here: 2101H and 2103H, above all, are refused with 02H.
 //! - Assumption: the codes of state word 1 are those of Goodrive350. An example prints 0003H, of a stopped drive.
 //! - Assumption: exceptions 07H to 09H, which the pages print for PROFINET only, are sent here too.
 //! - Assumption: no address has bit 15. No page tells of a way to RAM, and over PROFINET every write goes to EEPROM.
@@ -11,14 +12,14 @@
 //! - Ramps, jog and answers have no parameters in the pages at hand; the times are fixed.
 //! - Assumption: the motor overload has the number it has in Goodrive350; fault 1 is the only one printed.
 
-use super::{Family, Faults, Kind, Memory, Parameter, Range, Register, Roles, Shows, gd350};
+use super::{Family, Faults, Kind, Measure, Memory, Parameter, Range, Register, Roles, Shows, gd350};
 use crate::drive::machine::{Command, Direction};
 
 const RUN_CHANNEL: u16 = 0x0001;
 pub(super) const MAX_FREQUENCY: u16 = 0x0003;
 pub(super) const UPPER_FREQUENCY: u16 = 0x0004;
 pub(super) const LOWER_FREQUENCY: u16 = 0x0005;
-const SPEED_SOURCE: u16 = 0x0006;
+pub(super) const SPEED_SOURCE: u16 = 0x0006;
 const KEYPAD_FREQUENCY: u16 = 0x000A;
 pub(super) const PASSWORD: u16 = 0x0700;
 
@@ -34,12 +35,14 @@ const FAMILY: Family = Family {
     control: 0x2000,
     command: Some(0x2000),
     commands: gd350::commands,
-    registers: &[&[
-        Register::set(0x2000, Range::Words(1, 8)),
-        Register::set(0x2001, Range::UpTo(63_000, MAX_FREQUENCY)),
-        Register::set(0x2002, Range::Words(0, 1_000)),
-        Register::read(0x2100, Shows::State([1, 2, 3, 4])),
-    ]],
+    registers: &[
+        &[
+            Register::set(0x2000, Range::Words(1, 8)),
+            Register::set(0x2001, Range::UpTo(63_000, MAX_FREQUENCY)),
+            Register::set(0x2002, Range::Words(0, 1_000)),
+        ],
+        STATE,
+    ],
     parameters: &[
         Parameter::new(RUN_CHANNEL, 0, 2, 0),
         Parameter::new(MAX_FREQUENCY, 1_000, 63_000, 5_000).not_below(UPPER_FREQUENCY).at_standstill(),
@@ -66,6 +69,14 @@ const FAMILY: Family = Family {
     },
     faults: Faults { overload: 11, silent_bus: 18 },
 };
+
+/// State, fault and frequencies.
+pub(super) const STATE: &[Register] = &[
+    Register::read(0x2100, Shows::State([1, 2, 3, 4])),
+    Register::read(0x2102, Shows::Fault),
+    Register::read(0x3000, Shows::Measured(Measure::Frequency, 100.0)),
+    Register::read(0x3001, Shows::Measured(Measure::Setpoint, 100.0)),
+];
 
 /// Assumption: all of it. No page about this unit is at hand; it is taken to have the run byte that Goodrive3000's
 /// rectifier has over PROFIBUS, at the inverter's addresses, and no parameters.
