@@ -97,16 +97,21 @@ fn check_profile(profile: &Profile) {
     for entry in profile.entries() {
         check_entry(entry);
         assert_eq!(profile.find(entry.name()), Ok(entry));
-        assert_eq!(profile.find(&format!("0x{:04X}", entry.address())), Ok(entry));
-        assert_eq!(profile.entry_at(entry.address()), Some(entry));
+        assert!(entry.alias().is_none_or(|alias| profile.find(alias) == Ok(entry)));
+        if let Some(address) = entry.address() {
+            assert_eq!(profile.find(&format!("0x{address:04X}")), Ok(entry));
+            assert_eq!(profile.entry_at(address), Some(entry));
+        }
     }
-    let readable: Vec<&Entry> = profile.entries().filter(|entry| entry.is_known_readable()).collect();
+    let known = |entry: &&Entry| entry.is_known_readable() && entry.address().is_some();
+    let readable: Vec<&Entry> = profile.entries().filter(known).collect();
     let spans = profile.plan(readable.iter().copied());
     let spans = spans.unwrap_or_else(|error| unreachable!("{error}"));
     assert!(spans.iter().all(|span| (1..=profile.max_words()).contains(&span.count) && profile.max_words() <= 125));
     for entry in readable {
         let covers = |first: u16, count: u16| {
-            (u32::from(first)..u32::from(first) + u32::from(count)).contains(&u32::from(entry.address()))
+            let end = u32::from(first) + u32::from(count);
+            entry.address().is_some_and(|own| first <= own && u32::from(own) + u32::from(entry.words()) <= end)
         };
         assert!(spans.iter().any(|span| covers(span.address, span.count)), "{} is read by no span", entry.name());
     }
@@ -116,8 +121,8 @@ fn check_profile(profile: &Profile) {
             assert!(profile.entry_at(address).is_some());
         }
     }
-    for state in [State::Forward, State::Reverse, State::Stopped, State::Fault, State::PowerOff, State::PreExciting] {
-        assert!(profile.state_code(state).is_none_or(|code| profile.state(code) == state));
+    for rule in profile.state_word().iter().flat_map(|word| &word.rules) {
+        assert_ne!(profile.state(rule.value), State::Unknown, "{rule:?}");
     }
     for fault in profile.faults() {
         assert_eq!(*profile.fault(fault.code), *fault);
@@ -128,12 +133,25 @@ fn check_profile(profile: &Profile) {
 fn check_entry(entry: &Entry) {
     let quantity = entry.quantity();
     let signed = quantity.is_signed();
-    let (least, most) = if signed { (-32_768, 32_767) } else { (0, 65_535) };
+    let (least, most): (i64, i64) = match (signed, entry.words()) {
+        (true, 1) => (-32_768, 32_767),
+        (false, 1) => (0, 65_535),
+        (true, _) => (i32::MIN.into(), i32::MAX.into()),
+        (false, _) => (0, u32::MAX.into()),
+    };
     let low = quantity.low().map_or(least, Value::count);
     let high = quantity.high().map_or(most, Value::count);
     assert!(least <= low && low <= high && high <= most, "{}: {low} to {high}", entry.name());
     assert!(quantity.scale().is_none_or(|scale| scale == 10_u32.pow(quantity.decimals().into())));
-    for count in [least, -1, 0, 1, most, low, high, low - 1, high + 1, i32::midpoint(low, high)] {
+    if entry.words() == 2 {
+        assert!(entry.encode(low).is_err(), "{} takes two words", entry.name());
+        return;
+    }
+    if quantity.is_undecided() {
+        assert!(entry.encode(low).is_err(), "{} has no unit", entry.name());
+        return;
+    }
+    for count in [least, -1, 0, 1, most, low, high, low - 1, high + 1, i64::midpoint(low, high)] {
         let Some(raw) = word(count, signed) else { continue };
         let value = entry.decode(raw);
         let text = decimal(count, quantity.decimals().into());
@@ -155,12 +173,12 @@ fn check_entry(entry: &Entry) {
 }
 
 /// The word that holds `count`; `None` if none does.
-fn word(count: i32, signed: bool) -> Option<u16> {
+fn word(count: i64, signed: bool) -> Option<u16> {
     if signed { i16::try_from(count).ok().map(i16::cast_unsigned) } else { u16::try_from(count).ok() }
 }
 
 /// `count` with a point before its last `decimals` digits.
-fn decimal(count: i32, decimals: usize) -> String {
+fn decimal(count: i64, decimals: usize) -> String {
     let digits = format!("{:0>width$}", count.unsigned_abs(), width = decimals + 1);
     let (whole, fraction) = digits.split_at(digits.len() - decimals);
     let sign = if count < 0 { "-" } else { "" };

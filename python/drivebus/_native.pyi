@@ -306,20 +306,53 @@ class Profile:
     @staticmethod
     def load(folder: str | os.PathLike[str], /) -> Profile:
         """A folder with `profile.toml` and the CSV files. NotAllowed names file, line and reason."""
+    @staticmethod
+    def check(folder: str | os.PathLike[str], /) -> list[tuple[str, int | None, str]]:
+        """All that is wrong with a folder: file, line (None where a file cannot be read) and reason of each."""
     @property
     def name(self) -> str: ...
     @property
+    def family(self) -> str:
+        """The name; for an overlay that of the profile below it."""
+    @property
+    def kind(self) -> str:
+        """`"inverter"` or `"rectifier"`."""
+    @property
+    def version(self) -> int: ...
+    @property
+    def source(self) -> str: ...
+    @property
     def title(self) -> str: ...
+    @property
+    def functions(self) -> list[int]: ...
+    def requests(self) -> dict[str, Any]:
+        """`across_groups`, `verified`, `note`, `source`."""
+    def serial(self) -> dict[str, Any] | None:
+        """`baud_rate`, `format`, `unit` (or None), `response_delay` in seconds, `verified`, `source`."""
     @property
     def max_words(self) -> int:
         """Most words in one read or write."""
-    @property
-    def identification_address(self) -> int:
-        """Where the drive says what it is."""
+    def role(self, role: str, /) -> str | None:
+        """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `identification`, `setpoints.torque`."""
+    def status_words(self) -> list[str]:
+        """The words whose bit fields tell more of the state."""
+    def identifications(self) -> list[dict[str, Any]]:
+        """`code`, `family`, `title`, `shared`, `verified`, `note`, `source` of each code."""
+    def signature(self) -> tuple[list[int], list[int]] | None:
+        """The addresses that such a unit answers, and those that it refuses."""
     def identify(self, code: int, /) -> str | None:
         """The family that register 2103H names with *code*, by this profile's list; None if unknown."""
     def names(self) -> list[str]:
         """Every register name and parameter code, registers first, in address order."""
+    def search(self, text: str, limit: int) -> list[str]:
+        """Names and codes in which all words of *text* occur, the best first."""
+    def fault_values(self) -> list[str]: ...
+    def acts(self) -> list[str]: ...
+    def serial_parameters(self) -> list[str]: ...
+    def motor_parameters(self) -> list[str]: ...
+    def last_parameters(self) -> list[str]: ...
+    def counts(self) -> dict[str, dict[str, int]]:
+        """`registers`, `parameters`, `faults`: `total`, `sourced`, `unsourced`, `unverified`, `assumed`."""
     def monitor_names(self) -> list[str]:
         """The registers that `Drive.monitor()` reads when it is given no names."""
     def fault_history(self) -> list[str]:
@@ -330,14 +363,18 @@ class Profile:
         Keys: `name`, `code` (or None), `label`, `kind` (`"register"` or `"parameter"`), `address`, `unit`, `scale`,
         `signed`, `low`, `high`, `low_from`, `high_from` (parameters that narrow the range), `default`,
         `access` (`"rw"`, `"ro"`, `"run"`, `"stop"`, `"unknown"`),
-        `choices` ({int: str}), `bits` ({str: {int: str}} or None), `source`, `verified`, `note`.
+        `choices` ({int: str}), `bits` ({str: {int: str}} or None), `source`, `verified`, `evidence`, `note`, `words`,
+        `variant`. `address` is None where nobody knows it.
         """
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """The address of *name*; with *store* given, the one to write to for RAM (False) or EEPROM (True)."""
     def read_back(self, name: str, /) -> int | None:
         """Where what was written to *name* can be read; None where that would not tell whether the drive took it."""
     def decode(self, name: str, raw: int, /) -> int | float:
-        """*raw* (0..=0xFFFF) in engineering units: int where the drive counts or names, float where it measures."""
+        """*raw* (0..=0xFFFF, or 32 bits where it takes two words) in engineering units.
+
+        An int where the drive counts or names, a float where it measures.
+        """
     def encode(self, name: str, value: object, /) -> int:
         """*value* (int, float, Decimal, or a choice's label) as a word. NotAllowed names value, range and unit."""
     def fields(self, name: str, raw: int, /) -> dict[str, str]:
@@ -355,24 +392,50 @@ class Profile:
         Commands are `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`,
         `jog_stop`.
         """
+    def command_reason(self, name: str, /) -> str | None:
+        """Why a command is not verified."""
+    def commands(self) -> dict[str, int]: ...
+    def command_codes(self) -> dict[int, str]:
+        """Every code that the family defines at its command register."""
+    @property
+    def command_address(self) -> int | None: ...
+    def stored_address(self, address: int, /) -> int | None:
+        """The plain address behind one with the memory bit; None if *address* has not that bit."""
+    def memory(self) -> dict[str, Any] | None:
+        """`bit`, `means` (`"ram"`, `"eeprom"`), `reason` (None where verified), `source`."""
     def is_command(self, address: int, /) -> bool:
         """Whether a write to *address* can move a motor."""
     def state(self, raw: int, /) -> str:
         """State word 1 as `forward`, `reverse`, `stopped`, `fault`, `power_off`, `pre_exciting` or `unknown`."""
+    def state_reason(self) -> str | None:
+        """Why the states are not verified."""
     def control(self) -> list[dict[str, Any]]:
-        """What must be set before the drive obeys the bus: `code`, `value`, `label`, `verified`, `note`, in order."""
+        """What must be set before the drive obeys the bus, in order.
+
+        Keys of each: `code`, `value`, `label`, `verified`, `note`, `source`.
+        """
+    def setpoint_names(self) -> list[str]: ...
+    def needs(self, setpoint: str, /) -> list[dict[str, Any]]:
+        """What must be set before the drive takes a setpoint; as `control`."""
+    def variants(self) -> dict[str, dict[str, Any]]:
+        """`parameter`, `choices`, `reason`, `source` of each."""
+    @property
+    def variants_chosen(self) -> dict[str, str]: ...
+    def with_variants(self, chosen: Mapping[str, str], /) -> Profile:
+        """The same for a drive of which the variants are known."""
     def watchdog(self) -> dict[str, Any] | None:
         """What makes the drive act when the bus falls silent, or None.
 
         Keys: `timeout` and `action` (parameter codes), `actions` (the value of `"coast"` and of `"stop"`, where the
-        family has them), `verified`, `source`.
+        family has them), `verified`, `note`, `source`.
         """
     def fault(self, code: int, /) -> dict[str, Any]:
-        """One fault: `code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `source`.
+        """One fault: `code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `evidence`, `note`, `source`.
 
         An unknown number says so in its label.
         """
     def faults(self) -> list[dict[str, Any]]: ...
+    def exceptions(self) -> dict[int, tuple[str, str]]: ...
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code."""
 

@@ -19,11 +19,11 @@ class Identity:
     Args:
         bus: The line it hangs on; only for how often that was opened again.
         unit: Its address, 1..247.
-        address: Where it says what it is.
+        address: Where it says what it is; None where that is not known, and it is not asked.
         code: What it said, if it was asked before.
     """
 
-    def __init__(self, bus: AwaitableBus, unit: int, address: int, code: int | None = None) -> None:
+    def __init__(self, bus: AwaitableBus, unit: int, address: int | None, code: int | None = None) -> None:
         self._unit = unit
         self._address = address
         self._known = None if code is None else _named(code)
@@ -42,10 +42,11 @@ class Identity:
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
         opened = bus.reconnects
-        if self._known is not None and opened == self._opened:
+        address = self._address
+        if address is None or (self._known is not None and opened == self._opened):
             return opened
         try:
-            told = await self._ask(bus)
+            told = await self._ask(bus, address)
         except (NoAnswer, BadAnswer, PortError) as error:
             if self._known is None:
                 return opened
@@ -68,9 +69,9 @@ class Identity:
         self._opened = opened
         return opened
 
-    async def _ask(self, bus: AwaitableBus) -> str:
+    async def _ask(self, bus: AwaitableBus, address: int) -> str:
         try:
-            [code] = await bus.read(self._unit, self._address)
+            [code] = await bus.read(self._unit, address)
         except Refused as error:
             return f"refused with exception {error.code:02X}H"
         return _named(code)

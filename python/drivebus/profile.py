@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drivebus import _native
+from drivebus import _native, checks
 from drivebus.errors import NotAllowed
 from drivebus.values import Choice, Description, Fault, Value, WatchdogSettings
 
@@ -116,13 +116,81 @@ class Profile:
         return self._native.title
 
     @property
+    def family(self) -> str:
+        """The family: its own name, or for an overlay that of the profile below it."""
+        return self._native.family
+
+    @property
+    def kind(self) -> str:
+        """`"inverter"`, or `"rectifier"` for a unit that feeds no motor."""
+        return self._native.kind
+
+    @property
+    def version(self) -> int:
+        """The version of the profile itself."""
+        return self._native.version
+
+    @property
+    def source(self) -> str:
+        """The document it rests on."""
+        return self._native.source
+
+    @property
+    def functions(self) -> list[int]:
+        """The function codes that the drive takes."""
+        return self._native.functions
+
+    @property
     def max_words(self) -> int:
         """Most words in one read or write."""
         return self._native.max_words
 
+    def requests(self) -> dict[str, Any]:
+        """What else is known of requests: `across_groups`, `verified`, `note`, `source`."""
+        return self._native.requests()
+
+    def serial(self) -> dict[str, Any] | None:
+        """How the factory sets the line, where that is printed.
+
+        Keys: `baud_rate`, `format`, `unit` (or None), `response_delay` in seconds, `verified`, `source`.
+        """
+        return self._native.serial()
+
+    def counts(self) -> dict[str, dict[str, int]]:
+        """How much is documented: `registers`, `parameters` and `faults`.
+
+        Each with `total`, `sourced`, `unsourced`, `unverified` (printed in part or for a sister series) and `assumed`.
+        """
+        return self._native.counts()
+
+    @staticmethod
+    def check(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
+        """All that is wrong with the profile in a folder; an empty list if it is sound.
+
+        Each is a dict of `file`, `line` (None where a file cannot be read) and `reason`.
+        """
+        return [{"file": file, "line": line, "reason": reason} for file, line, reason in _native.Profile.check(path)]
+
     def names(self) -> list[str]:
         """Every register name and parameter code, registers first, in address order."""
         return list(self._names)
+
+    def search(self, text: str, limit: int = 20) -> list[str]:
+        """Names and codes in which all words of *text* occur, or in what is known of them; the best first."""
+        return self._native.search(text, checks.whole("limit", limit, 0, 10_000))
+
+    def role(self, role: str, /) -> str | None:
+        """The register with a role that every family has under some name; None where it is not known.
+
+        Roles are `"state"`, `"fault"` (the present one), `"frequency"` (at the output), `"setpoint"` (the frequency in
+        force), `"identification"`, and for each of `setpoint_names` one such as `"setpoints.torque"`.
+        """
+        return self._native.role(role)
+
+    @property
+    def status_words(self) -> list[str]:
+        """The words whose bit fields tell more of the state than the state itself."""
+        return self._native.status_words()
 
     def monitor_names(self) -> list[str]:
         """The registers that `Drive.monitor` reads when it is given no names."""
@@ -138,6 +206,11 @@ class Profile:
         if known is None:
             known = self._descriptions[name] = Description(**self._native.describe(name))
         return known
+
+    def plain_address(self, address: int, /) -> int:
+        """*address* without the bit that says where a written parameter is kept."""
+        stored = self._native.stored_address(address)
+        return address if stored is None else stored
 
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True)."""
@@ -184,13 +257,71 @@ class Profile:
         """Address and code of a command such as `"run_forward"` or `"coast"`."""
         return self._native.command(name)
 
+    def command_reason(self, name: str, /) -> str | None:
+        """Why a command is not verified; None where it is, or where the family has no such command."""
+        return self._native.command_reason(name)
+
+    def commands(self) -> dict[str, int]:
+        """Every command of the family with its code, verified or not."""
+        return self._native.commands()
+
+    def command_codes(self) -> dict[int, str]:
+        """Every code that the family defines at its command register, and what it means."""
+        return self._native.command_codes()
+
+    @property
+    def command_address(self) -> int | None:
+        """Where commands are written, 0..0xFFFF; None where the family has none."""
+        return self._native.command_address
+
+    def memory(self) -> dict[str, Any] | None:
+        """Where a written parameter is kept: None where every write may wear EEPROM.
+
+        Keys: `bit` of the address, `means` (`"ram"` or `"eeprom"`: what a write with the bit reaches), `reason` (why
+        this is not verified, or None), `source`.
+        """
+        return self._native.memory()
+
     def is_command(self, address: int, /) -> bool:
         """Whether a write to *address* can move a motor."""
         return self._native.is_command(address)
 
     def state(self, raw: int, /) -> str:
-        """The first status word by name."""
+        """The state word by name."""
         return self._native.state(raw)
+
+    def state_reason(self) -> str | None:
+        """Why the states are not verified; None where they are, or where the family has no state word."""
+        return self._native.state_reason()
+
+    def setpoint_names(self) -> list[str]:
+        """What can be given over the bus beside commands, such as `"frequency"` and `"torque"`."""
+        return self._native.setpoint_names()
+
+    def needs(self, setpoint: str, /) -> list[dict[str, Any]]:
+        """What must be set before the drive takes *setpoint*; items as of `control`."""
+        return self._native.needs(setpoint)
+
+    def variants(self) -> dict[str, dict[str, Any]]:
+        """Parameters that decide what some registers mean, such as `{"speed_unit": {"parameter": "P30.14", …}}`.
+
+        Keys of each: `parameter`, `choices` (name: word of the parameter), `reason` (why those words are not verified,
+        or None), `source`.
+        """
+        return self._native.variants()
+
+    @property
+    def variants_chosen(self) -> dict[str, str]:
+        """What `with_variants` was told."""
+        return self._native.variants_chosen
+
+    def with_variants(self, chosen: Mapping[str, str]) -> Profile:
+        """This profile for a drive of which is known what a parameter makes of some registers.
+
+        Raises:
+            NotAllowed: There is no such variant, or it has no such choice; the message has those that there are.
+        """
+        return Profile(self._native.with_variants(chosen))
 
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus, in the order in which to set it."""
@@ -208,6 +339,10 @@ class Profile:
         """One fault by what the keypad shows, such as `"OL1"`, or None. Capitals count: STo and STO differ."""
         return next((fault for fault in self.faults() if fault.mnemonic == mnemonic), None)
 
+    def exceptions(self) -> dict[int, tuple[str, str]]:
+        """Name and meaning of every exception code that the family documents."""
+        return self._native.exceptions()
+
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code in this family."""
         return self._native.exception(code)
@@ -216,10 +351,23 @@ class Profile:
         """The family that identification *code* names, as far as this profile knows; None if it does not."""
         return self._native.identify(code)
 
+    def identifications(self) -> list[dict[str, Any]]:
+        """The identification codes that this profile knows.
+
+        Keys of each: `code`, `family`, `title`, `shared` (what else reports it), `verified`, `note`, `source`.
+        """
+        return self._native.identifications()
+
+    def signature(self) -> dict[str, list[int]] | None:
+        """How a unit without a code is told: addresses that it `answers` and `refuses`, read one word each."""
+        signature = self._native.signature()
+        return None if signature is None else {"answers": signature[0], "refuses": signature[1]}
+
     @property
-    def identification_address(self) -> int:
-        """Where the drive says what it is, 0..0xFFFF."""
-        return self._native.identification_address
+    def identification_address(self) -> int | None:
+        """Where the drive says what it is, 0..0xFFFF; None where that is not known."""
+        register = self.role("identification")
+        return None if register is None else self.address(register)
 
     @property
     def watchdog(self) -> WatchdogSettings | None:
@@ -230,12 +378,34 @@ class Profile:
     @property
     def maximum_frequency(self) -> str | None:
         """The parameter that holds the drive's highest output frequency, if it has one."""
-        return self.describe("set_frequency").high_from
+        register = self.role("setpoints.frequency")
+        return None if register is None else self.describe(register).high_from
 
     @property
     def fault_history(self) -> tuple[str, ...]:
         """The parameters that hold the last faults, the latest first."""
         return tuple(self._native.fault_history())
+
+    @property
+    def fault_values(self) -> tuple[str, ...]:
+        """The parameters that hold what was measured when the drive tripped last."""
+        return tuple(self._native.fault_values())
+
+    def acts(self) -> list[str]:
+        """The parameters whose write does something and is not simply kept, such as tuning the motor."""
+        return self._native.acts()
+
+    def serial_parameters(self) -> list[str]:
+        """The parameters that set the line."""
+        return self._native.serial_parameters()
+
+    def motor_parameters(self) -> list[str]:
+        """The parameters that describe the motor."""
+        return self._native.motor_parameters()
+
+    def last_parameters(self) -> list[str]:
+        """The parameters that are to be written last of many, in this order."""
+        return self._native.last_parameters()
 
     def __repr__(self) -> str:
         return f"Profile({self.name!r})"
@@ -269,4 +439,6 @@ def _fault(row: dict[str, Any]) -> Fault:
         cause=row["cause"] or "",
         remedy=row["remedy"] or "",
         verified=row["verified"],
+        evidence=row["evidence"],
+        note=row["note"],
     )

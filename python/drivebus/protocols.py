@@ -198,8 +198,8 @@ class ProfileProtocol(Protocol):
         """Every fault that is known, by number."""
 
     @property
-    def identification_address(self) -> int:
-        """Where the drive says what it is."""
+    def identification_address(self) -> int | None:
+        """Where the drive says what it is, if that is known."""
 
     @property
     def watchdog(self) -> WatchdogSettings | None:

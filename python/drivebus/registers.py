@@ -172,7 +172,7 @@ class Registers:
         known = self.profile.describe(name)
         if not known.writable:
             raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=self.unit)
-        if self.profile.is_command(known.address):
+        if known.address is not None and self.profile.is_command(known.address):
             raise NotAllowed(
                 f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
                 "or reset_fault()",

@@ -98,6 +98,8 @@ class Fault:
         cause: What may have caused it; empty if no manual says so.
         remedy: What to do about it; empty if no manual says so.
         verified: Whether number and meaning were printed for this very family.
+        evidence: `"verified"`, `"unverified"` (printed in part or for a sister series) or `"assumed"`.
+        note: What else is known about it; says what is missing where it is not verified.
     """
 
     code: int
@@ -106,6 +108,8 @@ class Fault:
     cause: str = ""
     remedy: str = ""
     verified: bool = True
+    evidence: str = "verified"
+    note: str = ""
 
     def __str__(self) -> str:
         text = f"{self.mnemonic} ({self.code}): {self.label}" if self.mnemonic else f"{self.code}: {self.label}"
@@ -223,7 +227,7 @@ class Description:
         code: The parameter code, such as `"P00.11"`; None for registers.
         label: What it is, in words.
         kind: `"register"` or `"parameter"`.
-        address: Where it is read, 0..0xFFFF.
+        address: Where it is read, 0..0xFFFF; None where nobody knows that, and it cannot be used.
         unit: Engineering unit, empty for a plain number.
         scale: Raw counts per unit.
         signed: Whether the word is two's complement.
@@ -234,15 +238,19 @@ class Description:
         choices: Labels of the values, empty if they have none.
         bits: Labels of bit fields, or None.
         source: The document that says so.
-        verified: Whether that document is about this very family.
-        note: What else is worth knowing.
+        verified: Whether documents of this very family print all of it.
+        evidence: `"verified"`, `"unverified"` (printed in part or for a sister series) or `"assumed"` (no document of
+            the family prints it).
+        note: What else is worth knowing; says what is missing where it is not verified.
+        words: How many words it takes, 1 or 2 of which the first is the low one.
+        variant: What decides its unit, scale and range, such as `"speed_unit"`, or None.
     """
 
     name: str
     code: str | None
     label: str
     kind: str
-    address: int
+    address: int | None
     unit: str
     scale: int | float
     signed: bool
@@ -257,6 +265,14 @@ class Description:
     source: str
     verified: bool
     note: str
+    evidence: str = "verified"
+    words: int = 1
+    variant: str | None = None
+
+    @property
+    def reason(self) -> str:
+        """Why it is not verified; empty where it is."""
+        return "" if self.verified else self.note
 
     @property
     def writable(self) -> bool:
@@ -295,6 +311,7 @@ class WatchdogSettings:
         actions: The value of *action* for each thing it can do: `"coast"`, `"stop"`.
         verified: Whether a document of this very family prints them.
         source: The document that says so.
+        note: What else is known; says what is assumed where it is not verified.
     """
 
     timeout: str
@@ -302,6 +319,7 @@ class WatchdogSettings:
     actions: Mapping[str, int]
     verified: bool
     source: str
+    note: str = ""
 
 
 class Snapshot(Mapping[str, Value]):

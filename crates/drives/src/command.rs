@@ -53,6 +53,16 @@ impl Command {
     }
 }
 
+/// The word that means a command in a family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CommandCode {
+    /// The word.
+    pub code: u16,
+    /// Whether a document of the family prints it.
+    pub verified: bool,
+}
+
 impl std::str::FromStr for Command {
     type Err = ParseCommandError;
 

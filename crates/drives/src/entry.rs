@@ -1,6 +1,7 @@
 //! Entries: one register or parameter, its address, its quantity and who may change it when.
 
 use crate::bits::BitField;
+use crate::evidence::Evidence;
 use crate::quantity::Quantity;
 use crate::value::{Input, Value, ValueError};
 
@@ -60,15 +61,18 @@ pub enum Store {
 /// One register or parameter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
+    /// A register's name, a parameter's code.
     pub(crate) name: String,
+    /// The name that a parameter has beside its code.
+    pub(crate) alias: Option<String>,
     pub(crate) kind: Kind,
-    pub(crate) address: u16,
+    pub(crate) address: Option<u16>,
     pub(crate) label: String,
     pub(crate) quantity: Quantity,
     pub(crate) bits: Vec<BitField>,
     pub(crate) access: Access,
     pub(crate) default: Option<u16>,
-    pub(crate) verified: bool,
+    pub(crate) evidence: Evidence,
     pub(crate) note: String,
     pub(crate) source: String,
 }
@@ -77,6 +81,11 @@ impl Entry {
     /// The name of a register (`output_current`), the code of a parameter (`P00.11`).
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The name in words that a parameter has beside its code: `acceleration_time_1`.
+    pub fn alias(&self) -> Option<&str> {
+        self.alias.as_deref()
     }
 
     /// The code, if this is a parameter.
@@ -92,9 +101,15 @@ impl Entry {
         self.kind
     }
 
-    /// The address to read from. Written to, it reaches EEPROM if this is a parameter.
-    pub fn address(&self) -> u16 {
+    /// The address to read from. `None` where it is known that there is such a word, and not where: then it cannot be
+    /// used.
+    pub fn address(&self) -> Option<u16> {
         self.address
+    }
+
+    /// How many words it takes from its address on: 1 or 2.
+    pub fn words(&self) -> u16 {
+        self.quantity.words()
     }
 
     /// What it is, in a few words.
@@ -124,7 +139,12 @@ impl Entry {
 
     /// Whether documents of this family print all of this row; else [`note`](Self::note) says what they do not.
     pub fn verified(&self) -> bool {
-        self.verified
+        self.evidence == Evidence::Verified
+    }
+
+    /// How well documents of this family prove this row.
+    pub fn evidence(&self) -> Evidence {
+        self.evidence
     }
 
     /// What to know about it; may be empty.
@@ -132,14 +152,15 @@ impl Entry {
         &self.note
     }
 
-    /// Where it is printed.
+    /// Where it is printed; empty only where it is assumed.
     pub fn source(&self) -> &str {
         &self.source
     }
 
-    /// Whether the profile knows that it can be read. False where access is unknown: a read across it might be refused.
+    /// Whether the profile knows that it can be read. False where access is unknown, and where it is assumed: a read
+    /// across it might be refused.
     pub fn is_known_readable(&self) -> bool {
-        !matches!(self.access, Access::Wo | Access::Unknown)
+        !matches!(self.access, Access::Wo | Access::Unknown) && self.evidence != Evidence::Assumed
     }
 
     /// The value of `raw`. Every word has one, in range or not.
@@ -174,6 +195,24 @@ pub enum AccessError {
     #[error("{name} ({label}) can only be written")]
     WriteOnly {
         /// What was to be read.
+        name: String,
+        /// What it is.
+        label: String,
+    },
+    /// Nobody knows where it is.
+    #[error("{name} ({label}) cannot be used: its address is not known. {note}")]
+    NoAddress {
+        /// What was to be used.
+        name: String,
+        /// What it is.
+        label: String,
+        /// What is known instead.
+        note: String,
+    },
+    /// The family has no write to RAM only, or none is known.
+    #[error("{name} ({label}): no write that only RAM keeps is known for this family, so every write may wear EEPROM")]
+    NoRam {
+        /// What was to be written.
         name: String,
         /// What it is.
         label: String,

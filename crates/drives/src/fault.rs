@@ -1,5 +1,7 @@
 //! Faults and exceptions: why a drive tripped, and why it refuses a request.
 
+use crate::evidence::Evidence;
+
 /// A reason for which a drive trips.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -14,8 +16,8 @@ pub struct Fault {
     pub cause: String,
     /// What to do; may be empty.
     pub remedy: String,
-    /// Whether number, mnemonic and label rest on documents of this family.
-    pub verified: bool,
+    /// How well documents of this family prove number, mnemonic and label.
+    pub evidence: Evidence,
     /// What to know about this row; may be empty.
     pub note: String,
     /// Where it is printed; may be empty.
@@ -23,6 +25,11 @@ pub struct Fault {
 }
 
 impl Fault {
+    /// Whether number, mnemonic and label rest on documents of this family.
+    pub fn verified(&self) -> bool {
+        self.evidence == Evidence::Verified
+    }
+
     /// The fault that stands for a number which the profile does not know.
     pub(crate) fn unknown(code: u16) -> Self {
         Self {
@@ -31,7 +38,7 @@ impl Fault {
             label: format!("Unknown fault {code}"),
             cause: String::new(),
             remedy: "Look the number up in the manual of the drive".to_owned(),
-            verified: false,
+            evidence: Evidence::Assumed,
             note: "This number is not in the profile.".to_owned(),
             source: String::new(),
         }

@@ -43,33 +43,47 @@
 
 mod bits;
 mod command;
+mod counts;
 mod decimal;
 mod entry;
+mod evidence;
 mod fault;
+mod identification;
 mod load;
 mod lookup;
+mod memory;
 mod plan;
 mod profile;
 mod quantity;
 mod read_plan;
+mod roles;
+mod search;
 mod serial;
+mod setpoint;
 mod state;
 mod value;
+mod variant;
 mod watchdog;
 
 pub use bits::BitField;
-pub use command::{Command, Control, ParseCommandError};
+pub use command::{Command, CommandCode, Control, ParseCommandError};
+pub use counts::Counts;
 pub use entry::{Access, AccessError, Entry, Kind, Store};
+pub use evidence::Evidence;
 pub use fault::{Exception, Fault};
+pub use identification::{Identification, Signature};
 pub use load::ProfileError;
 pub use lookup::NameError;
+pub use memory::{Memory, MemoryBit};
 pub use plan::{ReadCost, ReadSpan, plan_reads};
-pub use profile::{Identification, Profile};
+pub use profile::{Profile, Requests, UnitKind};
 pub use quantity::Quantity;
 pub use read_plan::ReadPlan;
 pub use serial::SerialDefaults;
-pub use state::State;
+pub use setpoint::{Setpoint, SetpointRole};
+pub use state::{State, StateRule, StateWord};
 pub use value::{Input, Limits, Value, ValueError};
+pub use variant::{Variant, VariantChoice, VariantError};
 pub use watchdog::Watchdog;
 
 /// The examples of the README are tests.

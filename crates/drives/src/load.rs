@@ -1,19 +1,34 @@
-//! Loading: from four files to a checked [`Profile`].
+//! Loading: from the files of a folder to a checked [`Profile`].
 //!
 //! Everything a file can have wrong is found here, with file, line and reason; a `Profile` that exists is consistent.
-//! `manifest` knows the shape of `profile.toml`, `table` that of CSV files, `rows` what their cells mean, `assemble`
-//! what must agree between them.
+//! `manifest` knows the shape of `profile.toml`, `table` that of CSV files, `rows` what their cells mean, `entries` how
+//! rows lie over those of a profile below, `inherit` what may be trusted of that, `facts` and `motion` the tables of
+//! `profile.toml`, `assemble` what must agree between them.
 
 mod assemble;
+mod entries;
+mod facts;
+mod inherit;
 mod manifest;
+mod motion;
+mod problems;
 mod rows;
 mod table;
 
-use std::path::Path;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, OnceLock};
+
+use manifest::Manifest;
+use problems::Problems;
 
 use crate::lookup::closest;
 use crate::profile::Profile;
+
+/// Most bytes of one file.
+const MOST_BYTES: u64 = 1 << 20;
+/// Most profiles one below the other.
+const MOST_LEVELS: usize = 3;
 
 /// Why there is no profile.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -65,41 +80,47 @@ impl File {
     }
 }
 
-/// The files of a profile.
+/// The files of a profile; a table may be missing where another profile lies below.
 struct Files {
     manifest: File,
-    registers: File,
-    parameters: File,
-    faults: File,
+    registers: Option<File>,
+    parameters: Option<File>,
+    faults: Option<File>,
 }
 
 /// A profile that is part of the program.
 struct Builtin {
     name: &'static str,
     manifest: &'static str,
-    registers: &'static str,
-    parameters: &'static str,
-    faults: &'static str,
+    /// Those of its tables that it has: file and text.
+    tables: &'static [(&'static str, &'static str)],
     loaded: OnceLock<Result<Arc<Profile>, ProfileError>>,
 }
 
-static BUILTINS: [Builtin; 1] = [Builtin {
-    name: "gd350",
-    manifest: include_str!("../profiles/gd350/profile.toml"),
-    registers: include_str!("../profiles/gd350/registers.csv"),
-    parameters: include_str!("../profiles/gd350/parameters.csv"),
-    faults: include_str!("../profiles/gd350/faults.csv"),
-    loaded: OnceLock::new(),
-}];
+/// A shipped profile by its folder, with those of its tables that it has.
+macro_rules! builtin {
+    ($name:literal: $($table:literal)*) => {
+        Builtin {
+            name: $name,
+            manifest: include_str!(concat!("../profiles/", $name, "/profile.toml")),
+            tables: &[$(($table, include_str!(concat!("../profiles/", $name, "/", $table)))),*],
+            loaded: OnceLock::new(),
+        }
+    };
+}
+
+static BUILTINS: [Builtin; 1] = [builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv")];
 
 impl Builtin {
     fn files(&self) -> Files {
         let file = |name: &str, text: &str| File { name: format!("{}/{name}", self.name), text: text.to_owned() };
+        let table =
+            |name: &str| self.tables.iter().find(|(table, _)| *table == name).map(|(name, text)| file(name, text));
         Files {
             manifest: file("profile.toml", self.manifest),
-            registers: file("registers.csv", self.registers),
-            parameters: file("parameters.csv", self.parameters),
-            faults: file("faults.csv", self.faults),
+            registers: table("registers.csv"),
+            parameters: table("parameters.csv"),
+            faults: table("faults.csv"),
         }
     }
 }
@@ -112,7 +133,10 @@ impl Profile {
     /// [`ProfileError::Unknown`]: none has this name; the closest is named.
     pub fn builtin(name: &str) -> Result<Arc<Self>, ProfileError> {
         match BUILTINS.iter().find(|builtin| builtin.name.eq_ignore_ascii_case(name.trim())) {
-            Some(builtin) => builtin.loaded.get_or_init(|| assemble::profile(&builtin.files()).map(Arc::new)).clone(),
+            Some(builtin) => {
+                let load = || first(check_files(&builtin.files(), None, 1)).map(Arc::new);
+                builtin.loaded.get_or_init(load).clone()
+            }
             None => Err(ProfileError::Unknown {
                 name: name.to_owned(),
                 closest: closest(name.trim(), Self::builtin_names()).unwrap_or_default().to_owned(),
@@ -131,12 +155,103 @@ impl Profile {
     ///
     /// [`ProfileError`]: a file is missing or cannot be read, or a line of it says something that cannot be.
     pub fn load(folder: &Path) -> Result<Self, ProfileError> {
-        assemble::profile(&Files {
-            manifest: read(folder, "profile.toml")?,
-            registers: read(folder, "registers.csv")?,
-            parameters: read(folder, "parameters.csv")?,
-            faults: read(folder, "faults.csv")?,
-        })
+        first(load(folder, 1))
+    }
+
+    /// All that is wrong with the profile in `folder`, each with file, line and reason; nothing if it is sound.
+    pub fn check(folder: &Path) -> Vec<ProfileError> {
+        load(folder, 1).err().unwrap_or_default()
+    }
+}
+
+fn first(loaded: Result<Profile, Vec<ProfileError>>) -> Result<Profile, ProfileError> {
+    loaded.map_err(|problems| {
+        let unknown = || ProfileError::Unreadable { file: "the profile".to_owned(), reason: "not loaded".to_owned() };
+        problems.into_iter().next().unwrap_or_else(unknown)
+    })
+}
+
+/// Loads the profile in `folder`, on `level` of those that lie one over the other, counted from the top.
+fn load(folder: &Path, level: usize) -> Result<Profile, Vec<ProfileError>> {
+    let manifest = read(folder, "profile.toml").map_err(|error| vec![error])?;
+    let table = |name: &str| folder.join(name).exists().then(|| read(folder, name)).transpose();
+    let mut problems = Problems::default();
+    let files = Files {
+        manifest,
+        registers: problems.keep(table("registers.csv")).flatten(),
+        parameters: problems.keep(table("parameters.csv")).flatten(),
+        faults: problems.keep(table("faults.csv")).flatten(),
+    };
+    if !problems.is_empty() {
+        return Err(problems.into_all());
+    }
+    check_files(&files, Some(folder), level)
+}
+
+/// Puts a profile together from `files`, and from the one below them.
+fn check_files(files: &Files, folder: Option<&Path>, level: usize) -> Result<Profile, Vec<ProfileError>> {
+    let file = &files.manifest;
+    let manifest = manifest::read(file).map_err(|error| vec![error])?;
+    let base = below(file, &manifest, folder, level)?;
+    let mut problems = Problems::default();
+    if base.is_none() {
+        let tables =
+            [("registers.csv", &files.registers), ("parameters.csv", &files.parameters), ("faults.csv", &files.faults)];
+        for (name, _) in tables.iter().filter(|(_, table)| table.is_none()) {
+            problems.keep::<()>(Err(ProfileError::Unreadable {
+                file: folder.map_or_else(|| name.into(), |folder| folder.join(name)).display().to_string(),
+                reason: "there is no such file; a table without rows has its first line only".to_owned(),
+            }));
+        }
+    }
+    let profile = assemble::profile(files, &manifest, base, &mut problems);
+    match profile {
+        Some(profile) if problems.is_empty() => Ok(profile),
+        _ => Err(problems.into_all()),
+    }
+}
+
+/// The profile that `manifest` extends or lies over.
+fn below(
+    file: &File,
+    manifest: &Manifest,
+    folder: Option<&Path>,
+    level: usize,
+) -> Result<Option<Profile>, Vec<ProfileError>> {
+    let name = match (&manifest.extends, &manifest.overlay) {
+        (Some(extends), None) => &extends.get_ref().profile,
+        (None, Some(overlay)) => &overlay.get_ref().profile,
+        (None, None) => return Ok(None),
+        (Some(_), Some(overlay)) => {
+            let reason = "a profile either extends another one or is an overlay, not both";
+            return Err(vec![file.broken(manifest::line(file, overlay), reason)]);
+        }
+    };
+    let line = manifest::line(file, name);
+    let wanted = name.get_ref();
+    if level >= MOST_LEVELS {
+        let reason =
+            format!("\"{wanted}\" would lie below {level} others; {MOST_LEVELS} are the most, and none itself");
+        return Err(vec![file.broken(line, reason)]);
+    }
+    if let Some(folder) = folder.filter(|_| wanted.contains(['/', '\\'])) {
+        let path = PathBuf::from(wanted);
+        let plain =
+            |part: Component<'_>| matches!(part, Component::Normal(_) | Component::ParentDir | Component::CurDir);
+        if !path.components().all(plain) {
+            let reason = format!("\"{wanted}\" must be a shipped name, or a folder relative to this one");
+            return Err(vec![file.broken(line, reason)]);
+        }
+        return load(&folder.join(path), level + 1).map(Some);
+    }
+    match Profile::builtin(wanted) {
+        Ok(base) => Ok(Some(Profile::clone(&base))),
+        Err(ProfileError::Unknown { closest, .. }) => {
+            let reason =
+                format!("no profile \"{wanted}\" is shipped; the closest is \"{closest}\", and a folder has a / in it");
+            Err(vec![file.broken(line, reason)])
+        }
+        Err(other) => Err(vec![other]),
     }
 }
 
@@ -144,8 +259,18 @@ impl Profile {
 fn read(folder: &Path, name: &str) -> Result<File, ProfileError> {
     let path = folder.join(name);
     let file = path.display().to_string();
-    let bytes = std::fs::read(&path)
-        .map_err(|error| ProfileError::Unreadable { file: file.clone(), reason: error.to_string() })?;
+    let unreadable = |reason: String| ProfileError::Unreadable { file: file.clone(), reason };
+    // A pipe or a device would be read for ever, or not at all.
+    let is_file = std::fs::metadata(&path).map_err(|error| unreadable(error.to_string()))?.is_file();
+    if !is_file {
+        return Err(unreadable("this is no file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    let opened = std::fs::File::open(&path).map_err(|error| unreadable(error.to_string()))?;
+    opened.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(error.to_string()))?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(unreadable(format!("the file has more than {MOST_BYTES} bytes")));
+    }
     match String::from_utf8(bytes) {
         Ok(text) => Ok(File { name: file, text }),
         Err(error) => {

@@ -33,9 +33,9 @@ pub enum NameError {
         /// The name as given.
         name: String,
     },
-    /// The address is the one through which a parameter is written to RAM.
-    #[error("{address:04X}H only writes {name} to RAM and cannot be read; name it {name}")]
-    RamOnly {
+    /// The address is one that says where a written parameter is kept.
+    #[error("{address:04X}H only writes {name}, and says where it is kept; name it {name}")]
+    WriteForm {
         /// The address.
         address: u16,
         /// The parameter behind it.
@@ -44,15 +44,16 @@ pub enum NameError {
 }
 
 impl Profile {
-    /// The entry with this name: a register's name, a parameter's code in upper or lower case (`p00.11`), or an address
-    /// in hex (`0x3004`, `3004H`).
+    /// The entry with this name: the name of a register or parameter, a parameter's code in upper or lower case
+    /// (`p00.11`), or an address in hex (`0x3004`, `3004H`).
     ///
     /// # Errors
     ///
     /// [`NameError`]: there is no such entry (the closest is named), or it is closed, or the address only writes.
     pub fn find(&self, name: &str) -> Result<&Entry, NameError> {
         let wanted = name.trim();
-        if let Some(entry) = self.entries().find(|entry| entry.name().eq_ignore_ascii_case(wanted)) {
+        let called = |name: &str| name.eq_ignore_ascii_case(wanted);
+        if let Some(entry) = self.entries().find(|entry| called(entry.name()) || entry.alias().is_some_and(called)) {
             return Ok(entry);
         }
         if let Some((group, index)) = parse_code(wanted) {
@@ -71,7 +72,7 @@ impl Profile {
         Err(NameError::Unknown {
             profile: self.name().to_owned(),
             name: name.to_owned(),
-            closest: closest(wanted, self.entries().map(Entry::name)).unwrap_or_default().to_owned(),
+            closest: closest(wanted, self.entries().flat_map(names)).unwrap_or_default().to_owned(),
         })
     }
 
@@ -80,15 +81,21 @@ impl Profile {
             return NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() };
         }
         match self.stored_address(address).and_then(|stored| self.entry_at(stored)) {
-            Some(entry) => NameError::RamOnly { address, name: entry.name().to_owned() },
+            Some(entry) => NameError::WriteForm { address, name: entry.name().to_owned() },
             None => NameError::UnknownAddress { profile: self.name().to_owned(), address },
         }
     }
 }
 
-/// Reads a parameter's code, `P05.06` or `p5.6`, as group and index.
+/// What an entry is called.
+pub(crate) fn names(entry: &Entry) -> impl Iterator<Item = &str> {
+    std::iter::once(entry.name()).chain(entry.alias())
+}
+
+/// Reads a parameter's code, `P05.06`, `p5.6` or, as some makers write what can only be read, `r25.00`, as group and
+/// index.
 pub(crate) fn parse_code(text: &str) -> Option<(u8, u8)> {
-    let (group, index) = text.strip_prefix(['P', 'p'])?.split_once('.')?;
+    let (group, index) = text.strip_prefix(['P', 'p', 'R', 'r'])?.split_once('.')?;
     let number = |digits: &str| match digits.len() {
         1 | 2 if digits.bytes().all(|digit| digit.is_ascii_digit()) => digits.parse().ok(),
         _ => None,

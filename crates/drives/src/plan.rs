@@ -20,6 +20,16 @@ pub struct ReadCost {
     pub word: u32,
 }
 
+/// What a drive allows in one read, and what reads cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ReadRules {
+    /// Most words.
+    pub(crate) max_words: u16,
+    /// Whether a read may run from one parameter group (the high byte of the address) into the next.
+    pub(crate) across_groups: bool,
+    pub(crate) cost: ReadCost,
+}
+
 /// The cheapest reads that hold all of `wanted`, in address order; of equally cheap plans, one with the fewest reads.
 ///
 /// A read has at most `max_words` words (at least 1 is assumed). It runs across addresses that were not asked for only
@@ -27,29 +37,38 @@ pub struct ReadCost {
 ///
 /// `wanted` may be in any order and repeat itself.
 pub fn plan_reads(wanted: &[u16], max_words: u16, cost: ReadCost, readable: impl Fn(u16) -> bool) -> Vec<ReadSpan> {
+    let wanted: Vec<_> = wanted.iter().map(|&address| ReadSpan { address, count: 1 }).collect();
+    plan_spans(&wanted, ReadRules { max_words, across_groups: true, cost }, readable)
+}
+
+/// As [`plan_reads`], for values of one word or more, none of which is cut in two. Those wanted must not overlap.
+pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(u16) -> bool) -> Vec<ReadSpan> {
     let mut wanted = wanted.to_vec();
     wanted.sort_unstable();
     wanted.dedup();
+    let last_of = |span: &ReadSpan| span.address + (span.count - 1);
 
-    // best[n] is the cheapest way to read the first n addresses: its cost, its number of reads, and where the last read
-    // begins. The last read can only begin at one of the addresses before, as long as it is short enough.
+    // best[n] is the cheapest way to read the first n values: its cost, its number of reads, and where the last read
+    // begins. The last read can only begin at one of the values before, as long as it is short enough.
     let mut best = vec![(0_u64, 0_usize, 0_usize)];
     for end in 1..=wanted.len() {
-        let last = wanted[end - 1];
+        let last = last_of(&wanted[end - 1]);
         let mut cheapest = None;
         for start in (0..end).rev() {
-            let first = wanted[start];
+            let first = wanted[start].address;
             let words = u64::from(last - first) + 1;
-            let hole = start + 1 < end && !(first + 1..wanted[start + 1]).all(&readable);
-            if words > u64::from(max_words.max(1)) || hole {
+            let hole = start + 1 < end && !(last_of(&wanted[start]) + 1..wanted[start + 1].address).all(&readable);
+            let crosses = !rules.across_groups && first >> 8 != last >> 8;
+            // One value alone is read, whatever the rules say: the drive is the one to refuse it.
+            if start + 1 < end && (words > u64::from(rules.max_words.max(1)) || hole || crosses) {
                 break;
             }
             let (before, reads, _) = best[start];
-            let total = before + u64::from(cost.request) + u64::from(cost.word) * words;
+            let total = before + u64::from(rules.cost.request) + u64::from(rules.cost.word) * words;
             let candidate = (total, reads + 1, start);
             cheapest = Some(cheapest.map_or(candidate, |known| candidate.min(known)));
         }
-        // One address alone always fits, so there is a cheapest one.
+        // One value alone always fits, so there is a cheapest one.
         best.extend(cheapest);
     }
 
@@ -57,7 +76,8 @@ pub fn plan_reads(wanted: &[u16], max_words: u16, cost: ReadCost, readable: impl
     let mut end = wanted.len();
     while end > 0 {
         let (_, _, start) = best[end];
-        spans.push(ReadSpan { address: wanted[start], count: wanted[end - 1] - wanted[start] + 1 });
+        let address = wanted[start].address;
+        spans.push(ReadSpan { address, count: last_of(&wanted[end - 1]) - address + 1 });
         end = start;
     }
     spans.reverse();

@@ -1,17 +1,33 @@
 //! Profiles: all that is known of one family of drives, and the questions it answers.
 //!
-//! How a profile comes into being is `load`'s business, how names are found `lookup`'s.
+//! How a profile comes into being is `load`'s business, how names are found `lookup`'s, what the family calls the things
+//! that every family has `roles`'.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::command::{Command, Control};
+use crate::command::{Command, CommandCode, Control};
 use crate::entry::{Access, AccessError, Entry, Kind, Store};
 use crate::fault::{Exception, Fault};
-use crate::plan::{ReadSpan, plan_reads};
-use crate::serial::SerialDefaults;
-use crate::state::State;
+use crate::identification::{Identification, Signature};
+use crate::memory::{Memory, MemoryBit};
+use crate::plan::{ReadRules, ReadSpan, plan_spans};
+use crate::roles::Roles;
+use crate::serial::{SerialDefaults, USUAL_READ_COST};
+use crate::setpoint::{Setpoint, SetpointRole};
+use crate::state::{State, StateWord};
+use crate::variant::Variant;
 use crate::watchdog::Watchdog;
+
+/// Whether a unit feeds a motor, or the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnitKind {
+    /// It turns a motor.
+    Inverter,
+    /// It makes the direct voltage from which inverters turn motors.
+    Rectifier,
+}
 
 /// What one family of drives means by its registers.
 ///
@@ -20,48 +36,74 @@ use crate::watchdog::Watchdog;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Profile {
     pub(crate) name: String,
+    pub(crate) family: String,
     pub(crate) title: String,
+    pub(crate) kind: UnitKind,
+    pub(crate) version: u32,
     pub(crate) source: String,
-    pub(crate) serial: SerialDefaults,
-    pub(crate) functions: Vec<u8>,
-    pub(crate) max_words: u16,
-    pub(crate) ram_mask: u16,
-    pub(crate) closed_groups: Vec<u8>,
-    /// Where a write does something, and is not simply kept.
-    pub(crate) acting: Vec<u16>,
+    pub(crate) serial: Option<SerialDefaults>,
+    pub(crate) requests: Requests,
+    pub(crate) memory: Option<Memory>,
+    pub(crate) groups: Groups,
     /// Registers first, then parameters, each in address order.
     pub(crate) entries: Vec<Entry>,
     /// Where in `entries` an address is.
     pub(crate) by_address: BTreeMap<u16, usize>,
-    pub(crate) identification_address: u16,
+    pub(crate) roles: Roles,
     pub(crate) identifications: Vec<Identification>,
-    pub(crate) command_address: u16,
-    pub(crate) commands: BTreeMap<Command, u16>,
+    pub(crate) signature: Option<Signature>,
+    pub(crate) command_address: Option<u16>,
+    pub(crate) commands: BTreeMap<Command, CommandCode>,
+    /// Codes that the family defines and that have no name here.
+    pub(crate) other_commands: BTreeMap<u16, String>,
+    /// Why some commands are not verified.
+    pub(crate) commands_note: String,
     pub(crate) moving: Vec<u16>,
-    pub(crate) state_address: u16,
-    pub(crate) states: BTreeMap<State, u16>,
+    pub(crate) state: Option<StateWord>,
     pub(crate) control: Vec<Control>,
-    pub(crate) monitor: Vec<u16>,
+    pub(crate) setpoints: BTreeMap<Setpoint, SetpointRole>,
+    pub(crate) variants: BTreeMap<String, Variant>,
+    /// What was said of the variants.
+    pub(crate) chosen: BTreeMap<String, String>,
+    pub(crate) monitor: Vec<String>,
     pub(crate) watchdog: Option<Watchdog>,
-    pub(crate) fault_history: Vec<u16>,
+    pub(crate) fault_history: Vec<String>,
+    pub(crate) fault_values: Vec<String>,
     pub(crate) faults: BTreeMap<u16, Fault>,
     pub(crate) exceptions: BTreeMap<u8, Exception>,
 }
 
-/// What an identification code says.
+/// What a drive takes as a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Identification {
-    /// The word in the identification register.
-    pub code: u16,
-    /// The family: the name its profile has, whether or not there is one.
-    pub family: String,
-    /// The series, for people.
-    pub title: String,
-    /// Whether a manual prints it.
+pub struct Requests {
+    /// The function codes that it takes.
+    pub functions: Vec<u8>,
+    /// Most words in one read or write, 1..=125.
+    pub max_words: u16,
+    /// Whether a read may run from one parameter group into the next.
+    pub across_groups: bool,
+    /// Whether documents of this family print all of this.
     pub verified: bool,
+    /// What to know about it; says what is assumed where it is not verified.
+    pub note: String,
     /// Where it is printed.
     pub source: String,
+}
+
+/// Parameters that need care, by code.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Groups {
+    /// Groups that the maker keeps closed.
+    pub(crate) closed: Vec<u8>,
+    /// Their write does something, and is not simply kept.
+    pub(crate) acts: Vec<String>,
+    /// They set the line.
+    pub(crate) serial: Vec<String>,
+    /// They describe the motor.
+    pub(crate) motor: Vec<String>,
+    /// They are to be written last, in this order.
+    pub(crate) last: Vec<String>,
 }
 
 impl Profile {
@@ -70,9 +112,24 @@ impl Profile {
         &self.name
     }
 
+    /// The family: its own name, or for an overlay that of the profile below it.
+    pub fn family(&self) -> &str {
+        &self.family
+    }
+
     /// Its name for people: `INVT Goodrive350`.
     pub fn title(&self) -> &str {
         &self.title
+    }
+
+    /// Whether it feeds a motor.
+    pub fn kind(&self) -> UnitKind {
+        self.kind
+    }
+
+    /// The version of the profile itself.
+    pub fn version(&self) -> u32 {
+        self.version
     }
 
     /// The document it rests on.
@@ -80,19 +137,29 @@ impl Profile {
         &self.source
     }
 
-    /// How the line of a drive fresh from the factory is set.
-    pub fn serial(&self) -> &SerialDefaults {
-        &self.serial
+    /// How the line of a drive fresh from the factory is set, where that is printed.
+    pub fn serial(&self) -> Option<&SerialDefaults> {
+        self.serial.as_ref()
+    }
+
+    /// What the drive takes as a request.
+    pub fn requests(&self) -> &Requests {
+        &self.requests
     }
 
     /// The function codes that the drive takes.
     pub fn functions(&self) -> &[u8] {
-        &self.functions
+        &self.requests.functions
     }
 
     /// Most words in one read or write, 1..=125.
     pub fn max_words(&self) -> u16 {
-        self.max_words
+        self.requests.max_words
+    }
+
+    /// How the family says where a written parameter is kept; `None` where every write may wear EEPROM.
+    pub fn memory(&self) -> Option<&Memory> {
+        self.memory.as_ref()
     }
 
     /// Every register in address order, then every parameter in address order.
@@ -105,18 +172,52 @@ impl Profile {
         self.by_address.get(&address).and_then(|&index| self.entries.get(index))
     }
 
+    /// The entry whose name or code is `name`, letter by letter.
+    pub(crate) fn entry(&self, name: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.name == name || entry.alias.as_deref() == Some(name))
+    }
+
+    fn entries_of<'a>(&'a self, names: &'a [String]) -> impl Iterator<Item = &'a Entry> {
+        names.iter().filter_map(|name| self.entry(name))
+    }
+
+    /// The address that reads `entry`.
+    ///
+    /// # Errors
+    ///
+    /// [`AccessError::NoAddress`]: nobody knows where it is.
+    pub fn read_address(&self, entry: &Entry) -> Result<u16, AccessError> {
+        entry.address.ok_or_else(|| AccessError::NoAddress {
+            name: entry.name.clone(),
+            label: entry.label.clone(),
+            note: entry.note.clone(),
+        })
+    }
+
     /// The address that writes `entry`, kept where `store` says.
     ///
     /// # Errors
     ///
-    /// [`AccessError`]: the entry can only be read, or it is a register and EEPROM is asked for.
+    /// [`AccessError`]: the entry can only be read, its address is not known, it is a register and EEPROM is asked for,
+    /// or the family knows no write to RAM only.
     pub fn write_address(&self, entry: &Entry, store: Store) -> Result<u16, AccessError> {
         let (name, label) = (entry.name.clone(), entry.label.clone());
-        match (entry.access, entry.kind, store) {
-            (Access::Ro, _, _) => Err(AccessError::ReadOnly { name, label }),
-            (_, Kind::Register, Store::Eeprom) => Err(AccessError::NotStored { name, label }),
-            (_, Kind::Register, Store::Ram) | (_, Kind::Parameter, Store::Eeprom) => Ok(entry.address),
-            (_, Kind::Parameter, Store::Ram) => Ok(entry.address | self.ram_mask),
+        let plain = self.read_address(entry)?;
+        if entry.access == Access::Ro {
+            return Err(AccessError::ReadOnly { name, label });
+        }
+        if entry.kind == Kind::Register {
+            return match store {
+                Store::Ram => Ok(plain),
+                Store::Eeprom => Err(AccessError::NotStored { name, label }),
+            };
+        }
+        match (self.memory.as_ref().map(|memory| (memory.means, memory.mask())), store) {
+            (None, Store::Ram) => Err(AccessError::NoRam { name, label }),
+            (Some((MemoryBit::Ram, bit)), Store::Ram) | (Some((MemoryBit::Eeprom, bit)), Store::Eeprom) => {
+                Ok(plain | bit)
+            }
+            (None | Some((MemoryBit::Ram, _)), Store::Eeprom) | (Some((MemoryBit::Eeprom, _)), Store::Ram) => Ok(plain),
         }
     }
 
@@ -125,25 +226,25 @@ impl Profile {
     /// `None` where that would not tell: it cannot be read, or its write does something, so that something else may
     /// stand there afterwards.
     pub fn read_back(&self, entry: &Entry) -> Option<u16> {
-        let kept = entry.access != Access::Wo && !self.acting.contains(&entry.address);
-        (kept && !self.is_command(entry.address)).then_some(entry.address)
+        let acts = self.groups.acts.contains(&entry.name);
+        entry.address.filter(|&address| entry.access != Access::Wo && !acts && !self.is_command(address))
     }
 
-    /// The plain address behind one that writes to RAM only (000BH for 800BH), whether or not something is there.
-    /// `None` if `address` is no such address.
+    /// The bit of a parameter's address that is about memory, and not about where it is; 0 where there is none.
+    fn memory_mask(&self) -> u16 {
+        self.memory.as_ref().map_or(0, Memory::mask)
+    }
+
+    /// The plain address behind one with the memory bit (000BH for 800BH), whether or not something is there. `None` if
+    /// `address` is no such address.
     pub fn stored_address(&self, address: u16) -> Option<u16> {
-        (address & self.ram_mask != 0).then_some(address & !self.ram_mask)
+        (address & self.memory_mask() != 0).then_some(address & !self.memory_mask())
     }
 
     /// Whether `address`, or its plain form, is in a parameter group that the maker keeps closed.
     pub fn is_closed(&self, address: u16) -> bool {
-        let [group, _] = (address & !self.ram_mask).to_be_bytes();
-        self.closed_groups.contains(&group)
-    }
-
-    /// Where the drive says what it is.
-    pub fn identification_address(&self) -> u16 {
-        self.identification_address
+        let [group, _] = (address & !self.memory_mask()).to_be_bytes();
+        self.groups.closed.contains(&group)
     }
 
     /// What the identification code `code` says; `None` if this profile does not know it.
@@ -156,40 +257,77 @@ impl Profile {
         &self.identifications
     }
 
-    /// Address and word of a command; `None` if the family has no such command.
+    /// How a unit of this family that has no code can be told by what it answers and refuses.
+    pub fn signature(&self) -> Option<&Signature> {
+        self.signature.as_ref()
+    }
+
+    /// Address and word of a command, whether or not it is verified; `None` if the family has no such command.
     pub fn command(&self, command: Command) -> Option<(u16, u16)> {
-        self.commands.get(&command).map(|&code| (self.command_address, code))
+        Some((self.command_address?, self.commands.get(&command)?.code))
+    }
+
+    /// Why `command` is not verified; `None` where it is, or where there is no such command.
+    pub fn command_note(&self, command: Command) -> Option<&str> {
+        self.commands.get(&command).filter(|known| !known.verified).map(|_| self.commands_note.as_str())
+    }
+
+    /// The commands of the family, with their words.
+    pub fn commands(&self) -> &BTreeMap<Command, CommandCode> {
+        &self.commands
+    }
+
+    /// Every word that the family defines at its command register, and what it means.
+    pub fn command_codes(&self) -> BTreeMap<u16, &str> {
+        let named = self.commands.iter().map(|(command, known)| (known.code, command.name()));
+        let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
+        others.chain(named).collect()
     }
 
     /// The command that `raw` means at the command register.
     pub fn command_of(&self, raw: u16) -> Option<Command> {
-        self.commands.iter().find(|&(_, &code)| code == raw).map(|(&command, _)| command)
+        self.commands.iter().find(|&(_, known)| known.code == raw).map(|(&command, _)| command)
+    }
+
+    /// Where commands are written.
+    pub fn command_address(&self) -> Option<u16> {
+        self.command_address
     }
 
     /// Whether a write to `address` can start a motor or put current into it. Setpoints cannot: they change the speed of
     /// a motor that runs already.
     pub fn is_command(&self, address: u16) -> bool {
-        self.moving.contains(&(address & !self.ram_mask))
+        self.moving.contains(&(address & !self.memory_mask()))
     }
 
-    /// Where the drive says what the motor does.
-    pub fn state_address(&self) -> u16 {
-        self.state_address
+    /// How the family says what its motor does, where that is known.
+    pub fn state_word(&self) -> Option<&StateWord> {
+        self.state.as_ref()
     }
 
     /// What the state word `raw` means.
     pub fn state(&self, raw: u16) -> State {
-        self.states.iter().find(|&(_, &code)| code == raw).map_or(State::Unknown, |(&state, _)| state)
-    }
-
-    /// The state word for `state`, where the family has one.
-    pub fn state_code(&self, state: State) -> Option<u16> {
-        self.states.get(&state).copied()
+        self.state.as_ref().map_or(State::Unknown, |word| word.state(raw))
     }
 
     /// What must be set before the drive obeys the bus, in order.
     pub fn control(&self) -> &[Control] {
         &self.control
+    }
+
+    /// What can be given over the bus beside commands.
+    pub fn setpoints(&self) -> &BTreeMap<Setpoint, SetpointRole> {
+        &self.setpoints
+    }
+
+    /// The parameters that decide what some registers mean.
+    pub fn variants(&self) -> &BTreeMap<String, Variant> {
+        &self.variants
+    }
+
+    /// What was [chosen](Self::with_variants) of the variants.
+    pub fn chosen(&self) -> &BTreeMap<String, String> {
+        &self.chosen
     }
 
     /// What makes the drive act by itself when the bus falls silent; `None` where the family has no such thing.
@@ -199,12 +337,37 @@ impl Profile {
 
     /// Where the drive keeps its last faults, the latest first; none where it keeps none.
     pub fn fault_history(&self) -> impl Iterator<Item = &Entry> {
-        self.fault_history.iter().filter_map(|&address| self.entry_at(address))
+        self.entries_of(&self.fault_history)
+    }
+
+    /// Where the drive keeps what it measured when it tripped last; none where it keeps none.
+    pub fn fault_values(&self) -> impl Iterator<Item = &Entry> {
+        self.entries_of(&self.fault_values)
     }
 
     /// The registers that a monitor shows when it is not told what to show.
     pub fn monitor(&self) -> impl Iterator<Item = &Entry> {
-        self.monitor.iter().filter_map(|&address| self.entry_at(address))
+        self.entries_of(&self.monitor)
+    }
+
+    /// The parameters whose write does something and is not simply kept: it tunes the motor, or checks a password.
+    pub fn acting(&self) -> impl Iterator<Item = &Entry> {
+        self.entries_of(&self.groups.acts)
+    }
+
+    /// The parameters that set the line.
+    pub fn serial_parameters(&self) -> impl Iterator<Item = &Entry> {
+        self.entries_of(&self.groups.serial)
+    }
+
+    /// The parameters that describe the motor.
+    pub fn motor_parameters(&self) -> impl Iterator<Item = &Entry> {
+        self.entries_of(&self.groups.motor)
+    }
+
+    /// The parameters that are to be written last of many, in this order.
+    pub fn last_parameters(&self) -> impl Iterator<Item = &Entry> {
+        self.entries_of(&self.groups.last)
     }
 
     /// The fault with the number `code`; one that says so if it is unknown.
@@ -222,24 +385,40 @@ impl Profile {
         self.exceptions.get(&code).map_or_else(|| Cow::Owned(Exception::unknown(code)), Cow::Borrowed)
     }
 
+    /// Every exception that is documented, by code.
+    pub fn exceptions(&self) -> impl Iterator<Item = &Exception> {
+        self.exceptions.values()
+    }
+
     /// The cheapest reads that hold all of `entries`, on a line as the factory sets it.
     ///
     /// That is nearly always the smallest number of reads, because a request costs as much as a dozen words or more. A
     /// read runs across what was not asked for only if the profile [knows it to be
-    /// readable](Entry::is_known_readable).
+    /// readable](Entry::is_known_readable), and into another group only where the family allows that.
     ///
     /// # Errors
     ///
-    /// [`AccessError`]: one of them can only be written.
+    /// [`AccessError`]: one of them can only be written, or nobody knows where it is.
     pub fn plan<'a>(&self, entries: impl IntoIterator<Item = &'a Entry>) -> Result<Vec<ReadSpan>, AccessError> {
         let wanted = entries
             .into_iter()
             .map(|entry| match entry.access {
                 Access::Wo => Err(AccessError::WriteOnly { name: entry.name.clone(), label: entry.label.clone() }),
-                _ => Ok(entry.address),
+                _ => Ok(ReadSpan { address: self.read_address(entry)?, count: entry.words() }),
             })
-            .collect::<Result<Vec<u16>, AccessError>>()?;
-        let readable = |address| self.entry_at(address).is_some_and(Entry::is_known_readable);
-        Ok(plan_reads(&wanted, self.max_words, self.serial.read_cost(), readable))
+            .collect::<Result<Vec<ReadSpan>, AccessError>>()?;
+        // The second word of a wide entry is nobody's own.
+        let covers = |address: u16| {
+            let (_, &index) = self.by_address.range(..=address).next_back()?;
+            self.entries.get(index).filter(|entry| {
+                entry.address.is_some_and(|first| u32::from(address) < u32::from(first) + u32::from(entry.words()))
+            })
+        };
+        let rules = ReadRules {
+            max_words: self.requests.max_words,
+            across_groups: self.requests.across_groups,
+            cost: self.serial.as_ref().map_or(USUAL_READ_COST, SerialDefaults::read_cost),
+        };
+        Ok(plan_spans(&wanted, rules, |address| covers(address).is_some_and(Entry::is_known_readable)))
     }
 }

@@ -1,6 +1,6 @@
 //! Quantities: what a word measures, counts or names, and exact conversion both ways.
 //!
-//! Knows one word at a time; knows nothing of addresses or of who may write.
+//! Knows one value at a time; knows nothing of addresses or of who may write.
 
 use std::collections::BTreeMap;
 
@@ -14,11 +14,15 @@ pub struct Quantity {
     pub(crate) unit: String,
     pub(crate) decimals: Option<u8>,
     pub(crate) signed: bool,
-    pub(crate) low: Option<i32>,
-    pub(crate) high: Option<i32>,
+    /// Whether it takes two words, the low one first.
+    pub(crate) wide: bool,
+    pub(crate) low: Option<i64>,
+    pub(crate) high: Option<i64>,
     pub(crate) low_from: Option<String>,
     pub(crate) high_from: Option<String>,
     pub(crate) choices: BTreeMap<u16, String>,
+    /// What decides unit, scale and range.
+    pub(crate) variant: Option<String>,
 }
 
 impl Quantity {
@@ -36,6 +40,21 @@ impl Quantity {
     /// Digits after the point.
     pub fn decimals(&self) -> u8 {
         self.decimals.unwrap_or(0)
+    }
+
+    /// How many words it takes: 1, or 2 of which the first is the low one.
+    pub fn words(&self) -> u16 {
+        if self.wide { 2 } else { 1 }
+    }
+
+    /// The [variant](crate::Variant) that decides unit, scale and range, if one does.
+    pub fn variant(&self) -> Option<&str> {
+        self.variant.as_deref()
+    }
+
+    /// Whether a variant decides what it is, and nobody has said which: then values are counts, and none can be encoded.
+    pub fn is_undecided(&self) -> bool {
+        self.variant.is_some() && self.decimals.is_none()
     }
 
     /// Whether words are two's complement.
@@ -75,14 +94,36 @@ impl Quantity {
 
     /// The value of `raw`. Every word has one, in range or not.
     pub fn decode(&self, raw: u16) -> Value {
-        self.value(if self.signed { i32::from(raw.cast_signed()) } else { i32::from(raw) })
+        self.value(if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) })
+    }
+
+    /// The value of `words`, which has [as many](Self::words) as it takes, the low one first; `None` if it has not.
+    pub fn decode_words(&self, words: &[u16]) -> Option<Value> {
+        match (self.wide, words) {
+            (false, &[word]) => Some(self.decode(word)),
+            (true, &[low, high]) => {
+                let raw = u32::from(high) << 16 | u32::from(low);
+                Some(self.value(if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) }))
+            }
+            _ => None,
+        }
     }
 
     /// The word for `input`; `name` is for the error.
     pub(crate) fn encode(&self, name: &str, input: &Input<'_>) -> Result<u16, ValueError> {
+        if let Some(variant) = self.variant.as_ref().filter(|_| self.is_undecided()) {
+            return Err(ValueError::Undecided {
+                name: name.to_owned(),
+                value: input.to_string(),
+                variant: variant.clone(),
+            });
+        }
+        if self.wide {
+            return Err(ValueError::TwoWords { name: name.to_owned() });
+        }
         let counts = self.counts(name, input)?;
         let (low, high) = self.bounds();
-        let within = |count: i64| i64::from(low) <= count && count <= i64::from(high);
+        let within = |count: i64| low <= count && count <= high;
         match counts {
             // A count within bounds fits the word: the loader checked the bounds.
             Counts::Whole(count) if within(count) => Ok(to_word(count)),
@@ -136,19 +177,24 @@ impl Quantity {
     }
 
     /// The lowest and the highest count: as documented, or what a word can hold.
-    fn bounds(&self) -> (i32, i32) {
-        let (least, most) = word_limits(self.signed);
+    fn bounds(&self) -> (i64, i64) {
+        let (least, most) = limits(self.signed, self.wide);
         (self.low.unwrap_or(least), self.high.unwrap_or(most))
     }
 
-    fn value(&self, count: i32) -> Value {
+    fn value(&self, count: i64) -> Value {
         Value::new(count, self.decimals())
     }
 }
 
-/// The least and the greatest count that a word holds.
-pub(crate) fn word_limits(signed: bool) -> (i32, i32) {
-    if signed { (i32::from(i16::MIN), i32::from(i16::MAX)) } else { (0, i32::from(u16::MAX)) }
+/// The least and the greatest count that a word holds, or two.
+pub(crate) fn limits(signed: bool, wide: bool) -> (i64, i64) {
+    match (signed, wide) {
+        (true, false) => (i64::from(i16::MIN), i64::from(i16::MAX)),
+        (false, false) => (0, i64::from(u16::MAX)),
+        (true, true) => (i64::from(i32::MIN), i64::from(i32::MAX)),
+        (false, true) => (0, i64::from(u32::MAX)),
+    }
 }
 
 /// The two's complement word of `count`, which must be within -32768..=65535.

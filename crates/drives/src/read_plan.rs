@@ -20,7 +20,7 @@ pub struct ReadPlan {
 /// One entry of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Field {
-    /// Where its word is.
+    /// Where its first word is.
     position: usize,
     quantity: Quantity,
 }
@@ -45,8 +45,11 @@ impl Profile {
         };
         let fields = entries
             .iter()
-            .map(|entry| Field { position: position(entry.address()), quantity: entry.quantity().clone() })
-            .collect();
+            .map(|entry| {
+                let position = position(self.read_address(entry)?);
+                Ok(Field { position, quantity: entry.quantity().clone() })
+            })
+            .collect::<Result<_, AccessError>>()?;
         Ok(ReadPlan { reads, fields })
     }
 }
@@ -65,7 +68,8 @@ impl ReadPlan {
     /// The value of each entry in `words`, which holds those of all reads; none of an entry whose word is missing.
     pub fn values(&self, words: &[u16]) -> impl Iterator<Item = (&Quantity, Option<Value>)> {
         self.fields.iter().map(|field| {
-            let value = words.get(field.position).map(|&word| field.quantity.decode(word));
+            let end = field.position + usize::from(field.quantity.words());
+            let value = words.get(field.position..end).and_then(|words| field.quantity.decode_words(words));
             (&field.quantity, value)
         })
     }

@@ -38,3 +38,38 @@ impl State {
         }
     }
 }
+
+/// How a family says what its motor does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StateWord {
+    /// The register's name.
+    pub register: String,
+    /// Which words mean which state; the first that fits holds.
+    pub rules: Vec<StateRule>,
+    /// Whether a document of this family prints it.
+    pub verified: bool,
+    /// What to know about it; says what is assumed where it is not verified.
+    pub note: String,
+    /// Where it is printed.
+    pub source: String,
+}
+
+/// One way to tell a state: the bits of `mask` are those of `value`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StateRule {
+    /// The state.
+    pub state: State,
+    /// The bits that tell it.
+    pub mask: u16,
+    /// What they are.
+    pub value: u16,
+}
+
+impl StateWord {
+    /// What the word `raw` means.
+    pub fn state(&self, raw: u16) -> State {
+        self.rules.iter().find(|rule| raw & rule.mask == rule.value).map_or(State::Unknown, |rule| rule.state)
+    }
+}

@@ -5,30 +5,32 @@ use std::fmt;
 /// An exact value: `count / 10^decimals`. `Display` prints every decimal: `10.00`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Value {
-    count: i32,
+    count: i64,
     decimals: u8,
 }
 
 impl Value {
-    pub(crate) fn new(count: i32, decimals: u8) -> Self {
+    pub(crate) fn new(count: i64, decimals: u8) -> Self {
         Self { count, decimals }
     }
 
     /// The counts, with their sign.
-    pub fn count(self) -> i32 {
+    pub fn count(self) -> i64 {
         self.count
     }
 
     /// The float closest to this value. It prints with no more digits than the value has.
     pub fn to_f64(self) -> f64 {
-        // Both are whole and exact, so the one division is correctly rounded.
-        f64::from(self.count) / f64::from(10_u32.pow(u32::from(self.decimals)))
+        // 32 bits at most, so both are exact and the one division is correctly rounded.
+        #[expect(clippy::cast_precision_loss, reason = "a count has 32 bits at most")]
+        let count = self.count as f64;
+        count / f64::from(10_u32.pow(u32::from(self.decimals)))
     }
 }
 
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let scale = 10_u32.pow(u32::from(self.decimals));
+        let scale = 10_u64.pow(u32::from(self.decimals));
         let magnitude = self.count.unsigned_abs();
         let sign = if self.count < 0 { "-" } else { "" };
         if self.decimals == 0 {
@@ -116,6 +118,22 @@ pub enum ValueError {
         value: String,
         /// The label closest to it.
         closest: String,
+    },
+    /// The value takes two words, and can only be read.
+    #[error("{name} takes two words, and can only be read")]
+    TwoWords {
+        /// What was to be set.
+        name: String,
+    },
+    /// A parameter of the drive decides what the register means, and nobody has said which it is.
+    #[error("{name} = {value}: its unit depends on the setting \"{variant}\" of the drive, which is not known here")]
+    Undecided {
+        /// What was to be set.
+        name: String,
+        /// The value as given.
+        value: String,
+        /// The variant.
+        variant: String,
     },
     /// The value lies outside the range.
     #[error("{name} = {value}{}: out of range, allowed is {limits}", spaced(&limits.unit))]

@@ -14,6 +14,8 @@ pub struct Watchdog {
     pub stop: Option<u16>,
     /// Whether a document of this family prints all of it.
     pub verified: bool,
+    /// What to know about it; may be empty.
+    pub note: String,
     /// Where it is printed.
     pub source: String,
 }

@@ -103,7 +103,7 @@ fn registers_are_those_of_the_manual() {
         listed.push(hex(address));
     }
     let registers = profile.entries().filter(|entry| entry.kind() == Kind::Register);
-    assert_eq!(registers.map(Entry::address).collect::<Vec<_>>(), listed);
+    assert_eq!(registers.filter_map(Entry::address).collect::<Vec<_>>(), listed);
     assert_eq!(listed.len(), 43);
 }
 
@@ -113,11 +113,11 @@ fn parameters_have_the_address_of_group_and_index() {
     let words: Vec<&str> = PARAMETERS.split_whitespace().collect();
     let listed: Vec<(&str, u16)> = words.chunks_exact(2).map(|pair| (pair[0], hex(pair[1]))).collect();
     let parameters = profile.entries().filter(|entry| entry.kind() == Kind::Parameter);
-    assert_eq!(parameters.map(|entry| (entry.name(), entry.address())).collect::<Vec<_>>(), listed);
+    assert_eq!(parameters.map(|entry| (entry.name(), entry.address().unwrap())).collect::<Vec<_>>(), listed);
     assert_eq!(listed.len(), 54);
     for (code, address) in [("P05.06", 0x0506), ("P10.01", 0x0A01), ("P07.27", 0x071B), ("P00.07", 0x0007)] {
         if let Ok(entry) = profile.find(code) {
-            assert_eq!(entry.address(), address);
+            assert_eq!(entry.address(), Some(address));
         }
     }
 }
@@ -191,7 +191,7 @@ fn faults_are_numbered_as_in_the_lists() {
     );
     // Numbers 1 to 10 and readings of mnemonics rest on no GD350 page.
     for (code, verified) in [(1, false), (10, false), (11, true), (18, true), (35, true), (37, false), (70, false)] {
-        assert_eq!(profile.fault(code).verified, verified, "fault {code}");
+        assert_eq!(profile.fault(code).verified(), verified, "fault {code}");
     }
     assert_eq!(profile.fault(999).label, "Unknown fault 999");
 }
@@ -226,7 +226,6 @@ fn commands_and_states_are_those_of_section_9_4_5() {
         (7, State::Unknown),
     ] {
         assert_eq!(profile.state(raw), state);
-        assert_eq!(profile.state_code(state), (state != State::Unknown).then_some(raw));
     }
     let moving: Vec<u16> = (0..=u16::MAX).filter(|&address| address < 0x8000 && profile.is_command(address)).collect();
     assert_eq!(moving, [0x2000, 0x2009, 0x200A]);
@@ -263,9 +262,9 @@ fn bits_of_status_word_2_are_those_of_the_manual() {
 fn rules_are_those_of_the_manual() {
     let profile = gd350();
     assert_eq!((profile.max_words(), profile.functions()), (16, [0x03, 0x06, 0x08, 0x10].as_slice()));
-    let serial = profile.serial();
+    let serial = profile.serial().unwrap();
     assert_eq!((serial.baud_rate, serial.data_bits, serial.parity, serial.stop_bits), (19_200, 8, 'E', 1));
-    assert_eq!((serial.unit, serial.bits_per_char(), serial.verified), (1, 11, false));
+    assert_eq!((serial.unit, serial.bits_per_char(), serial.verified), (Some(1), 11, false));
 
     let acceleration = profile.find("P00.11").unwrap();
     assert_eq!(profile.write_address(acceleration, Store::Ram), Ok(0x800B));
@@ -290,16 +289,16 @@ fn rules_are_those_of_the_manual() {
     let control: Vec<(&str, u16, bool)> =
         profile.control().iter().map(|row| (&*row.code, row.raw, row.verified)).collect();
     assert_eq!(control, [("P00.01", 2, true), ("P00.02", 0, false), ("P00.06", 8, true)]);
-    let monitor: Vec<u16> = profile.monitor().map(Entry::address).collect();
+    let monitor: Vec<u16> = profile.monitor().filter_map(Entry::address).collect();
     assert_eq!(monitor, (0x3000..=0x3016).collect::<Vec<u16>>());
-    let history: Vec<u16> = profile.fault_history().map(Entry::address).collect();
+    let history: Vec<u16> = profile.fault_history().filter_map(Entry::address).collect();
     assert_eq!(history, (0x071B..=0x0720).collect::<Vec<u16>>());
 }
 
 #[test]
 fn identification_codes_are_those_of_the_lists() {
     let profile = gd350();
-    assert_eq!(profile.identification_address(), 0x2103);
+    assert_eq!(profile.role("identification").unwrap().address(), Some(0x2103));
     for (code, family) in [
         (0x0106, "gd20"),
         (0x0108, "gd35"),
@@ -350,7 +349,7 @@ fn every_row_names_its_source_and_every_doubt_its_reason() {
     }
     for fault in profile.faults() {
         assert!(!fault.source.is_empty(), "fault {}", fault.code);
-        assert!(fault.verified || !fault.note.is_empty(), "fault {}", fault.code);
+        assert!(fault.verified() || !fault.note.is_empty(), "fault {}", fault.code);
     }
 }
 

@@ -17,7 +17,7 @@ fn registers_codes_and_addresses_are_found() {
         ("P0.11", 0x000B),
         ("0x000B", 0x000B),
     ] {
-        assert_eq!(profile.find(name).unwrap().address(), address, "{name:?}");
+        assert_eq!(profile.find(name).unwrap().address(), Some(address), "{name:?}");
     }
 }
 
@@ -40,7 +40,7 @@ fn what_is_not_found_is_explained() {
     assert!(matches!(profile.find("0x6301"), Err(NameError::Closed { .. })));
     assert!(matches!(profile.find("0x1234"), Err(NameError::UnknownAddress { address: 0x1234, .. })));
     let error = profile.find("8007H").unwrap_err();
-    assert_eq!(error, NameError::RamOnly { address: 0x8007, name: "P00.07".to_owned() });
+    assert_eq!(error, NameError::WriteForm { address: 0x8007, name: "P00.07".to_owned() });
 }
 
 #[test]

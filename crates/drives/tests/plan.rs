@@ -104,7 +104,7 @@ fn a_gd350_is_read_in_few_requests() {
     assert_eq!(plan(&["P00.12", "P00.14"]), [(0x000C, 1), (0x000E, 1)]);
     assert_eq!(plan(&[]), []);
     // At 19200 8E1 with 5 ms delay: 20 characters of 11 bits and 96 bit times for a request, 22 for a word.
-    assert_eq!(profile.serial().read_cost(), ReadCost { request: 316, word: 22 });
+    assert_eq!(profile.serial().unwrap().read_cost(), ReadCost { request: 316, word: 22 });
 }
 
 #[test]

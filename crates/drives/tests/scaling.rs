@@ -4,12 +4,12 @@ use drivebus_drives::{Entry, Input, Profile, Value, ValueError};
 use proptest::prelude::*;
 
 /// The number that `raw` means in counts, worked out beside the code under test.
-fn counts(entry: &Entry, raw: u16) -> i32 {
-    let count = i32::from(raw);
+fn counts(entry: &Entry, raw: u16) -> i64 {
+    let count = i64::from(raw);
     if entry.quantity().is_signed() && count >= 0x8000 { count - 0x1_0000 } else { count }
 }
 
-fn is_allowed(entry: &Entry, count: i32) -> bool {
+fn is_allowed(entry: &Entry, count: i64) -> bool {
     let quantity = entry.quantity();
     quantity.low().is_none_or(|low| low.count() <= count) && quantity.high().is_none_or(|high| count <= high.count())
 }
@@ -123,8 +123,8 @@ proptest! {
         let quantity = entry.quantity();
         let step = 1000 / i64::from(quantity.scale().unwrap_or(1));
         let (least, most) = if quantity.is_signed() { (-32_768, 32_767) } else { (0, 65_535) };
-        let low = step * quantity.low().map_or(least, |low| i64::from(low.count()));
-        let high = step * quantity.high().map_or(most, |high| i64::from(high.count()));
+        let low = step * quantity.low().map_or(least, Value::count);
+        let high = step * quantity.high().map_or(most, Value::count);
 
         let text = written(thousandths);
         let by_text = entry.encode(text.as_str());
@@ -132,15 +132,15 @@ proptest! {
         match by_text {
             Ok(raw) => {
                 prop_assert!(low <= thousandths && thousandths <= high);
-                prop_assert_eq!(i64::from(counts(entry, raw)) * step, thousandths);
+                prop_assert_eq!(counts(entry, raw) * step, thousandths);
             }
             Err(ValueError::OutOfRange { limits, .. }) => {
                 prop_assert!(thousandths < low || high < thousandths);
-                prop_assert_eq!(i64::from(limits.low.count()) * step, low);
-                prop_assert_eq!(i64::from(limits.high.count()) * step, high);
+                prop_assert_eq!(limits.low.count() * step, low);
+                prop_assert_eq!(limits.high.count() * step, high);
             }
             Err(ValueError::SurplusDigits { below, above, .. }) => {
-                let steps = |value: Value| i64::from(value.count()) * step;
+                let steps = |value: Value| value.count() * step;
                 prop_assert!(low <= steps(below) && steps(below) < thousandths);
                 prop_assert!(thousandths < steps(above) && steps(above) <= high);
                 prop_assert_eq!(steps(above) - steps(below), step);

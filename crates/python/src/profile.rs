@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Fault, Input, Kind, Quantity, Store, Value};
+use drivebus_drives::{
+    self as drives, Command, Control, Counts, Entry, Fault, Input, Kind, MemoryBit, ProfileError, Quantity, Setpoint,
+    Store, UnitKind, Value,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyString};
 
@@ -32,14 +35,72 @@ impl Profile {
     #[staticmethod]
     #[pyo3(signature = (folder, /))]
     fn load(py: Python<'_>, folder: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let path: PathBuf =
-            folder.extract().map_err(|_| not_allowed(format!("folder {} is no path", shown(folder))))?;
+        let path = path(folder)?;
         py.detach(|| drives::Profile::load(&path)).map(|profile| Self(Arc::new(profile))).map_err(refuse)
+    }
+
+    /// All that is wrong with a folder: file, line and reason of each; a file that cannot be read has no line.
+    #[staticmethod]
+    #[pyo3(signature = (folder, /))]
+    fn check(py: Python<'_>, folder: &Bound<'_, PyAny>) -> PyResult<Vec<(String, Option<u64>, String)>> {
+        let path = path(folder)?;
+        let problems = py.detach(|| drives::Profile::check(&path));
+        Ok(problems.into_iter().map(problem).collect())
     }
 
     #[getter]
     fn name(&self) -> &str {
         self.0.name()
+    }
+
+    #[getter]
+    fn family(&self) -> &str {
+        self.0.family()
+    }
+
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.0.kind() {
+            UnitKind::Inverter => "inverter",
+            UnitKind::Rectifier => "rectifier",
+        }
+    }
+
+    #[getter]
+    fn version(&self) -> u32 {
+        self.0.version()
+    }
+
+    #[getter]
+    fn source(&self) -> &str {
+        self.0.source()
+    }
+
+    #[getter]
+    fn functions(&self) -> Vec<u16> {
+        self.0.functions().iter().map(|&function| function.into()).collect()
+    }
+
+    fn requests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let requests = self.0.requests();
+        let dict = PyDict::new(py);
+        dict.set_item("across_groups", requests.across_groups)?;
+        dict.set_item("verified", requests.verified)?;
+        dict.set_item("note", &requests.note)?;
+        dict.set_item("source", &requests.source)?;
+        Ok(dict)
+    }
+
+    fn serial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(serial) = self.0.serial() else { return Ok(None) };
+        let dict = PyDict::new(py);
+        dict.set_item("baud_rate", serial.baud_rate)?;
+        dict.set_item("format", format!("{}{}{}", serial.data_bits, serial.parity, serial.stop_bits))?;
+        dict.set_item("unit", serial.unit)?;
+        dict.set_item("response_delay", serial.response_delay.as_secs_f64())?;
+        dict.set_item("verified", serial.verified)?;
+        dict.set_item("source", &serial.source)?;
+        Ok(Some(dict))
     }
 
     #[getter]
@@ -52,9 +113,33 @@ impl Profile {
         self.0.max_words()
     }
 
-    #[getter]
-    fn identification_address(&self) -> u16 {
-        self.0.identification_address()
+    #[pyo3(signature = (role, /))]
+    fn role(&self, role: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
+        Ok(self.0.role(&text("role", role)?).map(known_as))
+    }
+
+    fn status_words(&self) -> Vec<&str> {
+        self.0.status_words().map(known_as).collect()
+    }
+
+    fn identifications<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let rows = self.0.identifications().iter().map(|row| {
+            let dict = PyDict::new(py);
+            dict.set_item("code", row.code)?;
+            dict.set_item("family", &row.family)?;
+            dict.set_item("title", &row.title)?;
+            dict.set_item("shared", &row.shared)?;
+            dict.set_item("verified", row.verified)?;
+            dict.set_item("note", &row.note)?;
+            dict.set_item("source", &row.source)?;
+            Ok(dict)
+        });
+        rows.collect()
+    }
+
+    /// The addresses that a unit of this family answers, and those that it refuses.
+    fn signature(&self) -> Option<(Vec<u16>, Vec<u16>)> {
+        self.0.signature().map(|signature| (signature.answers.clone(), signature.refuses.clone()))
     }
 
     #[pyo3(signature = (code, /))]
@@ -66,12 +151,50 @@ impl Profile {
         self.0.entries().map(Entry::name).collect()
     }
 
+    #[pyo3(signature = (text, limit))]
+    fn search(&self, text: &Bound<'_, PyAny>, limit: usize) -> PyResult<Vec<&str>> {
+        Ok(self.0.search(&self::text("text", text)?, limit).into_iter().map(Entry::name).collect())
+    }
+
     fn monitor_names(&self) -> Vec<&str> {
-        self.0.monitor().map(Entry::name).collect()
+        self.0.monitor().map(known_as).collect()
     }
 
     fn fault_history(&self) -> Vec<&str> {
         self.0.fault_history().map(Entry::name).collect()
+    }
+
+    fn fault_values(&self) -> Vec<&str> {
+        self.0.fault_values().map(Entry::name).collect()
+    }
+
+    fn acts(&self) -> Vec<&str> {
+        self.0.acting().map(Entry::name).collect()
+    }
+
+    fn serial_parameters(&self) -> Vec<&str> {
+        self.0.serial_parameters().map(Entry::name).collect()
+    }
+
+    fn motor_parameters(&self) -> Vec<&str> {
+        self.0.motor_parameters().map(Entry::name).collect()
+    }
+
+    fn last_parameters(&self) -> Vec<&str> {
+        self.0.last_parameters().map(Entry::name).collect()
+    }
+
+    /// Total, sourced, unverified and assumed rows, by what they are.
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, counts) in [
+            ("registers", self.0.count_entries(Kind::Register)),
+            ("parameters", self.0.count_entries(Kind::Parameter)),
+            ("faults", self.0.count_faults()),
+        ] {
+            dict.set_item(name, counted(py, counts)?)?;
+        }
+        Ok(dict)
     }
 
     #[pyo3(signature = (name, /))]
@@ -81,7 +204,7 @@ impl Profile {
         let quantity = entry.quantity();
         let value = |value: Option<Value>| value.map(|value| number(py, quantity, value));
         let dict = PyDict::new(py);
-        dict.set_item("name", entry.name())?;
+        dict.set_item("name", known_as(entry))?;
         dict.set_item("code", entry.code())?;
         dict.set_item("label", entry.label())?;
         dict.set_item(
@@ -106,7 +229,10 @@ impl Profile {
         dict.set_item("bits", bits(py, entry)?)?;
         dict.set_item("source", entry.source())?;
         dict.set_item("verified", entry.verified())?;
+        dict.set_item("evidence", entry.evidence().name())?;
         dict.set_item("note", entry.note())?;
+        dict.set_item("words", entry.words())?;
+        dict.set_item("variant", quantity.variant())?;
         Ok(dict)
     }
 
@@ -114,7 +240,7 @@ impl Profile {
     fn address(&self, name: &Bound<'_, PyAny>, store: Option<bool>) -> PyResult<u16> {
         let entry = self.find(name)?;
         match store {
-            None => Ok(entry.address()),
+            None => self.0.read_address(entry).map_err(refuse),
             Some(false) => self.0.write_address(entry, Store::Ram).map_err(refuse),
             Some(true) => self.0.write_address(entry, Store::Eeprom).map_err(refuse),
         }
@@ -128,7 +254,15 @@ impl Profile {
     #[pyo3(signature = (name, raw, /))]
     fn decode<'py>(&self, name: &Bound<'py, PyAny>, raw: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let entry = self.find(name)?;
-        Ok(number(name.py(), entry.quantity(), entry.decode(one_word("raw", raw)?)))
+        let quantity = entry.quantity();
+        if entry.words() == 1 {
+            return Ok(number(name.py(), quantity, entry.decode(one_word("raw", raw)?)));
+        }
+        let both: u32 =
+            raw.extract().map_err(|_| not_allowed(format!("raw {} is not in 0..4294967295", shown(raw))))?;
+        let words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
+        let value = quantity.decode_words(&words);
+        value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| not_allowed("no words".to_owned()))
     }
 
     #[pyo3(signature = (name, value, /))]
@@ -181,6 +315,48 @@ impl Profile {
         self.0.command(command).ok_or_else(missing)
     }
 
+    /// Why a command is not verified; `None` where it is.
+    #[pyo3(signature = (name, /))]
+    fn command_reason(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
+        let command: Command = text("command", name)?.parse().map_err(refuse)?;
+        Ok(self.0.command_note(command))
+    }
+
+    fn commands(&self) -> std::collections::BTreeMap<&'static str, u16> {
+        self.0.commands().iter().map(|(command, known)| (command.name(), known.code)).collect()
+    }
+
+    fn command_codes(&self) -> std::collections::BTreeMap<u16, &str> {
+        self.0.command_codes()
+    }
+
+    #[getter]
+    fn command_address(&self) -> Option<u16> {
+        self.0.command_address()
+    }
+
+    /// Whether `address` is a parameter's with the bit that says where it is kept: then the plain one.
+    #[pyo3(signature = (address, /))]
+    fn stored_address(&self, address: &Bound<'_, PyAny>) -> PyResult<Option<u16>> {
+        Ok(self.0.stored_address(one_word("address", address)?))
+    }
+
+    fn memory<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(memory) = self.0.memory() else { return Ok(None) };
+        let dict = PyDict::new(py);
+        dict.set_item("bit", memory.bit)?;
+        dict.set_item(
+            "means",
+            match memory.means {
+                MemoryBit::Ram => "ram",
+                MemoryBit::Eeprom => "eeprom",
+            },
+        )?;
+        dict.set_item("reason", (!memory.verified).then_some(&memory.note))?;
+        dict.set_item("source", &memory.source)?;
+        Ok(Some(dict))
+    }
+
     #[pyo3(signature = (address, /))]
     fn is_command(&self, address: &Bound<'_, PyAny>) -> PyResult<bool> {
         Ok(self.0.is_command(one_word("address", address)?))
@@ -191,18 +367,62 @@ impl Profile {
         Ok(self.0.state(one_word("raw", raw)?).name())
     }
 
+    /// Why the states are not verified; `None` where they are, or where there are none.
+    fn state_reason(&self) -> Option<&str> {
+        self.0.state_word().filter(|word| !word.verified).map(|word| word.note.as_str())
+    }
+
     fn control<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = self.0.control().iter().map(|row| {
-            let entry = self.0.find(&row.code).map_err(refuse)?;
+        self.items(py, self.0.control())
+    }
+
+    fn setpoint_names(&self) -> Vec<&'static str> {
+        self.0.setpoints().keys().map(|setpoint| setpoint.name()).collect()
+    }
+
+    #[pyo3(signature = (setpoint, /))]
+    fn needs<'py>(&self, setpoint: &Bound<'py, PyAny>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let name = text("setpoint", setpoint)?;
+        let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
+        let role = known.and_then(|setpoint| self.0.setpoints().get(&setpoint));
+        let missing = || not_allowed(format!("{} has no setpoint {name}", self.0.name()));
+        self.items(setpoint.py(), &role.ok_or_else(missing)?.needs)
+    }
+
+    fn variants<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for (name, variant) in self.0.variants() {
             let dict = PyDict::new(py);
-            dict.set_item("code", &row.code)?;
-            dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
-            dict.set_item("label", &row.label)?;
-            dict.set_item("verified", row.verified)?;
-            dict.set_item("note", &row.note)?;
-            Ok(dict)
-        });
-        rows.collect()
+            dict.set_item("parameter", &variant.parameter)?;
+            let choices = PyDict::new(py);
+            for (choice, known) in &variant.choices {
+                choices.set_item(choice, known.word)?;
+            }
+            dict.set_item("choices", choices)?;
+            dict.set_item("reason", (!variant.verified).then_some(&variant.note))?;
+            dict.set_item("source", &variant.source)?;
+            all.set_item(name, dict)?;
+        }
+        Ok(all)
+    }
+
+    #[getter]
+    fn variants_chosen(&self) -> std::collections::BTreeMap<String, String> {
+        self.0.chosen().clone()
+    }
+
+    #[pyo3(signature = (chosen, /))]
+    fn with_variants(&self, chosen: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let pairs = chosen
+            .call_method0("items")?
+            .try_iter()?
+            .map(|pair| {
+                let (name, choice): (Bound<'_, PyAny>, Bound<'_, PyAny>) = pair?.extract()?;
+                Ok((text("variant", &name)?, text("choice", &choice)?))
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let pairs = pairs.iter().map(|(name, choice)| (name.as_str(), choice.as_str()));
+        self.0.with_variants(pairs).map(|profile| Self(Arc::new(profile))).map_err(refuse)
     }
 
     fn watchdog<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
@@ -220,6 +440,7 @@ impl Profile {
         dict.set_item("action", &watchdog.action)?;
         dict.set_item("actions", actions)?;
         dict.set_item("verified", watchdog.verified)?;
+        dict.set_item("note", &watchdog.note)?;
         dict.set_item("source", &watchdog.source)?;
         Ok(Some(dict))
     }
@@ -233,6 +454,10 @@ impl Profile {
         self.0.faults().map(|row| fault(py, row)).collect()
     }
 
+    fn exceptions(&self) -> std::collections::BTreeMap<u8, (&str, &str)> {
+        self.0.exceptions().map(|row| (row.code, (row.name.as_str(), row.meaning.as_str()))).collect()
+    }
+
     #[pyo3(signature = (code, /))]
     fn exception(&self, code: &Bound<'_, PyAny>) -> PyResult<(String, String)> {
         let code = code.extract().map_err(|_| not_allowed(format!("code {} is not in 0..255", shown(code))))?;
@@ -242,10 +467,53 @@ impl Profile {
 }
 
 impl Profile {
+    /// Parameters that must have certain values.
+    fn items<'py>(&self, py: Python<'py>, rows: &[Control]) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let rows = rows.iter().map(|row| {
+            let entry = self.0.find(&row.code).map_err(refuse)?;
+            let dict = PyDict::new(py);
+            dict.set_item("code", &row.code)?;
+            dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
+            dict.set_item("label", &row.label)?;
+            dict.set_item("verified", row.verified)?;
+            dict.set_item("note", &row.note)?;
+            dict.set_item("source", &row.source)?;
+            Ok(dict)
+        });
+        rows.collect()
+    }
+
     /// The register or parameter that `name` means.
     fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<&Entry> {
         self.0.find(&text("name", name)?).map_err(refuse)
     }
+}
+
+/// What people call an entry: its name where it has one, else its code.
+fn known_as(entry: &Entry) -> &str {
+    entry.alias().unwrap_or_else(|| entry.name())
+}
+
+fn path(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
+    given.extract().map_err(|_| not_allowed(format!("folder {} is no path", shown(given))))
+}
+
+fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
+    match problem {
+        ProfileError::Broken { file, line, reason } => (file, Some(line), reason),
+        ProfileError::Unreadable { file, reason } => (file, None, reason),
+        other => (String::new(), None, other.to_string()),
+    }
+}
+
+fn counted(py: Python<'_>, counts: Counts) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("total", counts.total)?;
+    dict.set_item("sourced", counts.sourced)?;
+    dict.set_item("unsourced", counts.total - counts.sourced)?;
+    dict.set_item("unverified", counts.unverified)?;
+    dict.set_item("assumed", counts.assumed)?;
+    Ok(dict)
 }
 
 /// A `str`.
@@ -281,7 +549,9 @@ fn fault<'py>(py: Python<'py>, fault: &Fault) -> PyResult<Bound<'py, PyDict>> {
     dict.set_item("label", &fault.label)?;
     dict.set_item("cause", &fault.cause)?;
     dict.set_item("remedy", &fault.remedy)?;
-    dict.set_item("verified", fault.verified)?;
+    dict.set_item("verified", fault.verified())?;
+    dict.set_item("evidence", fault.evidence.name())?;
+    dict.set_item("note", &fault.note)?;
     dict.set_item("source", &fault.source)?;
     Ok(dict)
 }

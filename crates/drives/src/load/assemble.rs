@@ -1,323 +1,253 @@
-//! From four files to one profile: what they say about each other must agree.
+//! From four files, and perhaps a profile below them, to one profile: what they say about each other must agree.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
+use std::collections::BTreeMap;
 
 use toml::Spanned;
 
-use super::manifest::{self, Field, Manifest, line};
-use super::rows::{self, Located};
-use super::{File, Files, ProfileError};
-use crate::bits::BitField;
-use crate::command::{Command, Control};
-use crate::entry::{Entry, Kind};
-use crate::fault::Exception;
-use crate::lookup::{closest, parse_code};
-use crate::profile::{Identification, Profile};
-use crate::quantity::Quantity;
-use crate::serial::SerialDefaults;
-use crate::state::State;
-use crate::watchdog::Watchdog;
+use super::Files;
+use super::entries::Entries;
+use super::facts;
+use super::manifest::{self, Manifest, line};
+use super::motion;
+use super::problems::Problems;
+use super::{File, inherit, rows};
+use crate::profile::{Groups, Profile, Requests, UnitKind};
+use crate::roles::Roles;
+use crate::setpoint::{Setpoint, SetpointRole};
 
-/// Reads and checks all of `files`.
-pub(super) fn profile(files: &Files) -> Result<Profile, ProfileError> {
+/// Reads and checks all of `files`, over `base`. What is wrong goes to `problems`; then there may be no profile.
+pub(super) fn profile(
+    files: &Files,
+    manifest: &Manifest,
+    base: Option<Profile>,
+    problems: &mut Problems,
+) -> Option<Profile> {
     let file = &files.manifest;
-    let manifest = manifest::read(file)?;
-    let mut entries = Entries::read(files, &manifest)?;
-
-    for (name, fields) in &manifest.bits {
-        let bits = bit_fields(file, fields)?;
-        entries.get_mut(file, name)?.bits = bits;
+    let mut profile = start(file, manifest, base, problems)?;
+    if let Some(parameters) = &manifest.parameters {
+        profile.groups.closed.clone_from(&parameters.closed_groups);
+        if let Some(memory) = &parameters.memory {
+            profile.memory = problems.keep(facts::memory(file, memory));
+        }
     }
-    let command_address = entries.name_choices(
-        file,
-        &manifest.commands.register,
-        manifest.commands.codes.iter().map(|(command, code)| (command.name(), code)),
-    )?;
-    let state_address = entries.name_choices(
-        file,
-        &manifest.state.register,
-        manifest.state.codes.iter().map(|(state, code)| (state.name(), code)),
-    )?;
+    let mut entries = entries(files, &mut profile, problems);
+    bits(file, manifest, &mut entries, problems);
 
-    let profile = Profile {
-        name: name(file, &manifest.name)?,
-        serial: serial(file, &manifest.serial)?,
-        max_words: within(file, &manifest.requests.max_words, 1, 125, "max_words")?,
-        ram_mask: 1 << within(file, &manifest.parameters.ram_bit, 8, 15, "ram_bit")?,
-        identification_address: entries.get(file, &manifest.identification.register)?.address,
-        identifications: identifications(file, &manifest)?,
-        command_address,
-        commands: codes::<Command>(&manifest.commands.codes),
-        moving: addresses(file, &entries, &manifest.commands.moves)?,
-        state_address,
-        states: codes::<State>(&manifest.state.codes),
-        control: control(file, &entries, &manifest)?,
-        monitor: addresses(file, &entries, &manifest.monitor.registers)?,
-        acting: addresses(file, &entries, &manifest.parameters.acts)?,
-        watchdog: manifest.watchdog.as_ref().map(|row| watchdog(file, &entries, row)).transpose()?,
-        fault_history: addresses(file, &entries, &manifest.faults.history)?,
-        faults: rows::faults(&files.faults)?,
-        exceptions: exceptions(file, &manifest)?,
-        by_address: entries.by_address,
-        entries: entries.list,
-        title: manifest.title,
-        source: manifest.source,
-        functions: manifest.requests.functions,
-        closed_groups: manifest.parameters.closed_groups,
+    if let Some(parameters) = &manifest.parameters {
+        profile.groups = Groups {
+            closed: parameters.closed_groups.clone(),
+            acts: entries.parameters(file, &parameters.acts, problems),
+            serial: entries.parameters(file, &parameters.serial, problems),
+            motor: entries.parameters(file, &parameters.motor, problems),
+            last: entries.parameters(file, &parameters.last, problems),
+        };
+    }
+    if let Some(serial) = &manifest.serial {
+        profile.serial = problems.keep(facts::serial(file, serial));
+    }
+    variants(file, manifest, &mut profile, &entries, problems);
+    motion::commands(file, manifest, &mut profile, &mut entries, problems);
+    motion::state(file, manifest, &mut profile, &mut entries, problems);
+    roles(file, manifest, &mut profile.roles, &entries, problems);
+    lists(file, manifest, &mut profile, &entries, problems);
+    if let Some(identification) = &manifest.identification {
+        profile.identifications = facts::identifications(file, &identification.codes, problems);
+        let signature = identification.signature.as_ref();
+        profile.signature = signature.and_then(|row| facts::signature(file, &entries, row, problems));
+    }
+    setpoints(file, manifest, &mut profile.setpoints, &entries, problems);
+    if let Some(watchdog) = &manifest.watchdog {
+        profile.watchdog = facts::watchdog(file, &entries, watchdog, problems);
+    }
+    profile.exceptions =
+        facts::exceptions(file, &manifest.exceptions, std::mem::take(&mut profile.exceptions), problems);
+    profile.faults.extend(files.faults.as_ref().map(|faults| rows::faults(faults, problems)).unwrap_or_default());
+
+    profile.by_address = entries.by_address;
+    profile.entries = entries.list;
+    Some(profile)
+}
+
+/// The profile before its tables are read: what `base` has, or nothing; and what every profile says of itself.
+fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut Problems) -> Option<Profile> {
+    let name = name(file, &manifest.name, problems)?;
+    let missing = |what: &str| {
+        file.broken(
+            1,
+            format!("\"{what}\" is missing; only a profile that extends another, or an overlay, can do without"),
+        )
     };
-    Ok(profile)
-}
-
-/// The registers and parameters, and where each address is.
-struct Entries {
-    list: Vec<Entry>,
-    by_address: BTreeMap<u16, usize>,
-}
-
-impl Entries {
-    fn read(files: &Files, manifest: &Manifest) -> Result<Self, ProfileError> {
-        let mut rows: Vec<(&File, Located<Entry>)> = Vec::new();
-        rows.extend(rows::registers(&files.registers)?.into_iter().map(|row| (&files.registers, row)));
-        rows.extend(rows::parameters(&files.parameters)?.into_iter().map(|row| (&files.parameters, row)));
-        let ram_bit = within(&files.manifest, &manifest.parameters.ram_bit, 8, 15, "ram_bit")?;
-
-        let mut names: BTreeSet<&str> = BTreeSet::new();
-        let mut addresses = BTreeMap::new();
-        for (file, Located { line, item }) in &rows {
-            if !names.insert(&item.name) {
-                return Err(file.broken(*line, format!("{} is there twice", item.name)));
-            }
-            if let Some(other) = addresses.insert(item.address, &item.name) {
-                return Err(file.broken(*line, format!("{other} has the address {:04X}H too", item.address)));
-            }
-            let [group, _] = item.address.to_be_bytes();
-            if item.kind == Kind::Parameter && manifest.parameters.closed_groups.contains(&group) {
-                return Err(file.broken(*line, format!("{} is in a closed group", item.name)));
-            }
-            if item.address & (1 << ram_bit) != 0 {
-                return Err(file.broken(*line, format!("{} has the bit set that means a write to RAM", item.name)));
-            }
+    let requests = match &manifest.requests {
+        Some(requests) => problems.keep(read_requests(file, requests)),
+        None => problems.keep(base.as_ref().map(|base| base.requests.clone()).ok_or_else(|| missing("requests"))),
+    };
+    if base.is_none() && manifest.parameters.is_none() {
+        problems.add(file, 1, "\"parameters\" is missing; it says how the code of a parameter becomes an address");
+    }
+    let title = match (&manifest.title, &base) {
+        (Some(title), _) => Some(title.clone()),
+        (None, Some(base)) => Some(base.title.clone()),
+        (None, None) => problems.keep(Err(missing("title"))),
+    };
+    let version = manifest.version.as_ref().map_or(1, |version| *version.get_ref());
+    let family = match (&manifest.overlay, &base) {
+        (Some(_), Some(base)) => base.family.clone(),
+        _ => name.clone(),
+    };
+    let (requests, title) = (requests?, title?);
+    let base = base.map(|base| inherit::view(base, file, manifest, problems));
+    let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
+    Some(match base {
+        Some(base) => {
+            let requests = if manifest.requests.is_some() { requests } else { base.requests.clone() };
+            Profile { name, family, title, kind, version, requests, source: manifest.source.clone(), ..base }
         }
-        for (file, Located { line, item }) in &rows {
-            for bound in [item.quantity.low_from(), item.quantity.high_from()].into_iter().flatten() {
-                if parse_code(bound).is_none() || !names.contains(bound) {
-                    return Err(file.broken(*line, format!("bound \"{bound}\" is no parameter of this profile")));
-                }
-            }
-        }
-
-        let mut list: Vec<Entry> = rows.into_iter().map(|(_, row)| row.item).collect();
-        list.sort_by_key(|entry| (entry.kind, entry.address));
-        let by_address = list.iter().enumerate().map(|(index, entry)| (entry.address, index)).collect();
-        Ok(Self { list, by_address })
-    }
-
-    /// The entry that `name`, in `file`, refers to.
-    fn get(&self, file: &File, name: &Spanned<String>) -> Result<&Entry, ProfileError> {
-        let wanted = name.get_ref();
-        self.list.iter().find(|entry| entry.name == *wanted).ok_or_else(|| {
-            let closest = closest(wanted, self.list.iter().map(Entry::name)).unwrap_or("nothing at all");
-            file.broken(
-                line(file, name),
-                format!("no register or parameter \"{wanted}\"; the closest is \"{closest}\""),
-            )
-        })
-    }
-
-    fn get_mut(&mut self, file: &File, name: &Spanned<String>) -> Result<&mut Entry, ProfileError> {
-        let address = self.get(file, name)?.address;
-        let index = self.by_address.get(&address).copied();
-        index
-            .and_then(|index| self.list.get_mut(index))
-            .ok_or_else(|| file.broken(line(file, name), format!("no register or parameter \"{}\"", name.get_ref())))
-    }
-
-    /// Makes `codes` the choices of `register`, and returns its address. Codes must differ and be in range.
-    fn name_choices<'a>(
-        &mut self,
-        file: &File,
-        register: &Spanned<String>,
-        codes: impl Iterator<Item = (&'static str, &'a Spanned<u16>)>,
-    ) -> Result<u16, ProfileError> {
-        let entry = self.get_mut(file, register)?;
-        for (name, code) in codes {
-            let word = *code.get_ref();
-            check(file, line(file, code), &entry.quantity, &entry.name, word.into())?;
-            if let Some(other) = entry.quantity.choices.insert(word, name.to_owned()) {
-                return Err(file.broken(line(file, code), format!("{name} has the code of {other}")));
-            }
-        }
-        Ok(entry.address)
-    }
+        None => Profile {
+            name,
+            family,
+            title,
+            kind,
+            version,
+            requests,
+            source: manifest.source.clone(),
+            serial: None,
+            memory: None,
+            groups: Groups::default(),
+            entries: Vec::new(),
+            by_address: BTreeMap::new(),
+            roles: Roles::default(),
+            identifications: Vec::new(),
+            signature: None,
+            command_address: None,
+            commands: BTreeMap::new(),
+            other_commands: BTreeMap::new(),
+            commands_note: String::new(),
+            moving: Vec::new(),
+            state: None,
+            control: Vec::new(),
+            setpoints: BTreeMap::new(),
+            variants: BTreeMap::new(),
+            chosen: BTreeMap::new(),
+            monitor: Vec::new(),
+            watchdog: None,
+            fault_history: Vec::new(),
+            fault_values: Vec::new(),
+            faults: BTreeMap::new(),
+            exceptions: BTreeMap::new(),
+        },
+    })
 }
 
-/// Checks that `quantity` takes `value`, and returns its word.
-fn check(file: &File, line: u64, quantity: &Quantity, name: &str, value: i64) -> Result<u16, ProfileError> {
-    quantity.encode(name, &value.into()).map_err(|error| file.broken(line, error.to_string()))
-}
-
-fn name(file: &File, name: &Spanned<String>) -> Result<String, ProfileError> {
+fn name(file: &File, name: &Spanned<String>, problems: &mut Problems) -> Option<String> {
     let text = name.get_ref();
     let plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || matches!(byte, b'-' | b'_');
     if text.is_empty() || !text.bytes().all(plain) {
-        return Err(
-            file.broken(line(file, name), format!("name \"{text}\" must be lower-case letters, digits, - and _"))
-        );
+        let reason = format!("name \"{text}\" must be lower-case letters, digits, - and _");
+        problems.add(file, line(file, name), reason);
+        return None;
     }
-    Ok(text.clone())
+    Some(text.clone())
 }
 
-/// Checks that `low` ≤ `item` ≤ `high`.
-fn within<T>(file: &File, item: &Spanned<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>
-where
-    T: Copy + PartialOrd + std::fmt::Display,
-{
-    let value = *item.get_ref();
-    if low <= value && value <= high {
-        Ok(value)
-    } else {
-        Err(file.broken(line(file, item), format!("{what} is {value} and must be {low} to {high}")))
-    }
-}
-
-fn serial(file: &File, serial: &manifest::Serial) -> Result<SerialDefaults, ProfileError> {
-    let format = serial.format.get_ref();
-    let (data_bits, parity, stop_bits) = SerialDefaults::parse_format(format)
-        .ok_or_else(|| file.broken(line(file, &serial.format), format!("format \"{format}\" must be like 8E1")))?;
-    Ok(SerialDefaults {
-        baud_rate: within(file, &serial.baud_rate, 50, 10_000_000, "baud_rate")?,
-        data_bits,
-        parity,
-        stop_bits,
-        unit: within(file, &serial.unit, 1, 247, "unit")?,
-        response_delay: Duration::from_millis(serial.response_delay_ms.into()),
-        verified: serial.verified,
-        source: serial.source.clone(),
+fn read_requests(file: &File, requests: &manifest::Requests) -> Result<Requests, super::ProfileError> {
+    Ok(Requests {
+        functions: requests.functions.clone(),
+        max_words: facts::within(file, &requests.max_words, 1, 125, "max_words")?,
+        across_groups: requests.across_groups,
+        verified: requests.verified,
+        note: requests.note.clone(),
+        source: requests.source.clone(),
     })
 }
 
-fn identifications(file: &File, manifest: &Manifest) -> Result<Vec<Identification>, ProfileError> {
-    let mut known: Vec<Identification> = Vec::new();
-    for spanned in &manifest.identification.codes {
-        let row = spanned.get_ref();
-        if known.iter().any(|other| other.code == row.code) {
-            return Err(file.broken(line(file, spanned), format!("code {:04X}H is there twice", row.code)));
-        }
-        known.push(Identification {
-            code: row.code,
-            family: row.family.clone(),
-            title: row.title.clone(),
-            verified: row.verified,
-            source: row.source.clone(),
-        });
-    }
-    Ok(known)
-}
-
-fn codes<K: Copy + Ord>(codes: &BTreeMap<K, Spanned<u16>>) -> BTreeMap<K, u16> {
-    codes.iter().map(|(&key, code)| (key, *code.get_ref())).collect()
-}
-
-fn addresses(file: &File, entries: &Entries, names: &[Spanned<String>]) -> Result<Vec<u16>, ProfileError> {
-    names.iter().map(|name| entries.get(file, name).map(|entry| entry.address)).collect()
-}
-
-fn control(file: &File, entries: &Entries, manifest: &Manifest) -> Result<Vec<Control>, ProfileError> {
-    let rows = manifest.control.iter().map(|spanned| {
-        let row = spanned.get_ref();
-        let entry = entries.get(file, &Spanned::new(spanned.span(), row.code.clone()))?;
-        Ok(Control {
-            code: entry.name.clone(),
-            raw: check(file, line(file, spanned), &entry.quantity, &entry.name, row.value)?,
-            label: row.label.clone(),
-            verified: row.verified,
-            note: row.note.clone(),
-            source: row.source.clone(),
-        })
-    });
-    rows.collect()
-}
-
-/// Both parameters must exist, the values must be theirs, and there must be something that the drive can do.
-fn watchdog(file: &File, entries: &Entries, spanned: &Spanned<manifest::Watchdog>) -> Result<Watchdog, ProfileError> {
-    let row = spanned.get_ref();
-    let timeout = entries.get(file, &row.timeout)?;
-    let action = entries.get(file, &row.action)?;
-    let word = |value: &Option<Spanned<i64>>| {
-        let checked =
-            |value: &Spanned<i64>| check(file, line(file, value), &action.quantity, &action.name, *value.get_ref());
-        value.as_ref().map(checked).transpose()
-    };
-    let (coast, stop) = (word(&row.coast)?, word(&row.stop)?);
-    if coast.is_none() && stop.is_none() {
-        return Err(file.broken(line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\""));
-    }
-    Ok(Watchdog {
-        timeout: timeout.name.clone(),
-        action: action.name.clone(),
-        coast,
-        stop,
-        verified: row.verified,
-        source: row.source.clone(),
-    })
-}
-
-fn exceptions(file: &File, manifest: &Manifest) -> Result<BTreeMap<u8, Exception>, ProfileError> {
-    let mut exceptions = BTreeMap::new();
-    for spanned in &manifest.exceptions {
-        let row = spanned.get_ref();
-        let exception = Exception {
-            code: row.code,
-            name: row.name.clone(),
-            meaning: row.meaning.clone(),
-            source: row.source.clone(),
+/// The rows of the tables over those of the profile below.
+fn entries(files: &Files, profile: &mut Profile, problems: &mut Problems) -> Entries {
+    let mut all = Vec::new();
+    let mut bounds = Vec::new();
+    let tables = [
+        files.registers.as_ref().map(|file| (file, rows::registers(file, problems))),
+        files.parameters.as_ref().map(|file| (file, rows::parameters(file, problems))),
+    ];
+    for (file, rows) in tables.into_iter().flatten() {
+        let of_row = |row: &rows::Located<crate::entry::Entry>| {
+            let quantity = &row.item.quantity;
+            [&quantity.low_from, &quantity.high_from].map(|bound| bound.clone().map(|bound| (row.line, bound)))
         };
-        if exceptions.insert(row.code, exception).is_some() {
-            return Err(file.broken(line(file, spanned), format!("exception {:02X}H is there twice", row.code)));
-        }
+        bounds.push((file, rows.iter().flat_map(of_row).flatten().collect::<Vec<_>>()));
+        all.extend(rows.into_iter().map(|row| (file, row)));
     }
-    Ok(exceptions)
+    let inherited = std::mem::take(&mut profile.entries);
+    let entries = Entries::merge(inherited, all, &profile.groups.closed, profile.memory.as_ref(), problems);
+    for (file, bounds) in bounds {
+        entries.check_bounds(file, &bounds, problems);
+    }
+    entries
 }
 
-/// The bit fields of one word, lowest first. They must not overlap, and their names must differ.
-fn bit_fields(file: &File, fields: &[Spanned<Field>]) -> Result<Vec<BitField>, ProfileError> {
-    let mut known: Vec<BitField> = Vec::new();
-    for spanned in fields {
-        let field = bit_field(spanned.get_ref()).map_err(|reason| file.broken(line(file, spanned), reason))?;
-        if let Some(other) = known.iter().find(|other| other.name == field.name || other.mask() & field.mask() != 0) {
-            let reason = format!("\"{}\" has the name or a bit of \"{}\"", field.name, other.name);
-            return Err(file.broken(line(file, spanned), reason));
+fn bits(file: &File, manifest: &Manifest, entries: &mut Entries, problems: &mut Problems) {
+    for (name, fields) in &manifest.bits {
+        let bits = facts::bit_fields(file, fields, problems);
+        if let Some(entry) = entries.get_mut(file, name, problems) {
+            entry.bits = bits;
         }
-        known.push(field);
     }
-    known.sort_by_key(|field| field.low);
-    Ok(known)
 }
 
-fn bit_field(row: &Field) -> Result<BitField, String> {
-    let [high, low] = row.bits;
-    if high > 15 || low > high {
-        return Err(format!("bits [{high}, {low}] must be the highest and the lowest bit, 0 to 15"));
+/// Variants first, then the rows that name one: each must be known.
+fn variants(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entries, problems: &mut Problems) {
+    for (name, row) in &manifest.variants {
+        let variant = facts::variant(file, entries, row, problems);
+        profile.variants.extend(variant.map(|variant| (name.get_ref().clone(), variant)));
     }
-    let mut field = BitField {
-        name: row.name.clone(),
-        low,
-        width: high - low + 1,
-        values: BTreeMap::new(),
-        verified: row.verified,
+    for entry in &entries.list {
+        if let Some(wanted) = entry.quantity.variant.as_ref().filter(|wanted| !profile.variants.contains_key(*wanted)) {
+            let reason =
+                format!("{} has the variant \"{wanted}\", and there is no table [variants.{wanted}]", entry.name);
+            problems.add(file, 1, reason);
+        }
+    }
+}
+
+fn roles(file: &File, manifest: &Manifest, roles: &mut Roles, entries: &Entries, problems: &mut Problems) {
+    let mut own = |wanted: &Option<Spanned<String>>, role: &mut Option<String>| {
+        if let Some(wanted) = wanted {
+            *role = entries.get(file, wanted, problems).map(|entry| entry.name.clone());
+        }
     };
-    match &row.values {
-        None => field.values.extend([(0, "off".to_owned()), (1, "on".to_owned())]),
-        Some(values) => {
-            for (key, label) in values {
-                let value: u16 = key.parse().map_err(|_| format!("value \"{key}\" must be a number"))?;
-                if field.extract(field.insert(0, value)) != value {
-                    return Err(format!("value {value} does not fit bits [{high}, {low}]"));
-                }
-                field.values.insert(value, label.clone());
-            }
-        }
+    if let Some(identification) = &manifest.identification {
+        own(&identification.register, &mut roles.identification);
     }
-    Ok(field)
+    if let Some(status) = &manifest.status {
+        own(&status.fault, &mut roles.fault);
+        own(&status.frequency, &mut roles.frequency);
+        own(&status.setpoint, &mut roles.setpoint);
+        roles.status_words = entries.names(file, &status.words, problems);
+    }
+}
+
+fn lists(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entries, problems: &mut Problems) {
+    if let Some(control) = &manifest.control {
+        profile.control = facts::control(file, entries, control, problems);
+    }
+    if let Some(monitor) = &manifest.monitor {
+        profile.monitor = entries.names(file, &monitor.registers, problems);
+    }
+    if let Some(faults) = &manifest.faults {
+        profile.fault_history = entries.names(file, &faults.history, problems);
+        profile.fault_values = entries.names(file, &faults.values, problems);
+    }
+}
+
+fn setpoints(
+    file: &File,
+    manifest: &Manifest,
+    known: &mut BTreeMap<Setpoint, SetpointRole>,
+    entries: &Entries,
+    problems: &mut Problems,
+) {
+    for (&setpoint, row) in &manifest.setpoints {
+        let needs = facts::control(file, entries, &row.needs, problems);
+        let register = entries.get(file, &row.register, problems).map(|entry| entry.name.clone());
+        known.extend(register.map(|register| (setpoint, SetpointRole { register, needs })));
+    }
 }

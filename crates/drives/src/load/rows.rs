@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::table::{self, Row};
+use super::problems::Problems;
+use super::table::{self, Columns, Row};
 use super::{File, ProfileError};
 use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
+use crate::evidence::Evidence;
 use crate::fault::Fault;
 use crate::lookup::{parameter_address, parse_address, parse_code};
-use crate::quantity::{Quantity, to_word, word_limits};
+use crate::quantity::{Quantity, limits, to_word};
 
 /// An item and the line it came from.
 pub(super) struct Located<T> {
@@ -17,91 +19,131 @@ pub(super) struct Located<T> {
 }
 
 /// The rows of `registers.csv`.
-pub(super) fn registers(file: &File) -> Result<Vec<Located<Entry>>, ProfileError> {
-    const COLUMNS: [&str; 13] = [
-        "address",
-        "name",
-        "label",
-        "unit",
-        "scale",
-        "signed",
-        "low",
-        "high",
-        "high_from",
-        "access",
-        "verified",
-        "note",
-        "source",
-    ];
-    table::read(file, &COLUMNS, |row| {
-        let address = row.required("address")?;
-        let address = parse_address(address)
-            .ok_or_else(|| row.broken(format!("address \"{address}\" must be hex such as 0x3004")))?;
+pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Entry>> {
+    const COLUMNS: Columns = Columns {
+        required: &[
+            "address",
+            "name",
+            "label",
+            "unit",
+            "scale",
+            "signed",
+            "low",
+            "high",
+            "high_from",
+            "access",
+            "verified",
+            "note",
+            "source",
+        ],
+        optional: &["words", "variant"],
+    };
+    table::read(file, &COLUMNS, problems, |row| {
         let name = row.required("name")?;
-        if !is_snake_case(name) {
-            return Err(row.broken(format!("name \"{name}\" must be lower-case letters, digits and _, a letter first")));
-        }
+        let address = match row.text("address") {
+            "" => None,
+            text => Some(parse_address(text).ok_or_else(|| {
+                row.broken(format!("address \"{text}\" must be hex such as 0x3004, or empty if nobody knows it"))
+            })?),
+        };
         let quantity = quantity(row, None, BTreeMap::new())?;
-        entry(row, Kind::Register, name.to_owned(), address, quantity, None)
+        entry(row, Kind::Register, checked_name(row, name)?, None, address, quantity, None)
     })
 }
 
 /// The rows of `parameters.csv`.
-pub(super) fn parameters(file: &File) -> Result<Vec<Located<Entry>>, ProfileError> {
-    const COLUMNS: [&str; 15] = [
-        "code",
-        "label",
-        "unit",
-        "scale",
-        "signed",
-        "low",
-        "low_from",
-        "high",
-        "high_from",
-        "default",
-        "access",
-        "choices",
-        "verified",
-        "note",
-        "source",
-    ];
-    table::read(file, &COLUMNS, |row| {
+pub(super) fn parameters(file: &File, problems: &mut Problems) -> Vec<Located<Entry>> {
+    const COLUMNS: Columns = Columns {
+        required: &[
+            "code",
+            "label",
+            "unit",
+            "scale",
+            "signed",
+            "low",
+            "low_from",
+            "high",
+            "high_from",
+            "default",
+            "access",
+            "choices",
+            "verified",
+            "note",
+            "source",
+        ],
+        optional: &["name", "words"],
+    };
+    table::read(file, &COLUMNS, problems, |row| {
         let code = row.required("code")?;
         let (group, index) =
             parse_code(code).ok_or_else(|| row.broken(format!("code \"{code}\" must be like P05.06")))?;
         let quantity = quantity(row, filled(row.text("low_from")), choices(row)?)?;
         let default = match row.text("default") {
             "" => None,
-            text => Some(to_word(i64::from(count(row, "default", text, &quantity)?))),
+            text => Some(to_word(count(row, "default", text, &quantity)?)),
         };
-        let name = format!("P{group:02}.{index:02}");
-        entry(row, Kind::Parameter, name, parameter_address(group, index), quantity, default)
+        let alias = match row.text("name") {
+            "" => None,
+            name => Some(checked_name(row, name)?),
+        };
+        let letter = if code.starts_with(['r', 'R']) { 'r' } else { 'P' };
+        let name = format!("{letter}{group:02}.{index:02}");
+        entry(row, Kind::Parameter, name, alias, Some(parameter_address(group, index)), quantity, default)
     })
 }
 
 /// The rows of `faults.csv`.
-pub(super) fn faults(file: &File) -> Result<BTreeMap<u16, Fault>, ProfileError> {
-    const COLUMNS: [&str; 8] = ["code", "mnemonic", "label", "cause", "remedy", "verified", "note", "source"];
+pub(super) fn faults(file: &File, problems: &mut Problems) -> BTreeMap<u16, Fault> {
+    const COLUMNS: Columns = Columns {
+        required: &["code", "mnemonic", "label", "cause", "remedy", "verified", "note", "source"],
+        optional: &[],
+    };
     let mut faults = BTreeMap::new();
-    table::read(file, &COLUMNS, |row| {
+    table::read(file, &COLUMNS, problems, |row| {
         let code = row.required("code")?;
         let code: u16 = code.parse().map_err(|_| row.broken(format!("code \"{code}\" must be 0 to 65535")))?;
+        let (evidence, note, source) = evidence(row)?;
         let fault = Fault {
             code,
             mnemonic: row.text("mnemonic").to_owned(),
             label: row.required("label")?.to_owned(),
             cause: row.text("cause").to_owned(),
             remedy: row.text("remedy").to_owned(),
-            verified: row.flag("verified")?,
-            note: row.text("note").to_owned(),
-            source: row.required("source")?.to_owned(),
+            evidence,
+            note,
+            source,
         };
         match faults.insert(code, fault) {
             None => Ok(()),
             Some(_) => Err(row.broken(format!("fault {code} is there twice"))),
         }
+    });
+    faults
+}
+
+/// How well a row is documented: its evidence, its note and its source. What is not verified says why.
+fn evidence(row: &Row<'_>) -> Result<(Evidence, String, String), ProfileError> {
+    let cell = row.required("verified")?;
+    let evidence = Evidence::ALL.into_iter().find(|known| known.cell() == cell).ok_or_else(|| {
+        row.broken(format!("\"verified\" is \"{cell}\" and must be {}", Evidence::ALL.map(Evidence::cell).join(", ")))
     })?;
-    Ok(faults)
+    let (note, source) = (row.text("note"), row.text("source"));
+    if evidence != Evidence::Verified && note.is_empty() {
+        return Err(row.broken(format!("\"note\" is empty; where \"verified\" is {cell} it says what is missing")));
+    }
+    if evidence != Evidence::Assumed && source.is_empty() {
+        return Err(row.broken("\"source\" is empty; name the document and the page, or say that the row is assumed"));
+    }
+    Ok((evidence, note.to_owned(), source.to_owned()))
+}
+
+/// `name`, if it can be one: it is told from codes (`P00.11`) and addresses (`3004H`) by its letters.
+fn checked_name(row: &Row<'_>, name: &str) -> Result<String, ProfileError> {
+    if is_snake_case(name) {
+        Ok(name.to_owned())
+    } else {
+        Err(row.broken(format!("name \"{name}\" must be lower-case letters, digits and _, a letter first")))
+    }
 }
 
 /// The cells that registers and parameters share.
@@ -109,7 +151,8 @@ fn entry(
     row: &Row<'_>,
     kind: Kind,
     name: String,
-    address: u16,
+    alias: Option<String>,
+    address: Option<u16>,
     quantity: Quantity,
     default: Option<u16>,
 ) -> Result<Located<Entry>, ProfileError> {
@@ -117,8 +160,16 @@ fn entry(
     let access = Access::ALL.into_iter().find(|known| known.name() == access).ok_or_else(|| {
         row.broken(format!("access \"{access}\" must be {}", Access::ALL.map(Access::name).join(", ")))
     })?;
+    if quantity.wide && access != Access::Ro {
+        return Err(row.broken("a value of two words can only be read: its \"access\" must be ro"));
+    }
+    if quantity.wide && address == Some(u16::MAX) {
+        return Err(row.broken("a value of two words does not fit at the last address"));
+    }
+    let (evidence, note, source) = evidence(row)?;
     let item = Entry {
         name,
+        alias,
         kind,
         address,
         label: row.required("label")?.to_owned(),
@@ -126,35 +177,41 @@ fn entry(
         bits: Vec::new(),
         access,
         default,
-        verified: row.flag("verified")?,
-        note: row.text("note").to_owned(),
-        source: row.required("source")?.to_owned(),
+        evidence,
+        note,
+        source,
     };
     Ok(Located { line: row.line(), item })
 }
 
 /// Unit, scale and range.
 fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, String>) -> Result<Quantity, ProfileError> {
+    let variant = filled(row.text("variant"));
+    if variant.is_some() && ["unit", "scale", "low", "high"].iter().any(|column| !row.text(column).is_empty()) {
+        return Err(row.broken("where there is a \"variant\", it says unit, scale and range: leave those cells empty"));
+    }
     let decimals = match row.text("scale") {
         "" => None,
-        "1" => Some(0),
-        "10" => Some(1),
-        "100" => Some(2),
-        "1000" => Some(3),
-        "10000" => Some(4),
-        other => {
-            return Err(row.broken(format!("scale \"{other}\" must be 1, 10, 100, 1000 or 10000, or empty if unknown")));
-        }
+        text => Some(text.parse().ok().and_then(decimals).ok_or_else(|| {
+            row.broken(format!("scale \"{text}\" must be 1, 10, 100, 1000 or 10000, or empty if unknown"))
+        })?),
+    };
+    let wide = match row.text("words") {
+        "" | "1" => false,
+        "2" => true,
+        other => return Err(row.broken(format!("\"words\" is \"{other}\" and must be 1 or 2"))),
     };
     let mut quantity = Quantity {
         unit: row.text("unit").to_owned(),
         decimals,
         signed: row.flag("signed")?,
+        wide,
         low: None,
         high: None,
         low_from,
         high_from: filled(row.text("high_from")),
         choices,
+        variant,
     };
     quantity.low = bound(row, "low", &quantity)?;
     quantity.high = bound(row, "high", &quantity)?;
@@ -164,7 +221,12 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     }
 }
 
-fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i32>, ProfileError> {
+/// Digits after the point for so many counts per unit.
+pub(super) fn decimals(scale: u32) -> Option<u8> {
+    (0..=4).find(|&decimals| 10_u32.pow(u32::from(decimals)) == scale)
+}
+
+fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i64>, ProfileError> {
     match row.text(column) {
         "" => Ok(None),
         text => count(row, column, text, quantity).map(Some),
@@ -172,21 +234,18 @@ fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i32>
 }
 
 /// The counts that `text` means: a value in the quantity's unit, or hex. It must fit the word.
-fn count(row: &Row<'_>, column: &str, text: &str, quantity: &Quantity) -> Result<i32, ProfileError> {
+fn count(row: &Row<'_>, column: &str, text: &str, quantity: &Quantity) -> Result<i64, ProfileError> {
     let counts = match parse_address(text) {
         Some(word) => Some(Counts::Whole(i64::from(word))),
         None => Decimal::parse(text).map(|number| number.counts(quantity.decimals())),
     };
-    let (least, most) = word_limits(quantity.signed);
+    let (least, most) = limits(quantity.signed, quantity.wide);
     match counts {
-        Some(Counts::Whole(count)) => i32::try_from(count)
-            .ok()
-            .filter(|count| (least..=most).contains(count))
-            .ok_or_else(|| row.broken(format!("\"{column}\" {text} does not fit a word with this scale and sign"))),
-        Some(Counts::Above(_)) => Err(row.broken(format!("\"{column}\" {text} has more digits than the scale"))),
-        Some(Counts::FarBelow | Counts::FarAbove) => {
+        Some(Counts::Whole(count)) if (least..=most).contains(&count) => Ok(count),
+        Some(Counts::Whole(_) | Counts::FarBelow | Counts::FarAbove) => {
             Err(row.broken(format!("\"{column}\" {text} does not fit a word with this scale and sign")))
         }
+        Some(Counts::Above(_)) => Err(row.broken(format!("\"{column}\" {text} has more digits than the scale"))),
         None => Err(row.broken(format!("\"{column}\" is \"{text}\", which is no number"))),
     }
 }

@@ -4,7 +4,19 @@
 
 use csv::StringRecord;
 
+use super::problems::Problems;
 use super::{File, ProfileError};
+
+/// Most rows of one table.
+const MOST_ROWS: usize = 10_000;
+/// Most characters in a cell.
+const MOST_CHARACTERS: usize = 400;
+
+/// The columns that a table must have, and those that it may have.
+pub(super) struct Columns {
+    pub(super) required: &'static [&'static str],
+    pub(super) optional: &'static [&'static str],
+}
 
 /// One row of a table.
 pub(super) struct Row<'a> {
@@ -14,30 +26,49 @@ pub(super) struct Row<'a> {
     line: u64,
 }
 
-/// Reads `file`, which must have exactly `columns`, and makes an item of every row.
+/// Reads `file`, which must have `columns`, and makes an item of every row. Rows that are broken are left out.
 pub(super) fn read<T>(
     file: &File,
-    columns: &[&str],
+    columns: &Columns,
+    problems: &mut Problems,
     mut item: impl FnMut(&Row<'_>) -> Result<T, ProfileError>,
-) -> Result<Vec<T>, ProfileError> {
+) -> Vec<T> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file.text().as_bytes());
-    let headers = reader.headers().map_err(|error| broken(file, &error))?.clone();
-    if let Some(surplus) = headers.iter().find(|header| !columns.contains(header)) {
-        return Err(file.broken(1, format!("unknown column \"{surplus}\"; the columns are {}", columns.join(", "))));
+    let Some(headers) = problems.keep(headers(file, columns, &mut reader)) else { return Vec::new() };
+    let mut items = Vec::new();
+    for (index, record) in reader.records().enumerate() {
+        let row = record.map_err(|error| broken(file, &error)).and_then(|cells| {
+            let line = cells.position().map_or(1, csv::Position::line);
+            let row = Row { file, headers: &headers, cells, line };
+            row.check_length()?;
+            if index >= MOST_ROWS {
+                return Err(row.broken(format!("the table has more than {MOST_ROWS} rows")));
+            }
+            item(&row)
+        });
+        items.extend(problems.keep(row));
+        if index >= MOST_ROWS {
+            break;
+        }
     }
-    if let Some(missing) =
-        columns.iter().find(|&&column| headers.iter().filter(|&header| header == column).count() != 1)
-    {
+    items
+}
+
+fn headers(file: &File, columns: &Columns, reader: &mut csv::Reader<&[u8]>) -> Result<StringRecord, ProfileError> {
+    let headers = reader.headers().map_err(|error| broken(file, &error))?.clone();
+    let all = || columns.required.iter().chain(columns.optional);
+    if let Some(surplus) = headers.iter().find(|header| !all().any(|known| known == header)) {
+        let known: Vec<&str> = all().copied().collect();
+        return Err(file.broken(1, format!("unknown column \"{surplus}\"; the columns are {}", known.join(", "))));
+    }
+    let times = |column: &str| headers.iter().filter(|&header| header == column).count();
+    if let Some(missing) = columns.required.iter().find(|&&column| times(column) != 1) {
         return Err(file.broken(1, format!("column \"{missing}\" must be there once")));
     }
-    reader
-        .records()
-        .map(|record| {
-            let cells = record.map_err(|error| broken(file, &error))?;
-            let line = cells.position().map_or(1, csv::Position::line);
-            item(&Row { file, headers: &headers, cells, line })
-        })
-        .collect()
+    if let Some(twice) = columns.optional.iter().find(|&&column| times(column) > 1) {
+        return Err(file.broken(1, format!("column \"{twice}\" is there twice")));
+    }
+    Ok(headers)
 }
 
 /// What the CSV reader has against `file`.
@@ -82,5 +113,13 @@ impl Row<'_> {
     /// The error that this row causes.
     pub(super) fn broken(&self, reason: impl Into<String>) -> ProfileError {
         self.file.broken(self.line, reason)
+    }
+
+    fn check_length(&self) -> Result<(), ProfileError> {
+        let long = self.headers.iter().zip(&self.cells).find(|(_, cell)| cell.chars().count() > MOST_CHARACTERS);
+        long.map_or(Ok(()), |(column, cell)| {
+            let length = cell.chars().count();
+            Err(self.broken(format!("\"{column}\" has {length} characters; {MOST_CHARACTERS} are the most")))
+        })
     }
 }

@@ -45,7 +45,9 @@ impl Map {
         if Profile::builtin_names().any(|name| name == family.name) {
             let profile = Profile::builtin(family.name)?;
             for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
-                words.insert(entry.address(), Word::Parameter(parameter(family, &profile, entry)));
+                if let Some(address) = entry.address() {
+                    words.insert(address, Word::Parameter(parameter(family, &profile, entry, address)));
+                }
             }
         }
         words.extend(family.parameters.iter().map(|&known| (known.address, Word::Parameter(known))));
@@ -99,7 +101,7 @@ impl Word {
 impl Parameter {
     /// Whether `raw` is in range; `value_of` tells the parameters that the range depends on.
     pub(crate) fn allows(&self, raw: u16, value_of: impl Fn(u16) -> u16) -> bool {
-        let count = |raw: u16| if self.signed { i32::from(raw.cast_signed()) } else { i32::from(raw) };
+        let count = |raw: u16| if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) };
         let value = count(raw);
         let bound = |address: Option<u16>| address.map(|address| count(value_of(address)));
         let above = [self.low, bound(self.low_from)].into_iter().flatten().all(|low| low <= value);
@@ -109,9 +111,9 @@ impl Parameter {
 }
 
 /// A row of the profile.
-fn parameter(family: &Family, profile: &Profile, entry: &Entry) -> Parameter {
-    let (address, quantity) = (entry.address(), entry.quantity());
-    let address_of = |code: &str| profile.find(code).ok().map(Entry::address);
+fn parameter(family: &Family, profile: &Profile, entry: &Entry, address: u16) -> Parameter {
+    let quantity = entry.quantity();
+    let address_of = |code: &str| profile.find(code).ok().and_then(Entry::address);
     let low = quantity.low().map(Value::count);
     let lowest = low.and_then(|low| u16::try_from(low).ok()).unwrap_or(0);
     let assumed = || family.factory.iter().find(|&&(known, _)| known == address).map(|&(_, value)| value);

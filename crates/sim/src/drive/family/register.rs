@@ -118,8 +118,8 @@ pub(crate) struct Parameter {
     pub(crate) address: u16,
     pub(crate) access: Access,
     /// In counts; `None` where nothing is printed.
-    pub(crate) low: Option<i32>,
-    pub(crate) high: Option<i32>,
+    pub(crate) low: Option<i64>,
+    pub(crate) high: Option<i64>,
     /// Parameters that bound it as well, by address.
     pub(crate) low_from: Option<u16>,
     pub(crate) high_from: Option<u16>,
@@ -150,8 +150,8 @@ impl Parameter {
         Self {
             address,
             access: Access::Always,
-            low: Some(low as i32),
-            high: Some(high as i32),
+            low: Some(low as i64),
+            high: Some(high as i64),
             low_from: None,
             high_from: None,
             signed: false,

@@ -1,0 +1,141 @@
+//! The registers and parameters of a profile while it is put together: its own rows, and those of the profile below it.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+
+use super::File;
+use super::manifest::line;
+use super::problems::Problems;
+use super::rows::Located;
+use crate::entry::{Entry, Kind};
+use crate::lookup::{closest, names, parse_code};
+use crate::memory::Memory;
+
+/// The registers and parameters, and where each address is.
+#[derive(Debug, Default)]
+pub(super) struct Entries {
+    pub(super) list: Vec<Entry>,
+    pub(super) by_address: BTreeMap<u16, usize>,
+    /// Some rows were broken, so that a name that is missing may be theirs.
+    incomplete: bool,
+}
+
+impl Entries {
+    /// `rows` over `inherited`, of which each row with the same name or the same address gives way.
+    pub(super) fn merge(
+        inherited: Vec<Entry>,
+        rows: Vec<(&File, Located<Entry>)>,
+        closed_groups: &[u8],
+        memory: Option<&Memory>,
+        problems: &mut Problems,
+    ) -> Self {
+        let incomplete = !problems.is_empty();
+        let mut own: Vec<Entry> = Vec::new();
+        for (file, Located { line, item }) in rows {
+            if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| names(other).any(|own| own == name)))
+            {
+                problems.add(file, line, format!("{twice} is there twice"));
+            } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
+                problems.add(file, line, format!("{} has the address {address:04X}H too", other.name));
+            } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
+                problems.add(file, line, reason);
+            } else {
+                own.push(item);
+            }
+        }
+        let replaced = |old: &Entry| {
+            own.iter()
+                .any(|new| overlap(old, new).is_some() || names(old).any(|name| names(new).any(|own| own == name)))
+        };
+        let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
+        list.append(&mut own);
+        list.sort_by(|one, other| {
+            let place = |entry: &Entry| (entry.kind, entry.address.is_none(), entry.address);
+            place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
+        });
+        let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.address?, index))).collect();
+        Self { list, by_address, incomplete }
+    }
+
+    /// Checks that the bounds of `entries` of `file`, with their lines, are parameters.
+    pub(super) fn check_bounds(&self, file: &File, bounds: &[(u64, String)], problems: &mut Problems) {
+        for (line, bound) in bounds {
+            let known = parse_code(bound).is_some() && self.list.iter().any(|entry| entry.name == *bound);
+            if !known && !self.incomplete {
+                problems.add(file, *line, format!("bound \"{bound}\" is no parameter of this profile"));
+            }
+        }
+    }
+
+    pub(super) fn find(&self, name: &str) -> Option<&Entry> {
+        self.list.iter().find(|entry| names(entry).any(|known| known == name))
+    }
+
+    /// The entry that `name`, in `file`, refers to; there is a problem if there is none.
+    pub(super) fn get(&self, file: &File, name: &Spanned<String>, problems: &mut Problems) -> Option<&Entry> {
+        let found = self.find(name.get_ref());
+        if found.is_none() && !self.incomplete {
+            let wanted = name.get_ref();
+            let closest = closest(wanted, self.list.iter().flat_map(names)).unwrap_or("nothing at all");
+            let reason = format!("no register or parameter \"{wanted}\"; the closest is \"{closest}\"");
+            problems.add(file, line(file, name), reason);
+        }
+        found
+    }
+
+    /// As [`get`](Self::get), for what is to be changed.
+    pub(super) fn get_mut(
+        &mut self,
+        file: &File,
+        name: &Spanned<String>,
+        problems: &mut Problems,
+    ) -> Option<&mut Entry> {
+        let found = self.get(file, name, problems)?.name.clone();
+        self.list.iter_mut().find(|entry| entry.name == found)
+    }
+
+    /// The names that `wanted` refers to.
+    pub(super) fn names(&self, file: &File, wanted: &[Spanned<String>], problems: &mut Problems) -> Vec<String> {
+        wanted.iter().filter_map(|name| Some(self.get(file, name, problems)?.name.clone())).collect()
+    }
+
+    /// The parameters that `wanted` refers to, by code or by whole groups: `P14`.
+    pub(super) fn parameters(&self, file: &File, wanted: &[Spanned<String>], problems: &mut Problems) -> Vec<String> {
+        let mut found = Vec::new();
+        for name in wanted {
+            let group = parse_code(&format!("{}.00", name.get_ref())).map(|(group, _)| group);
+            let Some(group) = group else {
+                found.extend(self.get(file, name, problems).map(|entry| entry.name.clone()));
+                continue;
+            };
+            let of_group = |entry: &&Entry| {
+                entry.kind == Kind::Parameter && parse_code(&entry.name).is_some_and(|(own, _)| own == group)
+            };
+            let before = found.len();
+            found.extend(self.list.iter().filter(of_group).map(|entry| entry.name.clone()));
+            if found.len() == before && !self.incomplete {
+                problems.add(file, line(file, name), format!("no parameter is in group {}", name.get_ref()));
+            }
+        }
+        found
+    }
+}
+
+/// An address that both have.
+fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
+    let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
+    let (first, second) = (one.address?, other.address?);
+    (first.max(second) <= last(first, one).min(last(second, other))).then_some(first.max(second))
+}
+
+/// Why `entry` cannot stand at its address.
+fn out_of_place(entry: &Entry, closed_groups: &[u8], memory: Option<&Memory>) -> Option<String> {
+    let address = entry.address?;
+    let [group, _] = address.to_be_bytes();
+    if entry.kind == Kind::Parameter && closed_groups.contains(&group) {
+        return Some(format!("{} is in a closed group", entry.name));
+    }
+    let mask = memory.map_or(0, Memory::mask);
+    (address & mask != 0).then(|| format!("{} has the bit set that says where a write is kept", entry.name))
+}

@@ -1,0 +1,289 @@
+//! The tables of `profile.toml` that stand by themselves or name parameters: each read and checked.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use toml::Spanned;
+
+use super::entries::Entries;
+use super::manifest::{self, Field, line};
+use super::problems::Problems;
+use super::rows::decimals;
+use super::{File, ProfileError};
+use crate::bits::BitField;
+use crate::command::Control;
+use crate::decimal::{Counts, Decimal};
+use crate::fault::Exception;
+use crate::identification::{Identification, Signature};
+use crate::lookup::parse_address;
+use crate::memory::Memory;
+use crate::quantity::{Quantity, limits};
+use crate::serial::SerialDefaults;
+use crate::variant::{Variant, VariantChoice};
+use crate::watchdog::Watchdog;
+
+/// Checks that `low` ≤ `item` ≤ `high`.
+pub(super) fn within<T>(file: &File, item: &Spanned<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>
+where
+    T: Copy + PartialOrd + std::fmt::Display,
+{
+    let value = *item.get_ref();
+    if low <= value && value <= high {
+        Ok(value)
+    } else {
+        Err(file.broken(line(file, item), format!("{what} is {value} and must be {low} to {high}")))
+    }
+}
+
+/// Checks that `quantity` takes `value`, and returns its word.
+pub(super) fn check(file: &File, line: u64, quantity: &Quantity, name: &str, value: i64) -> Result<u16, ProfileError> {
+    quantity.encode(name, &value.into()).map_err(|error| file.broken(line, error.to_string()))
+}
+
+pub(super) fn serial(file: &File, serial: &manifest::Serial) -> Result<SerialDefaults, ProfileError> {
+    let format = serial.format.get_ref();
+    let (data_bits, parity, stop_bits) = SerialDefaults::parse_format(format)
+        .ok_or_else(|| file.broken(line(file, &serial.format), format!("format \"{format}\" must be like 8E1")))?;
+    Ok(SerialDefaults {
+        baud_rate: within(file, &serial.baud_rate, 50, 10_000_000, "baud_rate")?,
+        data_bits,
+        parity,
+        stop_bits,
+        unit: serial.unit.as_ref().map(|unit| within(file, unit, 1, 247, "unit")).transpose()?,
+        response_delay: Duration::from_millis(serial.response_delay_ms.into()),
+        verified: serial.verified,
+        source: serial.source.clone(),
+    })
+}
+
+pub(super) fn memory(file: &File, spanned: &Spanned<manifest::Memory>) -> Result<Memory, ProfileError> {
+    let row = spanned.get_ref();
+    if !row.verified && row.note.is_empty() {
+        return Err(
+            file.broken(line(file, spanned), "a memory rule that is not verified needs a \"note\" that says why")
+        );
+    }
+    Ok(Memory {
+        bit: within(file, &row.bit, 8, 15, "bit")?,
+        means: row.means,
+        verified: row.verified,
+        note: row.note.clone(),
+        source: row.source.clone(),
+    })
+}
+
+pub(super) fn identifications(
+    file: &File,
+    rows: &[Spanned<manifest::IdentificationCode>],
+    problems: &mut Problems,
+) -> Vec<Identification> {
+    let mut known: Vec<Identification> = Vec::new();
+    for spanned in rows {
+        let row = spanned.get_ref();
+        if known.iter().any(|other| other.code == row.code) {
+            problems.add(file, line(file, spanned), format!("code {:04X}H is there twice", row.code));
+            continue;
+        }
+        known.push(Identification {
+            code: row.code,
+            family: row.family.clone(),
+            title: row.title.clone(),
+            shared: row.shared.clone(),
+            verified: row.verified,
+            note: row.note.clone(),
+            source: row.source.clone(),
+        });
+    }
+    known
+}
+
+/// A signature names its words, or gives their addresses: what a unit refuses is nothing that its profile has.
+pub(super) fn signature(
+    file: &File,
+    entries: &Entries,
+    row: &manifest::Signature,
+    problems: &mut Problems,
+) -> Option<Signature> {
+    let mut addresses = |names: &[Spanned<String>]| -> Vec<u16> {
+        let address = |name: &Spanned<String>| match parse_address(name.get_ref()) {
+            Some(address) => Some(address),
+            None => entries.get(file, name, problems)?.address,
+        };
+        names.iter().filter_map(address).collect()
+    };
+    let (answers, refuses) = (addresses(&row.answers), addresses(&row.refuses));
+    (!answers.is_empty()).then_some(Signature { answers, refuses })
+}
+
+pub(super) fn control(
+    file: &File,
+    entries: &Entries,
+    rows: &[Spanned<manifest::Control>],
+    problems: &mut Problems,
+) -> Vec<Control> {
+    let mut known = Vec::new();
+    for spanned in rows {
+        let row = spanned.get_ref();
+        let place = Spanned::new(spanned.span(), row.code.clone());
+        let Some(entry) = entries.get(file, &place, problems) else { continue };
+        if !row.verified && row.note.is_empty() {
+            problems.add(file, line(file, spanned), "a value that is not verified needs a \"note\" that says why");
+        }
+        let raw = check(file, line(file, spanned), &entry.quantity, &entry.name, row.value);
+        known.extend(problems.keep(raw).map(|raw| Control {
+            code: entry.name.clone(),
+            raw,
+            label: row.label.clone(),
+            verified: row.verified,
+            note: row.note.clone(),
+            source: row.source.clone(),
+        }));
+    }
+    known
+}
+
+/// Both parameters must exist, the values must be theirs, and there must be something that the drive can do.
+pub(super) fn watchdog(
+    file: &File,
+    entries: &Entries,
+    spanned: &Spanned<manifest::Watchdog>,
+    problems: &mut Problems,
+) -> Option<Watchdog> {
+    let row = spanned.get_ref();
+    let timeout = entries.get(file, &row.timeout, problems).map(|entry| entry.name.clone());
+    let action = entries.get(file, &row.action, problems)?;
+    let mut word = |value: &Option<Spanned<i64>>| {
+        let value = value.as_ref()?;
+        problems.keep(check(file, line(file, value), &action.quantity, &action.name, *value.get_ref()))
+    };
+    let (coast, stop) = (word(&row.coast), word(&row.stop));
+    if row.coast.is_none() && row.stop.is_none() {
+        problems.add(file, line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\"");
+    }
+    Some(Watchdog {
+        timeout: timeout?,
+        action: action.name.clone(),
+        coast,
+        stop,
+        verified: row.verified,
+        note: row.note.clone(),
+        source: row.source.clone(),
+    })
+}
+
+/// The exceptions of `rows` over those of `known`.
+pub(super) fn exceptions(
+    file: &File,
+    rows: &[Spanned<manifest::Exception>],
+    mut known: BTreeMap<u8, Exception>,
+    problems: &mut Problems,
+) -> BTreeMap<u8, Exception> {
+    let mut own = Vec::new();
+    for spanned in rows {
+        let row = spanned.get_ref();
+        if own.contains(&row.code) {
+            problems.add(file, line(file, spanned), format!("exception {:02X}H is there twice", row.code));
+        }
+        own.push(row.code);
+        let exception = Exception {
+            code: row.code,
+            name: row.name.clone(),
+            meaning: row.meaning.clone(),
+            source: row.source.clone(),
+        };
+        known.insert(row.code, exception);
+    }
+    known
+}
+
+pub(super) fn variant(
+    file: &File,
+    entries: &Entries,
+    spanned: &Spanned<manifest::Variant>,
+    problems: &mut Problems,
+) -> Option<Variant> {
+    let row = spanned.get_ref();
+    if !row.verified && row.note.is_empty() {
+        problems.add(file, line(file, spanned), "a variant that is not verified needs a \"note\" that says why");
+    }
+    let parameter = entries.get(file, &row.parameter, problems)?.name.clone();
+    let mut choices: BTreeMap<String, VariantChoice> = BTreeMap::new();
+    for (name, spanned) in &row.choices {
+        let choice = spanned.get_ref();
+        if choices.values().any(|other| other.word == choice.value) {
+            problems.add(file, line(file, spanned), format!("the value {} is there twice", choice.value));
+        }
+        let quantity = problems.keep(variant_quantity(choice).map_err(|why| file.broken(line(file, spanned), why)));
+        choices.extend(quantity.map(|quantity| (name.clone(), VariantChoice { word: choice.value, quantity })));
+    }
+    let (verified, note, source) = (row.verified, row.note.clone(), row.source.clone());
+    Some(Variant { parameter, choices, verified, note, source })
+}
+
+fn variant_quantity(row: &manifest::VariantChoice) -> Result<Quantity, String> {
+    let decimals =
+        decimals(row.scale).ok_or_else(|| format!("scale {} must be 1, 10, 100, 1000 or 10000", row.scale))?;
+    let (least, most) = limits(row.signed, false);
+    let bound = |value: Option<f64>| {
+        let Some(value) = value else { return Ok(None) };
+        match Decimal::parse(&format!("{value:?}")).map(|number| number.counts(decimals)) {
+            Some(Counts::Whole(count)) if (least..=most).contains(&count) => Ok(Some(count)),
+            _ => Err(format!("{value} does not fit a word with this scale and sign")),
+        }
+    };
+    Ok(Quantity {
+        unit: row.unit.clone(),
+        decimals: Some(decimals),
+        signed: row.signed,
+        wide: false,
+        low: bound(row.low)?,
+        high: bound(row.high)?,
+        low_from: None,
+        high_from: None,
+        choices: BTreeMap::new(),
+        variant: None,
+    })
+}
+
+/// The bit fields of one word, lowest first. They must not overlap, and their names must differ.
+pub(super) fn bit_fields(file: &File, fields: &[Spanned<Field>], problems: &mut Problems) -> Vec<BitField> {
+    let mut known: Vec<BitField> = Vec::new();
+    for spanned in fields {
+        let field = bit_field(spanned.get_ref()).map_err(|reason| file.broken(line(file, spanned), reason));
+        let Some(field) = problems.keep(field) else { continue };
+        if let Some(other) = known.iter().find(|other| other.name == field.name || other.mask() & field.mask() != 0) {
+            let reason = format!("\"{}\" has the name or a bit of \"{}\"", field.name, other.name);
+            problems.add(file, line(file, spanned), reason);
+        }
+        known.push(field);
+    }
+    known.sort_by_key(|field| field.low);
+    known
+}
+
+fn bit_field(row: &Field) -> Result<BitField, String> {
+    let [high, low] = row.bits;
+    if high > 15 || low > high {
+        return Err(format!("bits [{high}, {low}] must be the highest and the lowest bit, 0 to 15"));
+    }
+    let mut field = BitField {
+        name: row.name.clone(),
+        low,
+        width: high - low + 1,
+        values: BTreeMap::new(),
+        verified: row.verified,
+    };
+    match &row.values {
+        None => field.values.extend([(0, "off".to_owned()), (1, "on".to_owned())]),
+        Some(values) => {
+            for (key, label) in values {
+                let value: u16 = key.parse().map_err(|_| format!("value \"{key}\" must be a number"))?;
+                if field.extract(field.insert(0, value)) != value {
+                    return Err(format!("value {value} does not fit bits [{high}, {low}]"));
+                }
+                field.values.insert(value, label.clone());
+            }
+        }
+    }
+    Ok(field)
+}

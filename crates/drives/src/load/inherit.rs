@@ -1,0 +1,137 @@
+//! What a profile takes over from the one below it, and how much of it may then be trusted.
+
+use toml::Spanned;
+
+use super::File;
+use super::manifest::{Extends, Manifest, line};
+use super::problems::Problems;
+use crate::evidence::Evidence;
+use crate::lookup::{closest, names};
+use crate::profile::Profile;
+
+/// Tables whose rules a sibling can confirm as a whole.
+const TABLES: [&str; 9] =
+    ["commands", "state", "control", "setpoints", "memory", "requests", "serial", "watchdog", "faults"];
+
+/// `base` as the one who writes `manifest` sees it: without what is dropped, and, for a sister family, with the evidence
+/// that the assumption leaves.
+pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems: &mut Problems) -> Profile {
+    drop_rows(&mut base, file, &manifest.drop, problems);
+    // A code names one family.
+    base.identifications.clear();
+    base.signature = None;
+    if let Some(extends) = &manifest.extends {
+        assume(&mut base, file, extends.get_ref(), problems);
+    }
+    base
+}
+
+fn drop_rows(base: &mut Profile, file: &File, dropped: &[Spanned<String>], problems: &mut Problems) {
+    for name in dropped {
+        let wanted = name.get_ref();
+        let Some(index) = base.entries.iter().position(|entry| names(entry).any(|known| known == wanted)) else {
+            let closest = closest(wanted, base.entries.iter().flat_map(names)).unwrap_or_default();
+            let reason = format!("{} has no \"{wanted}\" to drop; the closest is \"{closest}\"", base.name);
+            problems.add(file, line(file, name), reason);
+            continue;
+        };
+        let gone = base.entries.remove(index);
+        let stays = |name: &String| *name != gone.name;
+        for list in [&mut base.monitor, &mut base.fault_history, &mut base.fault_values, &mut base.roles.status_words] {
+            list.retain(stays);
+        }
+        let groups = &mut base.groups;
+        for list in [&mut groups.acts, &mut groups.serial, &mut groups.motor, &mut groups.last] {
+            list.retain(stays);
+        }
+        let roles = &mut base.roles;
+        for role in [&mut roles.identification, &mut roles.fault, &mut roles.frequency, &mut roles.setpoint] {
+            role.take_if(|name| !stays(name));
+        }
+        base.control.retain(|item| stays(&item.code));
+        base.setpoints.retain(|_, role| stays(&role.register) && role.needs.iter().all(|need| stays(&need.code)));
+        base.variants.retain(|_, variant| stays(&variant.parameter));
+        base.state.take_if(|state| !stays(&state.register));
+        base.watchdog.take_if(|watchdog| !stays(&watchdog.timeout) || !stays(&watchdog.action));
+        base.moving.retain(|&address| Some(address) != gone.address);
+        if base.command_address.is_some_and(|address| Some(address) == gone.address) {
+            base.command_address = None;
+            base.commands.clear();
+            base.other_commands.clear();
+        }
+        for entry in &mut base.entries {
+            for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {
+                bound.take_if(|code| *code == gone.name);
+            }
+        }
+    }
+}
+
+/// Takes the evidence off all that the sister family's own documents do not confirm.
+fn assume(base: &mut Profile, file: &File, extends: &Extends, problems: &mut Problems) {
+    let (assumption, source) = (extends.assumption.get_ref(), &extends.confirmed_source);
+    if assumption.trim().is_empty() {
+        let reason = "\"assumption\" is empty; say why this family may be taken for the other one";
+        problems.add(file, line(file, &extends.assumption), reason);
+    }
+    if let (Some(first), true) = (extends.confirmed.first(), source.trim().is_empty()) {
+        let reason = "\"confirmed_source\" is missing; name the document that prints these rows for this family";
+        problems.add(file, line(file, first), reason);
+    }
+    for name in &extends.confirmed {
+        let wanted = name.get_ref();
+        let known =
+            TABLES.contains(&wanted.as_str()) || base.entries.iter().any(|row| names(row).any(|own| own == wanted));
+        if !known {
+            let all = base.entries.iter().flat_map(names).chain(TABLES);
+            let closest = closest(wanted, all).unwrap_or_default();
+            let reason = format!("{} has no \"{wanted}\" to confirm; the closest is \"{closest}\"", base.name);
+            problems.add(file, line(file, name), reason);
+        }
+    }
+    let confirmed = |name: &str| extends.confirmed.iter().any(|row| row.get_ref() == name);
+
+    for entry in &mut base.entries {
+        if names(entry).any(confirmed) {
+            entry.source.clone_from(source);
+        } else if entry.evidence == Evidence::Verified {
+            entry.evidence = Evidence::Unverified;
+            entry.note = joined(assumption, &entry.note);
+        }
+    }
+    if !confirmed("commands") {
+        base.commands.values_mut().for_each(|command| command.verified = false);
+        base.commands_note.clone_from(assumption);
+    }
+    if let Some(state) = base.state.as_mut().filter(|_| !confirmed("state")) {
+        (state.verified, state.note) = (false, joined(assumption, &state.note));
+    }
+    if let Some(memory) = base.memory.as_mut().filter(|_| !confirmed("memory")) {
+        (memory.verified, memory.note) = (false, joined(assumption, &memory.note));
+    }
+    if let Some(watchdog) = base.watchdog.as_mut().filter(|_| !confirmed("watchdog")) {
+        (watchdog.verified, watchdog.note) = (false, joined(assumption, &watchdog.note));
+    }
+    if let Some(serial) = base.serial.as_mut().filter(|_| !confirmed("serial")) {
+        serial.verified = false;
+    }
+    if !confirmed("requests") {
+        let requests = &mut base.requests;
+        (requests.verified, requests.note) = (false, joined(assumption, &requests.note));
+    }
+    let control = base.control.iter_mut().filter(|_| !confirmed("control"));
+    let needs = base.setpoints.values_mut().filter(|_| !confirmed("setpoints")).flat_map(|role| &mut role.needs);
+    for item in control.chain(needs) {
+        (item.verified, item.note) = (false, joined(assumption, &item.note));
+    }
+    for fault in base.faults.values_mut().filter(|_| !confirmed("faults")) {
+        if fault.evidence == Evidence::Verified {
+            fault.evidence = Evidence::Unverified;
+            fault.note = joined(assumption, &fault.note);
+        }
+    }
+}
+
+fn joined(assumption: &str, note: &str) -> String {
+    format!("{assumption} {note}").trim_end().to_owned()
+}

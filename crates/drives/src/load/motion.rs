@@ -1,0 +1,142 @@
+//! What `profile.toml` says of commands and states: the words that move a motor, and those that tell what it does.
+
+use toml::Spanned;
+
+use super::File;
+use super::entries::Entries;
+use super::facts::check;
+use super::manifest::{Manifest, States, line};
+use super::problems::Problems;
+use crate::command::{Command, CommandCode};
+use crate::profile::{Profile, UnitKind};
+use crate::state::{StateRule, StateWord};
+
+/// The command register, its codes, and what else moves a motor.
+pub(super) fn commands(
+    file: &File,
+    manifest: &Manifest,
+    profile: &mut Profile,
+    entries: &mut Entries,
+    problems: &mut Problems,
+) {
+    let Some(table) = &manifest.commands else { return };
+    profile.commands.clear();
+    profile.other_commands.clear();
+    profile.commands_note.clear();
+    let mut all: Vec<(Command, &Spanned<u16>, bool)> = Vec::new();
+    all.extend(table.codes.iter().map(|(&command, code)| (command, code, true)));
+    if let Some(assumed) = &table.assumed {
+        all.extend(assumed.codes.iter().map(|(&command, code)| (command, code, false)));
+        profile.commands_note.clone_from(assumed.reason.get_ref());
+        if assumed.reason.get_ref().trim().is_empty() {
+            problems.add(file, line(file, &assumed.reason), "\"reason\" is empty; say why these codes are assumed");
+        }
+    }
+    let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
+    profile.command_address = register.address;
+    register.quantity.choices.clear();
+    let mut choices = std::collections::BTreeMap::new();
+    for (command, spanned, verified) in all {
+        let code = *spanned.get_ref();
+        if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
+            let reason = format!("a rectifier feeds no motor: it has no {}", command.name());
+            problems.add(file, line(file, spanned), reason);
+        }
+        let word = check(file, line(file, spanned), &register.quantity, &register.name, code.into());
+        if problems.keep(word).is_none() {
+            continue;
+        }
+        if let Some(other) = choices.insert(code, command.name().to_owned()) {
+            problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
+        }
+        if profile.commands.insert(command, CommandCode { code, verified }).is_some() {
+            problems.add(file, line(file, spanned), format!("{} is there twice", command.name()));
+        }
+    }
+    for (key, label) in &table.other {
+        let Ok(code) = key.get_ref().parse::<u16>() else {
+            let reason = format!("\"{}\" must be a number, the code of \"{label}\"", key.get_ref());
+            problems.add(file, line(file, key), reason);
+            continue;
+        };
+        if let Some(other) = choices.insert(code, label.clone()) {
+            problems.add(file, line(file, key), format!("\"{label}\" has the code of {other}"));
+        }
+        profile.other_commands.insert(code, label.clone());
+    }
+    register.quantity.choices = choices;
+    let moves = entries.names(file, &table.moves, problems);
+    profile.moving = moves.iter().filter_map(|name| entries.find(name)?.address).collect();
+}
+
+/// Whether a unit without a motor can have `command`.
+fn for_rectifiers(command: Command) -> bool {
+    matches!(command, Command::RunForward | Command::Stop | Command::Coast | Command::ResetFault)
+}
+
+/// The state word, by its values or by its bits.
+pub(super) fn state(
+    file: &File,
+    manifest: &Manifest,
+    profile: &mut Profile,
+    entries: &mut Entries,
+    problems: &mut Problems,
+) {
+    let Some(spanned) = &manifest.state else { return };
+    let table = spanned.get_ref();
+    if !table.verified && table.note.is_empty() {
+        problems.add(file, line(file, spanned), "states that are not verified need a \"note\" that says why");
+    }
+    if table.codes.is_empty() == table.when.is_empty() {
+        let reason = "a state word needs either [state.codes] or [[state.when]]";
+        problems.add(file, line(file, spanned), reason);
+    }
+    let mut rules = by_bits(file, table, entries, problems);
+    let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
+    if !table.codes.is_empty() {
+        register.quantity.choices.clear();
+    }
+    for (&state, spanned) in &table.codes {
+        let code = *spanned.get_ref();
+        let word = check(file, line(file, spanned), &register.quantity, &register.name, code.into());
+        if problems.keep(word).is_none() {
+            continue;
+        }
+        if let Some(other) = register.quantity.choices.insert(code, state.name().to_owned()) {
+            problems.add(file, line(file, spanned), format!("{} has the code of {other}", state.name()));
+        }
+        rules.push(StateRule { state, mask: u16::MAX, value: code });
+    }
+    profile.state = Some(StateWord {
+        register: register.name.clone(),
+        rules,
+        verified: table.verified,
+        note: table.note.clone(),
+        source: table.source.clone(),
+    });
+}
+
+fn by_bits(file: &File, table: &States, entries: &Entries, problems: &mut Problems) -> Vec<StateRule> {
+    let Some(register) = entries.find(table.register.get_ref()) else { return Vec::new() };
+    let mut rules = Vec::new();
+    for spanned in &table.when {
+        let when = spanned.get_ref();
+        let mut rule = StateRule { state: when.state, mask: 0, value: 0 };
+        for (name, &value) in &when.fields {
+            let Some(field) = register.bits.iter().find(|field| field.name == *name) else {
+                let known = register.bits.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
+                let reason = format!("{} has no bit field \"{name}\"; it has {known}", register.name);
+                problems.add(file, line(file, spanned), reason);
+                continue;
+            };
+            if field.extract(field.insert(0, value)) != value {
+                let reason = format!("{value} does not fit the {} bits of \"{name}\"", field.width);
+                problems.add(file, line(file, spanned), reason);
+            }
+            rule.mask |= field.mask();
+            rule.value = field.insert(rule.value, value);
+        }
+        rules.push(rule);
+    }
+    rules
+}

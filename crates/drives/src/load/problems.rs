@@ -1,0 +1,34 @@
+//! Problems: all that is wrong with the files of a profile, collected, so that nobody has to mend one to see the next.
+
+use super::{File, ProfileError};
+
+/// What was found so far.
+#[derive(Debug, Default)]
+pub(super) struct Problems(Vec<ProfileError>);
+
+impl Problems {
+    /// What `result` holds; its error is noted.
+    pub(super) fn keep<T>(&mut self, result: Result<T, ProfileError>) -> Option<T> {
+        result.map_err(|error| self.0.push(error)).ok()
+    }
+
+    /// Notes what is wrong with a line of `file`.
+    pub(super) fn add(&mut self, file: &File, line: u64, reason: impl Into<String>) {
+        self.0.push(file.broken(line, reason));
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// All of them, as far as they can be told apart, in the order in which the files are read.
+    pub(super) fn into_all(mut self) -> Vec<ProfileError> {
+        let mut seen = Vec::new();
+        self.0.retain(|problem| {
+            let new = !seen.contains(problem);
+            seen.push(problem.clone());
+            new
+        });
+        self.0
+    }
+}

@@ -1,0 +1,42 @@
+//! Roles: what every drive has under some name, by the name it has in this family.
+
+use crate::entry::Entry;
+use crate::profile::Profile;
+use crate::setpoint::Setpoint;
+
+/// The registers that have a role beyond being read and written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Roles {
+    pub(crate) identification: Option<String>,
+    pub(crate) fault: Option<String>,
+    pub(crate) frequency: Option<String>,
+    pub(crate) setpoint: Option<String>,
+    /// The words whose bit fields tell more of the state.
+    pub(crate) status_words: Vec<String>,
+}
+
+impl Profile {
+    /// The entry that has a role: `"state"`, `"fault"` (the present one), `"frequency"` (at the output), `"setpoint"`
+    /// (the frequency in force), `"identification"`, or a [setpoint](Setpoint), `"setpoints.torque"`. `None` where the
+    /// family has none, or none is known, or nothing has such a role.
+    pub fn role(&self, role: &str) -> Option<&Entry> {
+        let name = match role {
+            "state" => self.state.as_ref().map(|state| &state.register),
+            "fault" => self.roles.fault.as_ref(),
+            "frequency" => self.roles.frequency.as_ref(),
+            "setpoint" => self.roles.setpoint.as_ref(),
+            "identification" => self.roles.identification.as_ref(),
+            _ => {
+                let wanted = role.strip_prefix("setpoints.")?;
+                let setpoint = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == wanted)?;
+                self.setpoints.get(&setpoint).map(|role| &role.register)
+            }
+        };
+        self.entry(name?)
+    }
+
+    /// The words whose bit fields tell more of the state than the state itself.
+    pub fn status_words(&self) -> impl Iterator<Item = &Entry> {
+        self.roles.status_words.iter().filter_map(|name| self.entry(name))
+    }
+}
