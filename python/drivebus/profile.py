@@ -13,50 +13,13 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus.errors import NotAllowed
-from drivebus.values import Choice, Description, Fault, Value, WatchdogSettings
+from drivebus.read_plan import ReadPlan
+from drivebus.values import Description, Fault, WatchdogSettings
 
-__all__ = ["Profile", "ReadPlan", "identify", "profiles"]
+__all__ = ["Profile", "identify", "profiles"]
 
 _PLANS_KEPT = 256
 """Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
-
-
-class ReadPlan:
-    """What to read for some names, and what the words that come mean: worked out once, used for every answer.
-
-    Attributes:
-        names: As they were asked for.
-        reads: Address and number of words of each read: the fewest that hold all of them.
-        units: The engineering unit of each name.
-        native: The same for the compiled core, which knows no labels.
-    """
-
-    __slots__ = ("_labels", "names", "native", "reads", "units")
-
-    def __init__(self, profile: Profile, native: _native.Plan) -> None:
-        self.native = native
-        self.names = tuple(native.names)
-        self.reads = tuple(native.reads)
-        known = [profile.describe(name) for name in self.names]
-        self.units: Mapping[str, str] = {name: row.unit for name, row in zip(self.names, known, strict=True)}
-        self._labels = [
-            (index, {value: Choice(value, label) for value, label in row.choices.items()})
-            for index, row in enumerate(known)
-            if row.choices
-        ]
-
-    def values(self, answers: Sequence[Sequence[int]]) -> list[Value]:
-        """The value of each name, in their order, out of the words that each read brought."""
-        return self.named(self.native.values(answers))
-
-    def named(self, values: list[Value]) -> list[Value]:
-        """*values*, with a `Choice` for each that the profile has a label for; the list itself is changed."""
-        for index, labels in self._labels:
-            value = values[index]
-            # A float is never a choice, although one may equal its number.
-            if isinstance(value, int):
-                values[index] = labels.get(value, value)
-        return values
 
 
 class Profile:
@@ -247,7 +210,8 @@ class Profile:
         except TypeError:  # what cannot be looked up is no name, as the core says in its own words
             plan = None
         if plan is None:
-            plan = ReadPlan(self, self._native.compile(key))
+            native = self._native.compile(key)
+            plan = ReadPlan(native, [self.describe(name) for name in native.names])
             if len(self._plans) >= _PLANS_KEPT:
                 self._plans.clear()
             self._plans[key] = plan

@@ -13,21 +13,12 @@ use crate::identification::{Identification, Signature};
 use crate::memory::{Memory, MemoryBit};
 use crate::plan::{ReadRules, ReadSpan, plan_spans};
 use crate::roles::Roles;
+use crate::rules::{Groups, Requests, UnitKind};
 use crate::serial::{SerialDefaults, USUAL_READ_COST};
 use crate::setpoint::{Setpoint, SetpointRole};
 use crate::state::{State, StateWord};
 use crate::variant::Variant;
 use crate::watchdog::Watchdog;
-
-/// Whether a unit feeds a motor, or the others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum UnitKind {
-    /// It turns a motor.
-    Inverter,
-    /// It makes the direct voltage from which inverters turn motors.
-    Rectifier,
-}
 
 /// What one family of drives means by its registers.
 ///
@@ -71,39 +62,6 @@ pub struct Profile {
     pub(crate) fault_values: Vec<String>,
     pub(crate) faults: BTreeMap<u16, Fault>,
     pub(crate) exceptions: BTreeMap<u8, Exception>,
-}
-
-/// What a drive takes as a request.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Requests {
-    /// The function codes that it takes.
-    pub functions: Vec<u8>,
-    /// Most words in one read or write, 1..=125.
-    pub max_words: u16,
-    /// Whether a read may run from one parameter group into the next.
-    pub across_groups: bool,
-    /// Whether documents of this family print all of this.
-    pub verified: bool,
-    /// What to know about it; says what is assumed where it is not verified.
-    pub note: String,
-    /// Where it is printed.
-    pub source: String,
-}
-
-/// Parameters that need care, by code.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Groups {
-    /// Groups that the maker keeps closed.
-    pub(crate) closed: Vec<u8>,
-    /// Their write does something, and is not simply kept.
-    pub(crate) acts: Vec<String>,
-    /// They set the line.
-    pub(crate) serial: Vec<String>,
-    /// They describe the motor.
-    pub(crate) motor: Vec<String>,
-    /// They are to be written last, in this order.
-    pub(crate) last: Vec<String>,
 }
 
 impl Profile {

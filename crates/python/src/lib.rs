@@ -20,6 +20,7 @@ mod pyserial;
 mod requests;
 mod sim;
 mod sim_line;
+mod tables;
 
 /// Nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]

@@ -8,7 +8,7 @@ use pyo3::types::PyList;
 
 use crate::convert::words_of;
 use crate::errors::not_allowed;
-use crate::profile::number;
+use crate::tables::number;
 
 /// Reads and their values, worked out once.
 #[pyclass(frozen, module = "drivebus._native")]

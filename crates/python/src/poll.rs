@@ -14,8 +14,8 @@ use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{Class, call_error, not_allowed, refuse};
 use crate::mailbox::Mailbox;
 use crate::plan::Plan;
-use crate::profile::number;
 use crate::requests::{Asked, apart, nothing};
+use crate::tables::number;
 
 /// What the words of a target mean.
 #[derive(Debug)]

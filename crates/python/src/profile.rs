@@ -1,18 +1,16 @@
-//! `Profile` for Python: dictionaries, ints and floats where Rust has types.
+//! `Profile` for Python: what it asks of a profile, in Python's words.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{
-    self as drives, Command, Control, Counts, Entry, Fault, Input, Kind, MemoryBit, ProfileError, Quantity, Setpoint,
-    Store, UnitKind, Value,
-};
+use drivebus_drives::{self as drives, Command, Entry, Input, ProfileError, Setpoint, Store, UnitKind};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat, PyInt, PyString};
+use pyo3::types::{PyDict, PyFloat, PyString};
 
 use crate::convert::{one_word, shown};
 use crate::errors::{not_allowed, refuse};
 use crate::plan::Plan;
+use crate::tables::{self, known_as, number};
 
 /// What one family of drives means by its registers.
 #[pyclass(name = "Profile", frozen, module = "drivebus._native")]
@@ -82,25 +80,11 @@ impl Profile {
     }
 
     fn requests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let requests = self.0.requests();
-        let dict = PyDict::new(py);
-        dict.set_item("across_groups", requests.across_groups)?;
-        dict.set_item("verified", requests.verified)?;
-        dict.set_item("note", &requests.note)?;
-        dict.set_item("source", &requests.source)?;
-        Ok(dict)
+        tables::requests(py, self.0.requests())
     }
 
     fn serial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(serial) = self.0.serial() else { return Ok(None) };
-        let dict = PyDict::new(py);
-        dict.set_item("baud_rate", serial.baud_rate)?;
-        dict.set_item("format", format!("{}{}{}", serial.data_bits, serial.parity, serial.stop_bits))?;
-        dict.set_item("unit", serial.unit)?;
-        dict.set_item("response_delay", serial.response_delay.as_secs_f64())?;
-        dict.set_item("verified", serial.verified)?;
-        dict.set_item("source", &serial.source)?;
-        Ok(Some(dict))
+        self.0.serial().map(|serial| tables::serial(py, serial)).transpose()
     }
 
     #[getter]
@@ -123,18 +107,7 @@ impl Profile {
     }
 
     fn identifications<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = self.0.identifications().iter().map(|row| {
-            let dict = PyDict::new(py);
-            dict.set_item("code", row.code)?;
-            dict.set_item("family", &row.family)?;
-            dict.set_item("title", &row.title)?;
-            dict.set_item("shared", &row.shared)?;
-            dict.set_item("verified", row.verified)?;
-            dict.set_item("note", &row.note)?;
-            dict.set_item("source", &row.source)?;
-            Ok(dict)
-        });
-        rows.collect()
+        self.0.identifications().iter().map(|row| tables::identification(py, row)).collect()
     }
 
     /// The addresses that a unit of this family answers, and those that it refuses.
@@ -186,54 +159,12 @@ impl Profile {
 
     /// Total, sourced, unverified and assumed rows, by what they are.
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (name, counts) in [
-            ("registers", self.0.count_entries(Kind::Register)),
-            ("parameters", self.0.count_entries(Kind::Parameter)),
-            ("faults", self.0.count_faults()),
-        ] {
-            dict.set_item(name, counted(py, counts)?)?;
-        }
-        Ok(dict)
+        tables::counts(py, &self.0)
     }
 
     #[pyo3(signature = (name, /))]
     fn describe<'py>(&self, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        let py = name.py();
-        let entry = self.find(name)?;
-        let quantity = entry.quantity();
-        let value = |value: Option<Value>| value.map(|value| number(py, quantity, value));
-        let dict = PyDict::new(py);
-        dict.set_item("name", known_as(entry))?;
-        dict.set_item("code", entry.code())?;
-        dict.set_item("label", entry.label())?;
-        dict.set_item(
-            "kind",
-            match entry.kind() {
-                Kind::Register => "register",
-                Kind::Parameter => "parameter",
-            },
-        )?;
-        dict.set_item("address", entry.address())?;
-        dict.set_item("unit", quantity.unit())?;
-        // Where the scale is not known the unit is "raw", and there is one count to it.
-        dict.set_item("scale", quantity.scale().unwrap_or(1))?;
-        dict.set_item("signed", quantity.is_signed())?;
-        dict.set_item("low", value(quantity.low()))?;
-        dict.set_item("high", value(quantity.high()))?;
-        dict.set_item("low_from", quantity.low_from())?;
-        dict.set_item("high_from", quantity.high_from())?;
-        dict.set_item("default", value(entry.default_raw().map(|raw| entry.decode(raw))))?;
-        dict.set_item("access", entry.access().name())?;
-        dict.set_item("choices", quantity.choices())?;
-        dict.set_item("bits", bits(py, entry)?)?;
-        dict.set_item("source", entry.source())?;
-        dict.set_item("verified", entry.verified())?;
-        dict.set_item("evidence", entry.evidence().name())?;
-        dict.set_item("note", entry.note())?;
-        dict.set_item("words", entry.words())?;
-        dict.set_item("variant", quantity.variant())?;
-        Ok(dict)
+        tables::description(name.py(), self.find(name)?)
     }
 
     #[pyo3(signature = (name, /, *, store = None))]
@@ -342,19 +273,7 @@ impl Profile {
     }
 
     fn memory<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(memory) = self.0.memory() else { return Ok(None) };
-        let dict = PyDict::new(py);
-        dict.set_item("bit", memory.bit)?;
-        dict.set_item(
-            "means",
-            match memory.means {
-                MemoryBit::Ram => "ram",
-                MemoryBit::Eeprom => "eeprom",
-            },
-        )?;
-        dict.set_item("reason", (!memory.verified).then_some(&memory.note))?;
-        dict.set_item("source", &memory.source)?;
-        Ok(Some(dict))
+        self.0.memory().map(|memory| tables::memory(py, memory)).transpose()
     }
 
     #[pyo3(signature = (address, /))]
@@ -373,7 +292,7 @@ impl Profile {
     }
 
     fn control<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.items(py, self.0.control())
+        tables::items(py, &self.0, self.0.control())
     }
 
     fn setpoint_names(&self) -> Vec<&'static str> {
@@ -386,24 +305,11 @@ impl Profile {
         let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
         let role = known.and_then(|setpoint| self.0.setpoints().get(&setpoint));
         let missing = || not_allowed(format!("{} has no setpoint {name}", self.0.name()));
-        self.items(setpoint.py(), &role.ok_or_else(missing)?.needs)
+        tables::items(setpoint.py(), &self.0, &role.ok_or_else(missing)?.needs)
     }
 
     fn variants<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = PyDict::new(py);
-        for (name, variant) in self.0.variants() {
-            let dict = PyDict::new(py);
-            dict.set_item("parameter", &variant.parameter)?;
-            let choices = PyDict::new(py);
-            for (choice, known) in &variant.choices {
-                choices.set_item(choice, known.word)?;
-            }
-            dict.set_item("choices", choices)?;
-            dict.set_item("reason", (!variant.verified).then_some(&variant.note))?;
-            dict.set_item("source", &variant.source)?;
-            all.set_item(name, dict)?;
-        }
-        Ok(all)
+        tables::variants(py, &self.0)
     }
 
     #[getter]
@@ -426,32 +332,16 @@ impl Profile {
     }
 
     fn watchdog<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(watchdog) = self.0.watchdog() else {
-            return Ok(None);
-        };
-        let actions = PyDict::new(py);
-        for (name, word) in [("coast", watchdog.coast), ("stop", watchdog.stop)] {
-            if let Some(word) = word {
-                actions.set_item(name, word)?;
-            }
-        }
-        let dict = PyDict::new(py);
-        dict.set_item("timeout", &watchdog.timeout)?;
-        dict.set_item("action", &watchdog.action)?;
-        dict.set_item("actions", actions)?;
-        dict.set_item("verified", watchdog.verified)?;
-        dict.set_item("note", &watchdog.note)?;
-        dict.set_item("source", &watchdog.source)?;
-        Ok(Some(dict))
+        self.0.watchdog().map(|watchdog| tables::watchdog(py, watchdog)).transpose()
     }
 
     #[pyo3(signature = (code, /))]
     fn fault<'py>(&self, code: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        fault(code.py(), &self.0.fault(one_word("code", code)?))
+        tables::fault(code.py(), &self.0.fault(one_word("code", code)?))
     }
 
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.0.faults().map(|row| fault(py, row)).collect()
+        self.0.faults().map(|row| tables::fault(py, row)).collect()
     }
 
     fn exceptions(&self) -> std::collections::BTreeMap<u8, (&str, &str)> {
@@ -467,31 +357,10 @@ impl Profile {
 }
 
 impl Profile {
-    /// Parameters that must have certain values.
-    fn items<'py>(&self, py: Python<'py>, rows: &[Control]) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = rows.iter().map(|row| {
-            let entry = self.0.find(&row.code).map_err(refuse)?;
-            let dict = PyDict::new(py);
-            dict.set_item("code", &row.code)?;
-            dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
-            dict.set_item("label", &row.label)?;
-            dict.set_item("verified", row.verified)?;
-            dict.set_item("note", &row.note)?;
-            dict.set_item("source", &row.source)?;
-            Ok(dict)
-        });
-        rows.collect()
-    }
-
     /// The register or parameter that `name` means.
     fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<&Entry> {
         self.0.find(&text("name", name)?).map_err(refuse)
     }
-}
-
-/// What people call an entry: its name where it has one, else its code.
-fn known_as(entry: &Entry) -> &str {
-    entry.alias().unwrap_or_else(|| entry.name())
 }
 
 fn path(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
@@ -506,52 +375,7 @@ fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
     }
 }
 
-fn counted(py: Python<'_>, counts: Counts) -> PyResult<Bound<'_, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("total", counts.total)?;
-    dict.set_item("sourced", counts.sourced)?;
-    dict.set_item("unsourced", counts.total - counts.sourced)?;
-    dict.set_item("unverified", counts.unverified)?;
-    dict.set_item("assumed", counts.assumed)?;
-    Ok(dict)
-}
-
 /// A `str`.
 fn text(what: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
     given.extract().map_err(|_| not_allowed(format!("{what} {} is no text", shown(given))))
-}
-
-/// `value` as a float where the drive measures, as an int where it counts or names.
-pub(crate) fn number<'py>(py: Python<'py>, quantity: &Quantity, value: Value) -> Bound<'py, PyAny> {
-    if quantity.measures() {
-        PyFloat::new(py, value.to_f64()).into_any()
-    } else {
-        PyInt::new(py, value.count()).into_any()
-    }
-}
-
-/// The bit fields of `entry` and what their values mean; `None` where there are none.
-fn bits<'py>(py: Python<'py>, entry: &Entry) -> PyResult<Option<Bound<'py, PyDict>>> {
-    if entry.bits().is_empty() {
-        return Ok(None);
-    }
-    let dict = PyDict::new(py);
-    for field in entry.bits() {
-        dict.set_item(field.name(), field.values())?;
-    }
-    Ok(Some(dict))
-}
-
-fn fault<'py>(py: Python<'py>, fault: &Fault) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("code", fault.code)?;
-    dict.set_item("mnemonic", &fault.mnemonic)?;
-    dict.set_item("label", &fault.label)?;
-    dict.set_item("cause", &fault.cause)?;
-    dict.set_item("remedy", &fault.remedy)?;
-    dict.set_item("verified", fault.verified())?;
-    dict.set_item("evidence", fault.evidence.name())?;
-    dict.set_item("note", &fault.note)?;
-    dict.set_item("source", &fault.source)?;
-    Ok(dict)
 }

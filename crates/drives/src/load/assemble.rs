@@ -11,8 +11,9 @@ use super::manifest::{self, Manifest, line};
 use super::motion;
 use super::problems::Problems;
 use super::{File, inherit, rows};
-use crate::profile::{Groups, Profile, Requests, UnitKind};
+use crate::profile::Profile;
 use crate::roles::Roles;
+use crate::rules::{Groups, Requests, UnitKind};
 use crate::setpoint::{Setpoint, SetpointRole};
 
 /// Reads and checks all of `files`, over `base`. What is wrong goes to `problems`; then there may be no profile.

@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{File, ProfileError, line_of};
 use crate::command::Command;
 use crate::memory::MemoryBit;
-use crate::profile::UnitKind;
+use crate::rules::UnitKind;
 use crate::setpoint::Setpoint;
 use crate::state::State;
 

@@ -8,7 +8,8 @@ use super::facts::check;
 use super::manifest::{Manifest, States, line};
 use super::problems::Problems;
 use crate::command::{Command, CommandCode};
-use crate::profile::{Profile, UnitKind};
+use crate::profile::Profile;
+use crate::rules::UnitKind;
 use crate::state::{StateRule, StateWord};
 
 /// The command register, its codes, and what else moves a motor.

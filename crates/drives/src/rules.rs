@@ -1,0 +1,44 @@
+//! Rules: what kind of unit a family is, what requests it takes, and which of its parameters need care.
+
+/// Whether a unit feeds a motor, or the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnitKind {
+    /// It turns a motor.
+    Inverter,
+    /// It makes the direct voltage from which inverters turn motors.
+    Rectifier,
+}
+
+/// What a drive takes as a request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Requests {
+    /// The function codes that it takes.
+    pub functions: Vec<u8>,
+    /// Most words in one read or write, 1..=125.
+    pub max_words: u16,
+    /// Whether a read may run from one parameter group into the next.
+    pub across_groups: bool,
+    /// Whether documents of this family print all of this.
+    pub verified: bool,
+    /// What to know about it; says what is assumed where it is not verified.
+    pub note: String,
+    /// Where it is printed.
+    pub source: String,
+}
+
+/// Parameters that need care, by code.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Groups {
+    /// Groups that the maker keeps closed.
+    pub(crate) closed: Vec<u8>,
+    /// Their write does something, and is not simply kept.
+    pub(crate) acts: Vec<String>,
+    /// They set the line.
+    pub(crate) serial: Vec<String>,
+    /// They describe the motor.
+    pub(crate) motor: Vec<String>,
+    /// They are to be written last, in this order.
+    pub(crate) last: Vec<String>,
+}
