@@ -210,7 +210,7 @@ def profiles() -> dict[str, bytes]:
         "many-digits": instead(1, "630.00", "0" * 400 + "1." + "0" * 400),
         "least-word": instead(1, "-20.0,120.0", "-3276.8,3276.7"),
         "one-value": instead(1, "-20.0,120.0", "0x0A,0x0A"),
-        "no-bounds": instead(1, "10,yes,-20.0,120.0", ",no,,"),
+        "no-bounds": instead(1, "10,yes,,-20.0,120.0", ",no,,,"),
         "last-addresses": instead(1, "3004H", "7FFFH"),
         "hex-default": instead(2, ",50.00,stop", ",0x1388,stop"),
         "choice-twice": instead(2, "0=keypad;2=bus", "0=bus;2=BUS"),
@@ -220,6 +220,18 @@ def profiles() -> dict[str, bytes]:
         "long-name": instead(0, 'registers = ["frequency"', f'registers = ["{"frequency" * 60}"'),
         "bits-overlap": instead(0, "bits = [2, 1]", "bits = [15, 0]"),
         "max-words": instead(0, "max_words = 4", "max_words = 125"),
+        "over-a-shipped-one": b'=== 0\nname = "a"\nsource = "b"\n[overlay]\nprofile = "gd350"\n',
+        "a-sister": b'=== 0\nname = "a"\nsource = "b"\ndrop = ["P00.03"]\n[extends]\nprofile = "gd350"\nassumption = "c"\n',
+        "over-itself": b'=== 0\nname = "a"\nsource = "b"\n[overlay]\nprofile = "./"\n',
+        "two-words-at-the-end": instead(1, "0x3006", "0xFFFF"),
+        "two-words-overlap": instead(1, "0x3006", "0x30FF").replace(b"0x7001", b"0x3100"),
+        "wide-and-signed": instead(1, "1,no,2", "1000,yes,2"),
+        "rectifier": instead(0, 'title = "Small drive"', 'title = "Small drive"\nkind = "rectifier"'),
+        "state-by-nothing": instead(0, "fields = { ready = 0 }", "fields = {}"),
+        "no-such-field": instead(0, "fields = { ready = 0 }", "fields = { x = 0 }"),
+        "variant-out-of-range": instead(0, "high = 600.0", "high = 6e9"),
+        "variant-not-there": instead(1, "speed_unit", "sped_unit"),
+        "memory-low-bit": instead(0, "bit = 15", "bit = 8"),
     }
 
 

@@ -134,7 +134,7 @@ impl Profile {
     pub fn builtin(name: &str) -> Result<Arc<Self>, ProfileError> {
         match BUILTINS.iter().find(|builtin| builtin.name.eq_ignore_ascii_case(name.trim())) {
             Some(builtin) => {
-                let load = || first(check_files(&builtin.files(), None, 1)).map(Arc::new);
+                let load = || first(check_files(&builtin.files(), None, &[])).map(Arc::new);
                 builtin.loaded.get_or_init(load).clone()
             }
             None => Err(ProfileError::Unknown {
@@ -155,12 +155,12 @@ impl Profile {
     ///
     /// [`ProfileError`]: a file is missing or cannot be read, or a line of it says something that cannot be.
     pub fn load(folder: &Path) -> Result<Self, ProfileError> {
-        first(load(folder, 1))
+        first(load(folder, &[]))
     }
 
     /// All that is wrong with the profile in `folder`, each with file, line and reason; nothing if it is sound.
     pub fn check(folder: &Path) -> Vec<ProfileError> {
-        load(folder, 1).err().unwrap_or_default()
+        load(folder, &[]).err().unwrap_or_default()
     }
 }
 
@@ -171,8 +171,8 @@ fn first(loaded: Result<Profile, Vec<ProfileError>>) -> Result<Profile, ProfileE
     })
 }
 
-/// Loads the profile in `folder`, on `level` of those that lie one over the other, counted from the top.
-fn load(folder: &Path, level: usize) -> Result<Profile, Vec<ProfileError>> {
+/// Loads the profile in `folder`, below those in the folders `above`.
+fn load(folder: &Path, above: &[PathBuf]) -> Result<Profile, Vec<ProfileError>> {
     let manifest = read(folder, "profile.toml").map_err(|error| vec![error])?;
     let table = |name: &str| folder.join(name).exists().then(|| read(folder, name)).transpose();
     let mut problems = Problems::default();
@@ -185,14 +185,14 @@ fn load(folder: &Path, level: usize) -> Result<Profile, Vec<ProfileError>> {
     if !problems.is_empty() {
         return Err(problems.into_all());
     }
-    check_files(&files, Some(folder), level)
+    check_files(&files, Some(folder), above)
 }
 
 /// Puts a profile together from `files`, and from the one below them.
-fn check_files(files: &Files, folder: Option<&Path>, level: usize) -> Result<Profile, Vec<ProfileError>> {
+fn check_files(files: &Files, folder: Option<&Path>, above: &[PathBuf]) -> Result<Profile, Vec<ProfileError>> {
     let file = &files.manifest;
     let manifest = manifest::read(file).map_err(|error| vec![error])?;
-    let base = below(file, &manifest, folder, level)?;
+    let base = below(file, &manifest, folder, above)?;
     let mut problems = Problems::default();
     if base.is_none() {
         let tables =
@@ -216,7 +216,7 @@ fn below(
     file: &File,
     manifest: &Manifest,
     folder: Option<&Path>,
-    level: usize,
+    above: &[PathBuf],
 ) -> Result<Option<Profile>, Vec<ProfileError>> {
     let name = match (&manifest.extends, &manifest.overlay) {
         (Some(extends), None) => &extends.get_ref().profile,
@@ -229,11 +229,6 @@ fn below(
     };
     let line = manifest::line(file, name);
     let wanted = name.get_ref();
-    if level >= MOST_LEVELS {
-        let reason =
-            format!("\"{wanted}\" would lie below {level} others; {MOST_LEVELS} are the most, and none itself");
-        return Err(vec![file.broken(line, reason)]);
-    }
     if let Some(folder) = folder.filter(|_| wanted.contains(['/', '\\'])) {
         let path = PathBuf::from(wanted);
         let plain =
@@ -242,7 +237,21 @@ fn below(
             let reason = format!("\"{wanted}\" must be a shipped name, or a folder relative to this one");
             return Err(vec![file.broken(line, reason)]);
         }
-        return load(&folder.join(path), level + 1).map(Some);
+        let wrong = |reason: String| Err(vec![file.broken(line, reason)]);
+        let real = |folder: &Path| folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let below = folder.join(path);
+        let mut above = above.to_vec();
+        above.push(real(folder));
+        if above.contains(&real(&below)) {
+            return wrong(format!("\"{wanted}\" leads back to this profile: none can lie below itself"));
+        }
+        if above.len() >= MOST_LEVELS {
+            return wrong(format!(
+                "\"{wanted}\" lies below {} others; {MOST_LEVELS} one over the other are the most",
+                above.len()
+            ));
+        }
+        return load(&below, &above).map(Some);
     }
     match Profile::builtin(wanted) {
         Ok(base) => Ok(Some(Profile::clone(&base))),

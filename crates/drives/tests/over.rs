@@ -1,0 +1,183 @@
+//! Profiles over profiles: what an overlay adds, what a sister family takes over, and how much of it is then trusted.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::PathBuf;
+
+use drivebus_drives::{Command, Evidence, Profile, ProfileError, State, Store};
+
+/// A folder of a test's own, removed when it is dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str, files: &[(&str, &str)]) -> Self {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("over-{name}-{}", std::process::id()));
+        for (file, text) in files {
+            let path = folder.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        Self(folder)
+    }
+
+    fn load(&self) -> Result<Profile, ProfileError> {
+        Profile::load(&self.0)
+    }
+
+    /// The reasons of all that is wrong with it.
+    fn reasons(&self) -> Vec<String> {
+        Profile::check(&self.0).iter().map(ToString::to_string).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder left behind in the build directory harms nobody.
+        drop(fs::remove_dir_all(&self.0));
+    }
+}
+
+const REGISTERS: &str = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source\n";
+const FAULTS: &str = "code,mnemonic,label,cause,remedy,verified,note,source\n";
+
+#[test]
+fn an_overlay_adds_and_replaces_and_leaves_the_rest_as_it_is() {
+    let base = Profile::builtin("gd350").unwrap();
+    let rows = format!(
+        "{REGISTERS}0x3004,output_current,Output current of plant 7,A,100,no,0.00,300.00,,ro,yes,,\"Plant 7, sheet 3\"\n\
+         0x3020,oil_pressure,Oil pressure,bar,10,no,0.0,20.0,,ro,yes,,\"Plant 7, sheet 4\"\n"
+    );
+    let overlay = "name = \"plant-7\"\nsource = \"Plant 7\"\n[overlay]\nprofile = \"gd350\"\n";
+    let folder = Folder::new("plant", &[("profile.toml", overlay), ("registers.csv", &rows)]);
+    let profile = folder.load().unwrap();
+
+    assert_eq!((profile.name(), profile.family(), profile.title()), ("plant-7", "gd350", base.title()));
+    assert_eq!(profile.find("output_current").unwrap().decode(1234).to_string(), "12.34");
+    assert_eq!(profile.find("oil_pressure").unwrap().address(), Some(0x3020));
+    assert_eq!(profile.entries().count(), base.entries().count() + 1);
+    for entry in base.entries().filter(|entry| entry.name() != "output_current") {
+        assert_eq!(profile.find(entry.name()), Ok(entry));
+    }
+    assert_eq!(profile.commands(), base.commands());
+    assert_eq!(profile.control(), base.control());
+    // The code of the drive names the family below, and that is asked for it.
+    assert_eq!(profile.identifications(), []);
+}
+
+#[test]
+fn a_sister_family_is_trusted_as_far_as_its_own_documents_go() {
+    let manifest = r#"
+        name = "gd999"
+        title = "Goodrive999"
+        source = "GD999 leaflet"
+        drop = ["rev_upper_frequency"]
+        [extends]
+        profile = "gd350"
+        assumption = "The leaflet calls it compatible with the GD350."
+        confirmed = ["set_frequency", "memory"]
+        confirmed_source = "GD999 leaflet, p. 2"
+    "#;
+    let profile = Folder::new("sister", &[("profile.toml", manifest)]).load().unwrap();
+
+    let setpoint = profile.find("set_frequency").unwrap();
+    assert_eq!((setpoint.evidence(), setpoint.source()), (Evidence::Verified, "GD999 leaflet, p. 2"));
+    let current = profile.find("output_current").unwrap();
+    assert_eq!(current.evidence(), Evidence::Unverified);
+    assert!(current.note().starts_with("The leaflet calls it compatible with the GD350."), "{}", current.note());
+    assert!(profile.find("rev_upper_frequency").is_err());
+
+    assert_eq!(profile.command(Command::Stop), Some((0x2000, 5)));
+    assert_eq!(profile.command_note(Command::Stop), Some("The leaflet calls it compatible with the GD350."));
+    assert!(!profile.state_word().unwrap().verified);
+    assert_eq!(profile.state(3), State::Stopped);
+    assert!(profile.control().iter().all(|item| !item.verified));
+    assert!(profile.memory().unwrap().verified, "it is confirmed");
+    assert_eq!(profile.write_address(profile.find("P00.11").unwrap(), Store::Ram), Ok(0x800B));
+    assert_eq!((profile.identifications(), profile.family()), ([].as_slice(), "gd999"));
+}
+
+#[test]
+fn what_lies_below_must_be_there_and_end_somewhere() {
+    let manifest = |table: &str| format!("name = \"mine\"\nsource = \"me\"\n{table}\n");
+    for (name, table, reason) in [
+        ("unknown", "[overlay]\nprofile = \"gd35o\"", "the closest is \"gd35"),
+        ("itself", "[overlay]\nprofile = \"../over-itself-PID\"", "leads back to this profile"),
+        ("absolute", "[overlay]\nprofile = \"/etc\"", "relative to this one"),
+        ("both", "[overlay]\nprofile = \"gd350\"\n[extends]\nprofile = \"gd350\"\nassumption = \"so\"", "not both"),
+        ("silent", "[extends]\nprofile = \"gd350\"\nassumption = \" \"", "\"assumption\" is empty"),
+        ("nothing", "[extends]\nprofile = \"gd350\"", "assumption"),
+        (
+            "unsourced",
+            "[extends]\nprofile = \"gd350\"\nassumption = \"so\"\nconfirmed = [\"memory\"]",
+            "\"confirmed_source\" is missing",
+        ),
+        (
+            "misspelt",
+            "[extends]\nprofile = \"gd350\"\nassumption = \"so\"\nconfirmed_source = \"me\"\nconfirmed = [\"memroy\"]",
+            "the closest is \"memory\"",
+        ),
+    ] {
+        let table = table.replace("PID", &std::process::id().to_string());
+        let folder = Folder::new(name, &[("profile.toml", &manifest(&table))]);
+        let reasons = folder.reasons();
+        assert!(matches!(&reasons[..], [only] if only.contains(reason)), "{name}: {reasons:?}");
+    }
+    let dropped = manifest("drop = [\"no_such_row\"]\n[overlay]\nprofile = \"gd350\"");
+    let reasons = Folder::new("dropped", &[("profile.toml", &dropped)]).reasons();
+    assert!(reasons[0].contains("to drop; the closest is"), "{reasons:?}");
+}
+
+#[test]
+fn a_rectifier_has_no_command_that_needs_a_motor() {
+    let manifest = r#"
+        name = "rectifier"
+        title = "A rectifier"
+        kind = "rectifier"
+        source = "leaflet"
+        [requests]
+        functions = [3, 6]
+        max_words = 16
+        source = "leaflet"
+        [parameters]
+        address = "group.index"
+        source = "leaflet"
+        [commands]
+        register = "command"
+        moves = ["command"]
+        source = "leaflet"
+        codes = { run_forward = 1, stop = 5, jog_forward = 3, run_reverse = 2 }
+    "#;
+    let rows = format!("{REGISTERS}0x2000,command,Command,,1,no,,,,rw,yes,,leaflet\n");
+    let parameters =
+        "code,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n";
+    let files =
+        [("profile.toml", manifest), ("registers.csv", &rows), ("parameters.csv", parameters), ("faults.csv", FAULTS)];
+    let reasons = Folder::new("rectifier", &files).reasons();
+    assert_eq!(reasons.len(), 2, "{reasons:?}");
+    for (reason, command) in reasons.iter().zip(["run_reverse", "jog_forward"]) {
+        assert!(reason.contains("line 17") && reason.ends_with(&format!("it has no {command}")), "{reason}");
+    }
+}
+
+/// A row whose address nobody knows is described, and cannot be used; an overlay can say where it is.
+#[test]
+fn a_row_without_an_address_waits_for_one() {
+    let manifest = "name = \"partly\"\nsource = \"me\"\n[overlay]\nprofile = \"gd350\"\n";
+    let rows = format!("{REGISTERS},oil_pressure,Oil pressure,bar,10,no,,,,ro,assumed,No page says where it is.,\n");
+    let folder =
+        Folder::new("partly", &[("profile.toml", manifest), ("registers.csv", &rows), ("full/faults.csv", FAULTS)]);
+    let partly = folder.load().unwrap();
+    let pressure = partly.find("oil_pressure").unwrap();
+    assert_eq!((pressure.address(), pressure.evidence()), (None, Evidence::Assumed));
+    let refused = partly.plan([pressure]).unwrap_err().to_string();
+    assert!(refused.contains("No page says where it is."), "{refused}");
+
+    let own = folder.0.file_name().unwrap().to_string_lossy().into_owned();
+    let above = format!("name = \"full\"\nsource = \"me\"\n[overlay]\nprofile = \"../../{own}\"\n");
+    fs::write(folder.0.join("full/profile.toml"), above).unwrap();
+    let row = format!("{REGISTERS}0x3020,oil_pressure,Oil pressure,bar,10,no,,,,ro,yes,,sheet 4\n");
+    fs::write(folder.0.join("full/registers.csv"), row).unwrap();
+    let full = Profile::load(&folder.0.join("full")).unwrap();
+    assert_eq!(full.find("oil_pressure").unwrap().address(), Some(0x3020));
+    assert_eq!((full.family(), full.entries().count()), ("gd350", partly.entries().count()));
+}
