@@ -14,6 +14,7 @@ This is not a safety function. An emergency stop is a wire.
 
 from drivebus import doctor, rtu, sim
 from drivebus._native import SerialFormat, __version__, crc16
+from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
 from drivebus.bus import Bus
 from drivebus.drive import Drive
 from drivebus.errors import (
@@ -48,6 +49,7 @@ from drivebus.values import (
 )
 
 __all__ = [
+    "Backup",
     "BadAnswer",
     "Batch",
     "Bus",
@@ -57,6 +59,8 @@ __all__ = [
     "ControlSource",
     "CrcError",
     "Description",
+    "Diff",
+    "Difference",
     "Drive",
     "DrivebusError",
     "DrivebusWarning",
@@ -69,6 +73,8 @@ __all__ = [
     "PortError",
     "Profile",
     "Refused",
+    "Restoration",
+    "Restored",
     "Sample",
     "SerialFormat",
     "Simulator",

@@ -64,6 +64,9 @@ class Drive:
     wait_until_stopped = blocking(Operations.wait_until_stopped)
     check_control = blocking(Operations.check_control)
     prepare_control = blocking(Operations.prepare_control)
+    backup = blocking(Operations.backup)
+    restore = blocking(Operations.restore)
+    diff = blocking(Operations.diff)
 
     def describe(self, name: str) -> Description:
         """All that is known of a register or parameter. Nothing is sent.

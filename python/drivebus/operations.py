@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drivebus import checks
+from drivebus.backup import Keeping
 from drivebus.errors import Unconfirmed
 from drivebus.motion import POLL_INTERVAL, Motion, Seen
 from drivebus.values import Control, ControlItem, Fault, Snapshot, State, Status
@@ -18,7 +19,7 @@ _STANDSTILL = 0.05
 """Output frequency in Hz below which a drive that has stopped counts as stopped."""
 
 
-class Operations(Motion):
+class Operations(Keeping, Motion):
     """All that can be asked of a drive.
 
     Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,

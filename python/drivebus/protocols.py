@@ -140,7 +140,11 @@ class ProfileProtocol(Protocol):
 
     @property
     def name(self) -> str:
-        """The family, such as `"gd350"`."""
+        """The profile, such as `"gd350"`."""
+
+    @property
+    def family(self) -> str:
+        """The family: its own name, or for an overlay that of the profile below it."""
 
     @property
     def title(self) -> str:
@@ -151,6 +155,9 @@ class ProfileProtocol(Protocol):
 
     def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address*, or None."""
+
+    def role(self, what: str, /) -> str | None:
+        """The register for `"state"`, `"fault"`, `"frequency"`, `"setpoints.torque"` …, if the family has one."""
 
     def monitor_names(self) -> list[str]:
         """The registers worth watching."""
@@ -188,6 +195,12 @@ class ProfileProtocol(Protocol):
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus."""
 
+    def setpoint_names(self) -> list[str]:
+        """What the drive can be told besides commands, such as `"frequency"` and `"torque"`."""
+
+    def needs(self, setpoint: str, /) -> list[dict[str, Any]]:
+        """What must be set before the drive heeds a setpoint."""
+
     def fault(self, code: int, /) -> Fault:
         """One fault by its number."""
 
@@ -212,3 +225,23 @@ class ProfileProtocol(Protocol):
     @property
     def fault_history(self) -> Sequence[str]:
         """The parameters that hold the last faults, the latest first."""
+
+    @property
+    def fault_values(self) -> Sequence[str]:
+        """The parameters that hold what the drive saw when it tripped last."""
+
+    @property
+    def version(self) -> int:
+        """The version of the profile."""
+
+    def acts(self) -> list[str]:
+        """The parameters whose write does something, such as tuning the motor."""
+
+    def serial_parameters(self) -> list[str]:
+        """The parameters that hold the settings of the serial line."""
+
+    def motor_parameters(self) -> list[str]:
+        """The parameters that hold the data of the motor."""
+
+    def last_parameters(self) -> list[str]:
+        """The parameters that are written after all others, in this order."""

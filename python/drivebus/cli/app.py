@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus.cli import doctor, look, move, tools
+from drivebus.cli import backup, doctor, look, move, tools
 from drivebus.cli.names import complete_profile
 from drivebus.cli.output import Output
 from drivebus.cli.session import Session, exit_code, parse_format
@@ -37,7 +37,8 @@ class _Commands(click.Group):
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
     },
-    epilog="Exit codes: 0 done, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, 6 bad answer, 7 unconfirmed. "
+    epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
+    "6 bad answer, 7 unconfirmed. "
     "Each option before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
     "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an "
     "emergency stop is a wire.",
@@ -111,7 +112,7 @@ def cli(
     context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485)
 
 
-for command in (*look.COMMANDS, *doctor.COMMANDS, *move.COMMANDS, *tools.COMMANDS):
+for command in (*look.COMMANDS, *doctor.COMMANDS, *move.COMMANDS, *backup.COMMANDS, *tools.COMMANDS):
     cli.add_command(command)
 
 

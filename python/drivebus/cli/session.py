@@ -24,7 +24,7 @@ EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
     (drivebus.BadAnswer, 6),
     (drivebus.Unconfirmed, 7),
 ]
-"""What the process ends with, by whose fault it is; 0 is done, 1 anything else."""
+"""What the process ends with, by whose fault it is; 0 is done, 1 anything else, such as differences found."""
 
 
 class _Declined(click.ClickException):

@@ -1,0 +1,12 @@
+"""What a drive is set to: kept in a file, compared, and given back.
+
+`Backup` is what was read of one drive, `Diff` how two of them differ, `Restoration` what became of each parameter that
+was to be given back. `Drive.backup`, `Drive.diff` and `Drive.restore` make them.
+"""
+
+from drivebus.backup.compare import Diff, Difference
+from drivebus.backup.keeping import Keeping
+from drivebus.backup.model import Backup, Origin
+from drivebus.backup.report import Restoration, Restored
+
+__all__ = ["Backup", "Diff", "Difference", "Keeping", "Origin", "Restoration", "Restored"]

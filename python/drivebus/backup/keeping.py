@@ -1,0 +1,164 @@
+"""Backup, restore and diff of one drive, written once to be awaited: `drivebus.Drive` carries them out at once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from drivebus.backup import taking
+from drivebus.backup.compare import Diff, Side, compare, factory
+from drivebus.backup.model import Backup
+from drivebus.backup.reading import Reader
+from drivebus.backup.report import Restoration
+from drivebus.backup.restoring import Restore
+from drivebus.backup.rules import Rules
+from drivebus.backup.taking import Progress
+from drivebus.errors import NotAllowed
+from drivebus.registers import Registers
+
+__all__ = ["Keeping"]
+
+Kept = Backup | str | os.PathLike[str]
+"""A backup, or the file of one."""
+
+
+class Keeping(Registers):
+    """What a drive is set to, as a whole."""
+
+    async def backup(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        resume: bool = True,
+        progress: Progress | None = None,
+        *,
+        unverified: bool = False,
+        force: bool = False,
+    ) -> Backup:
+        """Reads every parameter that can be read, in the fewest requests. Nothing is written to the drive.
+
+        With *path* the backup goes into that file, in one step when it is complete. Until then it grows in
+        `PATH.part`: after a break (a pulled cable, a killed process) the same call goes on where it was.
+
+        Args:
+            path: Where to keep it; None keeps no file. `Backup.save` writes one later.
+            resume: Go on with what a break left behind; False begins anew.
+            progress: Is called with how many parameters are done, and how many there are.
+            unverified: Read also what this family is only assumed to have.
+            force: Replace a file that is another drive's, or no backup.
+
+        Raises:
+            NotAllowed: The file is another drive's, or cannot be written; or the family has no known parameters.
+            Refused: The drive is locked by a password.
+            NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
+        """
+        place = None if path is None else Path(path)
+        return await taking.take(self, place, resume=resume, force=force, unverified=unverified, progress=progress)
+
+    async def restore(
+        self,
+        backup: Kept,
+        dry_run: bool = False,
+        *,
+        groups: Sequence[str] | None = None,
+        serial: bool = False,
+        motor: bool = False,
+        force: bool = False,
+        unverified: bool = False,
+        progress: Progress | None = None,
+    ) -> Restoration:
+        """Gives the drive back what *backup* has: only what differs, stored in EEPROM, and each read back.
+
+        Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
+        settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
+        something when it is written; the report says so of each. Cut off at any moment, the same call goes on where it
+        was: the memory of no parameter is written twice.
+
+        Args:
+            backup: A backup, or its file.
+            dry_run: Write nothing, and report what would be.
+            groups: Only these, such as `["P00", "P09"]`; single codes may be among them.
+            serial: Also the settings of the serial line. The drive may then not be heard any more.
+            motor: Also the data of the motor.
+            force: Also to a drive of another identification or firmware, or of another family: then what has the same
+                code there gets the same value.
+            unverified: Also what this family is only assumed to have.
+            progress: Is called with how many parameters are done, and how many are to be written.
+
+        Raises:
+            NotAllowed: The file is wrong, or not of this drive; or the motor turns, or another drive answers at this
+                address since the port was opened again. Nothing was written.
+            NoAnswer, BadAnswer, PortError: The line failed; the error's note names what was restored before. Say it
+                again, and the rest follows.
+
+        A refusal of one parameter ends nothing: it stands in the report.
+        """
+        kept = self._kept(backup, force)
+        work = Restore(self, kept, unverified=unverified)
+        return await work.run(
+            dry_run=dry_run, groups=groups, serial=serial, motor=motor, force=force, progress=progress
+        )
+
+    async def diff(self, backup: Kept | None = None, *, everything: bool = False, force: bool = False) -> Diff:
+        """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.
+
+        Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
+        what can only be read) is left out, unless *everything*. The result is false where nothing differs.
+
+        Args:
+            backup: A backup, its file, or None.
+            everything: Compare also what changes by itself.
+            force: Compare also with a backup of another identification or firmware.
+
+        Raises:
+            NotAllowed: The file is wrong, or of another family; nothing was sent.
+            NoAnswer, BadAnswer, PortError, Refused: See each.
+        """
+        if backup is None:
+            left = factory(self.profile)
+        else:
+            kept = self._kept(backup, force)
+            others = [] if force else kept.origin.other(await taking.origin_of(self))
+            if others:
+                raise NotAllowed(
+                    f"the backup is not of the drive at unit {self.unit}: {'; '.join(others)}. To compare them all the "
+                    "same, say force=True",
+                    unit=self.unit,
+                )
+            left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
+        rules = Rules(self.profile)
+        codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
+        words = await Reader(self, sorted(codes, key=rules.place)).rest()
+        return compare(self.profile, left, Side(f"unit {self.unit}", words.raw, words.unread), everything=everything)
+
+    def _kept(self, backup: Kept, force: bool = False) -> Backup:
+        """*backup* in the words of this drive's family."""
+        kept = backup if isinstance(backup, Backup) else Backup.load(backup, self.profile)
+        if not kept.complete:
+            raise NotAllowed(
+                f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
+                "again with the same path to have the rest",
+                unit=self.unit,
+            )
+        if kept.origin.family == self.profile.family:
+            return kept
+        if not force:
+            raise NotAllowed(
+                f"the backup is of a {kept.origin.family}, and unit {self.unit} is a {self.profile.family}: a code may "
+                "mean another thing there; nothing was sent. If that is right, say force=True",
+                unit=self.unit,
+            )
+        return kept.translated(self.profile)
+
+    def _is_in_ram(self, code: str) -> bool:
+        """Whether this object wrote *code* to RAM, and not to EEPROM since: what it reads as is then not stored."""
+        return not self._in_ram.isdisjoint({code, self.profile.describe(code).name})
+
+    async def _put(self, code: str, address: int, words: int | Sequence[int], *, store: bool) -> None:
+        """Writes the words of a parameter, and remembers to which memory."""
+        if not store:
+            self._in_ram.add(code)
+        await self._write(address, words)
+        if store:
+            self._in_ram.difference_update({code, self.profile.describe(code).name})
+            self._count_store(code)

@@ -1,0 +1,180 @@
+"""What was read of one drive, whose it is, and the words of its parameters.
+
+Plain data beside the profile that says what they mean; how it looks in a file is in `text` and `parse`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from drivebus.backup import disk, parse, text
+from drivebus.backup.compare import Diff, Side, compare, factory
+from drivebus.backup.rules import Rules
+from drivebus.errors import NotAllowed
+from drivebus.profile import Profile
+from drivebus.protocols import ProfileProtocol
+from drivebus.values import Value
+
+__all__ = ["Backup", "Origin"]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Whose parameters these are.
+
+    Attributes:
+        family: The family of the drive, such as `"gd350"`.
+        title: The family as its maker calls it.
+        unit: Its address, 1..247.
+        identification: What it said it is; None if it would not tell, or its family has no such code.
+        firmware: Its firmware, where its family says where to read that.
+        profile_version: The version of the profile it was read with.
+        drivebus: The version of this package.
+        taken: When the first of them was read, in UTC.
+    """
+
+    family: str
+    title: str
+    unit: int
+    identification: int | None
+    firmware: str | None
+    profile_version: int
+    drivebus: str
+    taken: datetime
+
+    def other(self, than: Origin, *, unit: bool = False) -> list[str]:
+        """In what this is another drive than *than*, in words; with *unit* its address counts too."""
+        found = []
+        if self.family != than.family:
+            found.append(f"its family is {self.family}, not {than.family}")
+        if self.identification != than.identification:
+            found.append(f"its identification is {_code(self.identification)}, not {_code(than.identification)}")
+        if self.firmware != than.firmware:
+            found.append(f"its firmware is {self.firmware or 'unknown'}, not {than.firmware or 'unknown'}")
+        if unit and self.unit != than.unit:
+            found.append(f"its unit is {self.unit}, not {than.unit}")
+        return found
+
+
+def _code(identification: int | None) -> str:
+    return "unknown" if identification is None else f"{identification:04X}H"
+
+
+class Backup(Mapping[str, Value]):
+    """The parameters of one drive as they were: a mapping of codes to values in engineering units, in code order.
+
+    Attributes:
+        origin: Whose they are.
+        raw: The word of each as the drive told it; a parameter of two words is one number.
+        unread: Why each of the others is not among them.
+        complete: Whether all that can be read was read; a backup that was interrupted is not.
+        profile: What its words mean.
+        translated_from: The family whose codes they were, where the same values stand under the codes of another.
+    """
+
+    __slots__ = ("complete", "origin", "profile", "raw", "translated_from", "unread")
+
+    def __init__(
+        self,
+        origin: Origin,
+        raw: Mapping[str, int],
+        unread: Mapping[str, str],
+        profile: ProfileProtocol,
+        *,
+        complete: bool = True,
+        translated_from: str | None = None,
+    ) -> None:
+        place = Rules(profile).place
+        self.origin = origin
+        self.raw: Mapping[str, int] = dict(sorted(raw.items(), key=lambda item: place(item[0])))
+        self.unread: Mapping[str, str] = dict(sorted(unread.items(), key=lambda item: place(item[0])))
+        self.profile = profile
+        self.complete = complete
+        self.translated_from = translated_from
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], profile: ProfileProtocol | None = None) -> Backup:
+        """A backup from its file. Nothing in it is executed, and each line is checked against the profile.
+
+        Args:
+            path: The file, of 1 MiB at most.
+            profile: What its words mean, if the file is of that family; the shipped profile of its family otherwise.
+
+        Raises:
+            NotAllowed: The file is no backup, or lines in it are wrong: the message names every one of them, with what
+                is wrong and the closest name.
+        """
+        path = Path(path)
+        found = parse.parse(path, disk.read(path), _shipped if profile is None else _meant_by(profile))
+        return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete)
+
+    def diff(self, other: Backup | None = None, *, everything: bool = False) -> Diff:
+        """How *other* differs from this one; how this differs from what the factory set, as far as known, for None.
+
+        What tells nothing about how a drive is set (the fault history, what can only be read) is left out, unless
+        *everything*.
+
+        Raises:
+            NotAllowed: They are of two families: a code may mean another thing.
+        """
+        ours = Side(f"unit {self.origin.unit} of {self.origin.taken:%Y-%m-%d %H:%M:%S}", self.raw, self.unread)
+        if other is None:
+            return compare(self.profile, factory(self.profile), ours, everything=everything)
+        if other.origin.family != self.origin.family:
+            raise NotAllowed(
+                f"a backup of a {self.origin.family} and one of a {other.origin.family} cannot be compared: a code may "
+                "mean another thing"
+            )
+        theirs = Side(f"unit {other.origin.unit} of {other.origin.taken:%Y-%m-%d %H:%M:%S}", other.raw, other.unread)
+        return compare(self.profile, ours, theirs, everything=everything)
+
+    def translated(self, profile: ProfileProtocol) -> Backup:
+        """The same values under the same codes of another family; `unread` says why some have none there."""
+        raw: dict[str, int] = {}
+        unread: dict[str, str] = {}
+        for code, value in self.items():
+            try:
+                raw[code] = profile.encode(code, value)
+            except NotAllowed as error:
+                unread[code] = str(error)
+        return Backup(self.origin, raw, unread, profile, complete=self.complete, translated_from=self.origin.family)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the file, whole or not at all: what was there before is there until the new one is."""
+        disk.write(Path(path), self.text())
+
+    def text(self) -> str:
+        """What stands in the file: sorted, one parameter a line."""
+        return text.text(self.origin, self.raw, self.unread, self.profile, self.complete)
+
+    def __getitem__(self, code: str) -> Value:
+        return text.worded(self.profile, code, self.raw[code])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.raw)
+
+    def __len__(self) -> int:
+        return len(self.raw)
+
+    def __repr__(self) -> str:
+        of = self.origin
+        rest = "" if self.complete else ", not complete"
+        return (
+            f"<Backup of unit {of.unit}, {of.family}, {of.taken:%Y-%m-%d %H:%M:%S}: {len(self.raw)} parameters{rest}>"
+        )
+
+
+def _meant_by(profile: ProfileProtocol) -> Callable[[str], ProfileProtocol]:
+    """Finds what the words of a family mean: *profile* its own, a shipped profile all others."""
+    return lambda family: profile if family == profile.family else _shipped(family)
+
+
+def _shipped(family: str) -> ProfileProtocol:
+    try:
+        return Profile.builtin(family)
+    except NotAllowed as error:
+        raise NotAllowed(f"{error}; for a profile of your own give profile=…") from None

@@ -1,0 +1,202 @@
+"""A backup file as people leave it: every line is checked, and everything that is wrong is said at once.
+
+The file is TOML, and each of its lines is TOML by itself, so it is handed to the parser line by line: one that reads
+the whole file ends at the first error and does not say where the others are. Nothing is executed.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from drivebus import checks
+from drivebus.backup.parameter import FIELDS, Wrong, word
+from drivebus.backup.text import FORMAT
+from drivebus.errors import NotAllowed
+from drivebus.protocols import ProfileProtocol
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["Parsed", "parse"]
+
+_LONGEST = 1000
+"""Characters a line may have."""
+_SHOWN = 100
+"""Wrong lines that a message names; the rest is counted."""
+
+_TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
+_DRIVE: dict[str, tuple[type, str]] = {
+    "family": (str, "a text"),
+    "title": (str, "a text"),
+    "unit": (int, "a number"),
+    "identification": (int, "a number such as 0x01A0"),
+    "firmware": (str, "a text"),
+    "profile_version": (int, "a number"),
+    "drivebus": (str, "a text"),
+    "taken": (datetime, "a moment such as 2026-01-31T12:00:00Z"),
+}
+_SECTIONS = ("drive", "parameters", "readings")
+
+
+@dataclass
+class Parsed:
+    """What a file holds.
+
+    Attributes:
+        profile: What its words mean.
+        origin: The fields of an `Origin`.
+        raw: The word of each parameter.
+        complete: Whether the backup was finished.
+    """
+
+    profile: ProfileProtocol
+    origin: dict[str, Any]
+    raw: dict[str, int]
+    complete: bool
+
+
+@dataclass
+class _File:
+    """What was found so far."""
+
+    path: Path
+    wrong: list[tuple[int, str]] = field(default_factory=list)
+    top: dict[str, Any] = field(default_factory=dict)
+    drive: dict[str, Any] = field(default_factory=dict)
+    parameters: list[tuple[int, str, object]] = field(default_factory=list)
+    section: str = ""
+
+    def refuse(self) -> NotAllowed:
+        """The error that names each wrong line."""
+        self.wrong.sort()
+        lines = [f"{self.path}:{line}: {reason}" for line, reason in self.wrong[:_SHOWN]]
+        if len(self.wrong) > _SHOWN:
+            lines.append(f"and {len(self.wrong) - _SHOWN} more")
+        count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
+        return NotAllowed("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
+
+
+def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], ProfileProtocol]) -> Parsed:
+    """What *data*, the file at *path*, holds.
+
+    Args:
+        path: For messages.
+        data: The file.
+        profile: What its words mean, or what finds that by the family.
+
+    Raises:
+        NotAllowed: It is no backup, or lines are wrong; the message names all of them.
+    """
+    file = _File(path)
+    for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), 1):
+        try:
+            _line(file, number, line)
+        except Wrong as error:
+            file.wrong.append((number, str(error)))
+    _check_head(file)
+    if "family" not in file.drive:
+        raise file.refuse()
+    if callable(profile):
+        profile = profile(file.drive["family"])
+    raw = _parameters(file, profile)
+    if file.wrong:
+        raise file.refuse()
+    origin = {
+        "title": profile.title,
+        "unit": 0,
+        "identification": None,
+        "firmware": None,
+        "profile_version": 0,
+        "drivebus": "",
+        "taken": datetime.fromtimestamp(0, timezone.utc),
+        **file.drive,
+    }
+    return Parsed(profile, origin, raw, file.top.get("complete", True))
+
+
+def _line(file: _File, number: int, data: bytes) -> None:
+    try:
+        text = data.decode("utf-8").strip()
+    except UnicodeDecodeError:
+        raise Wrong("it is not UTF-8 text") from None
+    if not text or text.startswith("#"):
+        return
+    if len(text) > _LONGEST:
+        raise Wrong(f"it has more than {_LONGEST} characters")
+    found = _toml(text)
+    if text.startswith("["):
+        file.section = text.partition("#")[0].strip(" \t[]")
+        if found != {file.section: {}} or file.section not in _SECTIONS:
+            raise Wrong(
+                f"there is no section {text.partition('#')[0].strip()}{checks.closest(file.section, _SECTIONS)}"
+            )
+        return
+    [(key, value)] = found.items()
+    if file.section in ("parameters", "readings"):
+        # `P00.03 = …` is TOML for a 03 inside of a P00.
+        if isinstance(value, dict) and len(value) == 1 and not value.keys() & FIELDS:
+            [(index, value)] = value.items()
+            key = f"{key}.{index}"
+        file.parameters.append((number, key, value))
+    elif file.section in ("", "drive"):
+        _head(file, key, value)
+
+
+def _toml(text: str) -> dict[str, Any]:
+    """*text*, one line, as TOML."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise Wrong("it is nested too deeply") from None
+    except ValueError as error:
+        # The line is the parser's whole document; which line of the file it is, is said elsewhere.
+        reason = re.sub(r"at line 1, column", "at column", str(error)).replace("end of document", "end of line")
+        raise Wrong(f"{text if len(text) <= 80 else f'{text[:77]}...'} is no TOML: {reason}") from None
+
+
+def _head(file: _File, key: str, value: object) -> None:
+    """One line before the parameters."""
+    known, place = (_DRIVE, file.drive) if file.section else (_TOP, file.top)
+    where = f"[{file.section}]" if file.section else "the beginning"
+    if key not in known:
+        raise Wrong(f"{where} has no {key!r}{checks.closest(key, known)}")
+    kind, wanted = known[key]
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        raise Wrong(f"{key} must be {wanted}")
+    if key in place:
+        raise Wrong(f"{key} is given twice")
+    if isinstance(value, datetime):
+        value = (value if value.tzinfo else value.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+    place[key] = value
+
+
+def _check_head(file: _File) -> None:
+    given = file.top.get("format")
+    if given != FORMAT and not any("format" in reason for _, reason in file.wrong):
+        what = "no line `format = 1`: it is no backup" if given is None else f"format {given}, which is not known"
+        file.wrong.insert(0, (1, f"the file has {what}"))
+    if "family" not in file.drive and not any("family" in reason for _, reason in file.wrong):
+        file.wrong.append((1, 'the file does not say whose it is: [drive] lacks a line such as family = "gd350"'))
+
+
+def _parameters(file: _File, profile: ProfileProtocol) -> dict[str, int]:
+    """The word of each parameter; what is wrong is noted."""
+    raw: dict[str, int] = {}
+    lines: dict[str, int] = {}
+    for number, code, value in file.parameters:
+        try:
+            taken = word(profile, code, value)
+            if code in lines:
+                raise Wrong(f"{code} is given twice; it stands in line {lines[code]} already")
+            raw[code], lines[code] = taken, number
+        except Wrong as error:
+            file.wrong.append((number, str(error)))
+    return raw

@@ -1,0 +1,93 @@
+"""Reads many parameters as words, in the fewest requests that the drive allows, and says why it lacks the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivebus.errors import Refused
+from drivebus.registers import Registers
+
+__all__ = ["Reader", "Words", "word_of"]
+
+_LOCKED = "password_protected"
+"""By this name every profile calls a refusal that meets whatever is asked."""
+
+
+class Words:
+    """What one request brought.
+
+    Attributes:
+        raw: The word of each parameter in it; one of two words is one number.
+        unread: Or why it was not read.
+    """
+
+    __slots__ = ("raw", "unread")
+
+    def __init__(self, raw: dict[str, int], unread: dict[str, str]) -> None:
+        self.raw = raw
+        self.unread = unread
+
+
+class Reader:
+    """Reads *codes*, request by request. One that is refused is cut in two, down to the parameter that is meant."""
+
+    def __init__(self, drive: Registers, codes: Sequence[str]) -> None:
+        self._drive = drive
+        self._waiting = [list(codes)] if codes else []
+        self._planned: list[tuple[int, int, list[str]]] = []
+
+    async def next(self) -> Words | None:
+        """What the next request brought; None when all was asked.
+
+        Raises:
+            Refused: The drive is locked by a password: it would refuse each.
+            NoAnswer, BadAnswer, PortError: See each.
+        """
+        if not self._planned:
+            if not self._waiting:
+                return None
+            self._plan(self._waiting.pop())
+        address, count, inside = self._planned.pop(0)
+        try:
+            words = await self._drive.read_words(address, count)
+        except Refused as error:
+            if error.name == _LOCKED:
+                raise
+            if len(inside) == 1:
+                return Words({}, {inside[0]: _reason(error)})
+            half = len(inside) // 2
+            self._waiting += [inside[half:], inside[:half]]
+            return Words({}, {})
+        return Words({code: self._word(code, words, address) for code in inside}, {})
+
+    async def rest(self) -> Words:
+        """What all requests that are left bring."""
+        raw: dict[str, int] = {}
+        unread: dict[str, str] = {}
+        while (words := await self.next()) is not None:
+            raw.update(words.raw)
+            unread.update(words.unread)
+        return Words(raw, unread)
+
+    def _plan(self, codes: Sequence[str]) -> None:
+        profile = self._drive.profile
+        places = {code: profile.address(code) for code in codes}
+        self._planned = [
+            (address, count, [code for code, place in places.items() if address <= place < address + count])
+            for address, count in profile.compile(codes).reads
+        ]
+
+    def _word(self, code: str, words: Sequence[int], address: int) -> int:
+        place = self._drive.profile.address(code) - address
+        return word_of(words[place : place + self._drive.profile.describe(code).words])
+
+
+def word_of(words: Sequence[int]) -> int:
+    """The words of one parameter as one number: the low word comes first."""
+    return sum(word << 16 * index for index, word in enumerate(words))
+
+
+def _reason(error: Refused) -> str:
+    if not error.meaning:
+        return str(error)
+    return f"the drive refused to tell it: exception {error.code:02X}H, {error.name}: {error.meaning}"

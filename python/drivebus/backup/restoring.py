@@ -1,0 +1,240 @@
+"""Gives a drive its parameters back: only what differs, in an order that it accepts, and never one twice.
+
+What the drive has is read first, so that a restore that was cut off goes on where it was: what is there is not written
+again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from drivebus.backup.compare import amount
+from drivebus.backup.model import Backup
+from drivebus.backup.order import Order, Step
+from drivebus.backup.reading import Reader, word_of
+from drivebus.backup.report import Restoration, Restored
+from drivebus.backup.rules import Rules
+from drivebus.backup.taking import Progress, origin_of
+from drivebus.backup.text import worded
+from drivebus.errors import BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused
+
+if TYPE_CHECKING:
+    from drivebus.backup.keeping import Keeping
+
+__all__ = ["Restore"]
+
+_ATTEMPTS = 3
+"""How often a write is sent that the drive shows not to have heard."""
+
+
+class Restore:
+    """One restore of one drive."""
+
+    def __init__(self, drive: Keeping, backup: Backup, *, unverified: bool) -> None:
+        self._drive = drive
+        self._profile = drive.profile
+        self._backup = backup
+        self._rules = Rules(drive.profile)
+        self._unverified = unverified
+        self._had: dict[str, int] = {}
+        self._has: dict[str, int] = {}
+        # What the backup of another family has and this one does not.
+        lost = backup.unread if backup.translated_from else {}
+        self._results: dict[str, tuple[str, str]] = {code: ("missing", reason) for code, reason in lost.items()}
+        self._order: list[str] = []
+
+    async def run(
+        self,
+        *,
+        dry_run: bool,
+        groups: Sequence[str] | None,
+        serial: bool,
+        motor: bool,
+        force: bool,
+        progress: Progress | None,
+    ) -> Restoration:
+        """See `Drive.restore`."""
+        chosen = self._rules.selected(self._backup, groups)
+        wanted = [code for code in chosen if not self._leave(code)]
+        asked = [code for code in wanted if self._rules.unasked(code, serial=serial, motor=motor) is None]
+        await self._check_identity(force)
+        pairs = self._rules.bounds()
+        bounding = {code for pair in pairs if {*pair} & {*asked} for code in pair}
+        await self._read(wanted, bounding)
+        for code in wanted:
+            if code not in self._results and code not in asked:
+                self._results[code] = ("skipped", self._rules.unasked(code, serial=serial, motor=motor) or "")
+        pending = [code for code in asked if code not in self._results and self._has_a_place(code)]
+        if pending and not dry_run:
+            await self._check_stopped(pending)
+        order = Order(
+            {code: float(self._profile.decode(code, word)) for code, word in self._has.items()},
+            {code: float(self._backup[code]) for code in pending},
+            pairs,
+            self._rules.last(),
+        )
+        done = 0
+        while (step := order.next()) is not None:
+            await self._take(step, order, dry_run)
+            done += step.final
+            if progress is not None and step.final:
+                progress(done, len(pending))
+        self._block(order)
+        if not dry_run:
+            await self._look_again()
+        lost = [code for code in self._results if code not in self._backup]
+        return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, dry_run)
+
+    def _leave(self, code: str) -> bool:
+        reason = self._rules.unread(code, self._unverified) or self._rules.uncompared(code)
+        if reason is not None:
+            self._results[code] = ("skipped", reason)
+        return reason is not None
+
+    async def _check_identity(self, force: bool) -> None:
+        others = self._backup.origin.other(await origin_of(self._drive))
+        if others and not force:
+            raise NotAllowed(
+                f"the backup is not of the drive at unit {self._drive.unit}: {'; '.join(others)}; nothing was written. "
+                "If that is right, say force=True",
+                unit=self._drive.unit,
+            )
+
+    async def _read(self, wanted: Sequence[str], bounding: set[str]) -> None:
+        """What the drive has of *wanted*, and of what bounds it."""
+        readable = [code for code in bounding if self._rules.unread(code, self._unverified) is None]
+        words = await Reader(self._drive, sorted({*wanted, *readable}, key=self._rules.place)).rest()
+        self._had, self._has = words.raw, dict(words.raw)
+        for code in wanted:
+            if code in words.unread:
+                self._results[code] = ("missing", words.unread[code])
+            elif words.raw[code] == self._backup.raw[code] and not self._drive._is_in_ram(code):
+                self._results[code] = ("same", "")
+
+    def _has_a_place(self, code: str) -> bool:
+        """Whether the family's rule says where *code* is stored; known of all before the first is written."""
+        try:
+            self._profile.address(code, store=True)
+        except NotAllowed as error:
+            self._results[code] = ("blocked", str(error))
+        return code not in self._results
+
+    async def _check_stopped(self, pending: Sequence[str]) -> None:
+        """Refuses while the motor turns, where something is written that a drive takes only while it stands.
+
+        What no document says when it may be written, counts as that.
+        """
+        stopped = [code for code in pending if self._profile.describe(code).access not in ("run", "rw")]
+        if not stopped:
+            return
+        try:
+            state = await self._drive.state()
+        except NotAllowed:
+            # Its family does not say where it tells its state; the drive itself refuses what it must.
+            return
+        if state.running:
+            raise NotAllowed(
+                f"{', '.join(stopped[:5])}{' and others' if len(stopped) > 5 else ''} can be restored only while the "
+                f"drive is stopped, and unit {self._drive.unit} runs ({state}); nothing was written",
+                unit=self._drive.unit,
+            )
+
+    async def _take(self, step: Step, order: Order, dry_run: bool) -> None:
+        """Does one step, and says to *order* what came of it."""
+        code = step.code
+        raw = self._backup.raw[code] if step.final else self._profile.encode(code, step.value)
+        self._order.append(code)
+        if dry_run:
+            if step.final:
+                self._results[code] = ("planned", "")
+            order.wrote(step, step.value)
+            return
+        try:
+            shown = await self._write(code, raw, store=step.final)
+        except Refused as error:
+            self._results[code] = ("refused", _meaning(error))
+            order.leave(code)
+            return
+        except (NoAnswer, BadAnswer, PortError, NotAllowed) as error:
+            _note(error, [done for done, (result, _) in self._results.items() if result == "restored"])
+            raise
+        self._has[code] = shown
+        order.wrote(step, float(self._profile.decode(code, shown)))
+        if step.final:
+            self._results[code] = ("restored", "") if shown == raw else ("differs", "the drive shows another value")
+
+    async def _write(self, code: str, raw: int, *, store: bool) -> int:
+        """Writes *raw*, for good if *store*, and returns what the drive then shows.
+
+        A confirmation that was lost is cleared up by reading. The write is repeated only where the drive shows what it
+        had before: then it has not heard it, and has not worn its memory.
+        """
+        known = self._profile.describe(code)
+        address = self._address(code, store)
+        words = [raw >> 16 * index & 0xFFFF for index in range(known.words)]
+        for _ in range(_ATTEMPTS):
+            try:
+                await self._drive._put(code, address, words[0] if known.words == 1 else words, store=store)
+            except (NoAnswer, BadAnswer, PortError) as error:
+                if error.started is None:
+                    raise
+                shown = await self._look(code)
+                if shown == self._has[code]:
+                    continue
+                return shown
+            return await self._look(code)
+        return self._has[code]
+
+    def _address(self, code: str, store: bool) -> int:
+        try:
+            return self._profile.address(code, store=store)
+        except NotAllowed:
+            if store:
+                raise
+            # The family knows no write that is forgotten: the step on the way wears the memory too.
+            return self._profile.address(code, store=True)
+
+    async def _look(self, code: str) -> int:
+        known = self._profile.describe(code)
+        words = await self._drive.read_words(self._profile.address(code), known.words)
+        return word_of(words)
+
+    def _block(self, order: Order) -> None:
+        """Says of what is left why it could not be written."""
+        for code in order.rest:
+            by = order.hindrance(code, float(self._backup[code]))
+            limit = "another parameter" if by is None else f"{by}, which the drive has at {self._shown(by)}"
+            self._results[code] = ("blocked", f"it would be beyond {limit}")
+
+    def _shown(self, code: str) -> str:
+        return amount(self._profile, code, worded(self._profile, code, self._has[code]))
+
+    async def _look_again(self) -> None:
+        """Reads what was restored once more: one parameter may have moved another."""
+        restored = [code for code, (result, _) in self._results.items() if result == "restored"]
+        words = await Reader(self._drive, sorted(restored, key=self._rules.place)).rest()
+        self._has.update(words.raw)
+        for code in restored:
+            if words.raw.get(code) != self._backup.raw[code]:
+                self._results[code] = ("differs", "it was restored, and another parameter changed it afterwards")
+
+    def _item(self, code: str) -> Restored:
+        result, reason = self._results[code]
+        if code not in self._backup:
+            return Restored(code, "", "", None, None, None, result, reason)
+        known = self._profile.describe(code)
+        before, after = (
+            None if code not in words else worded(self._profile, code, words[code]) for words in (self._had, self._has)
+        )
+        return Restored(code, known.label, known.unit, before, self._backup[code], after, result, reason)
+
+
+def _meaning(error: Refused) -> str:
+    return f"exception {error.code:02X}H, {error.name}: {error.meaning}" if error.meaning else str(error)
+
+
+def _note(error: DrivebusError, restored: Sequence[str]) -> None:
+    if hasattr(error, "add_note"):
+        done = f"restored before it: {', '.join(restored)}" if restored else "nothing was restored before it"
+        error.add_note(f"{done}; restored again, the drive is given only what it still lacks")

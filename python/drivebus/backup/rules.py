@@ -1,0 +1,113 @@
+"""Which parameters are read, compared and given back, and why the others are not. Nothing here asks a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from drivebus import checks
+from drivebus.errors import NotAllowed
+from drivebus.protocols import ProfileProtocol
+
+__all__ = ["Rules"]
+
+
+class Rules:
+    """What the profile says about keeping the parameters of its family."""
+
+    def __init__(self, profile: ProfileProtocol) -> None:
+        self.profile = profile
+        self._serial = frozenset(profile.serial_parameters())
+        self._motor = frozenset(profile.motor_parameters())
+        self._acts = frozenset(profile.acts())
+        self._faults = frozenset((*profile.fault_history, *profile.fault_values))
+
+    def codes(self) -> list[str]:
+        """Every parameter that the profile knows, in code order."""
+        known = (self.profile.describe(name) for name in self.profile.names())
+        return sorted(
+            {each.code for each in known if each.code is not None and each.kind == "parameter"}, key=self.place
+        )
+
+    def place(self, code: str) -> tuple[int, str]:
+        """Where *code* stands in a file: in the order of addresses, which is that of groups."""
+        try:
+            address = self.profile.describe(code).address
+        except NotAllowed:
+            address = None
+        return (1 << 16 if address is None else address, code)
+
+    def unread(self, code: str, unverified: bool) -> str | None:
+        """Why *code* is not read; None if it is."""
+        known = self.profile.describe(code)
+        if known.address is None:
+            return "its address is not known"
+        if known.access == "wo":
+            return "it can only be written"
+        if "password" in known.label.lower():
+            return "a password has no place in a file"
+        if known.evidence == "assumed" and not unverified:
+            return f"that this family has it is only assumed: {known.reason}"
+        return None
+
+    def uncompared(self, code: str) -> str | None:
+        """Why *code* tells nothing about how the drive is set; None if it does."""
+        known = self.profile.describe(code)
+        if code in self._faults:
+            return "it belongs to the fault history"
+        if known.access == "ro":
+            return "it can only be read"
+        if code in self._acts:
+            return "writing it does something, and what it reads as need not be what was written"
+        return None
+
+    def unasked(self, code: str, *, serial: bool, motor: bool) -> str | None:
+        """Why *code* is not given back unless that is asked for; None if it is."""
+        if not serial and _among(code, self._serial):
+            return "a setting of the serial line; given back only where that is asked for"
+        if not motor and _among(code, self._motor):
+            return "data of the motor; given back only where that is asked for"
+        return None
+
+    def selected(self, codes: Iterable[str], groups: Sequence[str] | None) -> list[str]:
+        """Those of *codes* that are in *groups* (groups such as `"P00"`, or single codes); all for None.
+
+        Raises:
+            NotAllowed: One of *groups* is none; the message has the closest.
+        """
+        codes = list(codes)
+        if groups is None:
+            return codes
+        if isinstance(groups, str) or not all(isinstance(group, str) for group in groups):
+            raise NotAllowed(f'groups {groups!r} are no list of groups; give one such as ["P00", "P09"]')
+        every = self.codes()
+        known = {code.partition(".")[0] for code in every} | set(every)
+        for group in groups:
+            if group not in known:
+                near = checks.closest(group, known)
+                raise NotAllowed(f"{self.profile.name} has no group {group!r}{near}")
+        return [code for code in codes if _among(code, frozenset(groups))]
+
+    def last(self) -> list[str]:
+        """What is written last, in this order: where the drive takes its commands and its setpoints from."""
+        sources = [item["code"] for item in self.profile.control()]
+        for name in self.profile.setpoint_names():
+            sources += [item["code"] for item in self.profile.needs(name)]
+        wanted = list(self.profile.last_parameters())
+        # What decides who is in command comes after what decides where the setpoint comes from.
+        return [*reversed([code for code in dict.fromkeys(sources) if code not in wanted]), *wanted]
+
+    def bounds(self) -> list[tuple[str, str]]:
+        """Pairs of parameters of which the first is never above the second."""
+        pairs = []
+        for code in self.codes():
+            known = self.profile.describe(code)
+            if known.low_from is not None:
+                pairs.append((known.low_from, code))
+            if known.high_from is not None:
+                pairs.append((code, known.high_from))
+        return list(dict.fromkeys(pairs))
+
+
+def _among(code: str, listed: frozenset[str]) -> bool:
+    """Whether *listed* has *code* or its whole group."""
+    return code in listed or code.partition(".")[0] in listed

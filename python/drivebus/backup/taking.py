@@ -1,0 +1,139 @@
+"""Takes a backup of a drive, into a file that grows as it goes and outlives whatever ends the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timezone
+from pathlib import Path
+
+from drivebus._native import __version__
+from drivebus.backup import disk
+from drivebus.backup.model import Backup, Origin
+from drivebus.backup.reading import Reader
+from drivebus.backup.rules import Rules
+from drivebus.errors import NotAllowed, Refused
+from drivebus.registers import Registers
+
+__all__ = ["Progress", "origin_of", "take"]
+
+Progress = Callable[[int, int], object]
+"""Is told how many are done, and how many there are."""
+
+_REQUESTS_A_STEP = 8
+"""Requests after which the file is written anew: what a power cut costs, against the wear of the disk."""
+
+_FIRMWARE = "firmware_version"
+"""The parameter or register of this name tells the firmware, where a profile has one."""
+
+
+async def origin_of(drive: Registers) -> Origin:
+    """Whose parameters are read: what the drive says of itself now."""
+    profile = drive.profile
+    identification = firmware = None
+    register = profile.role("identification")
+    if register is not None:
+        try:
+            [identification] = await drive.read_words(profile.address(register))
+        except Refused:
+            identification = None
+    if _FIRMWARE in profile.names():
+        try:
+            [word] = await drive.read_words(profile.address(_FIRMWARE))
+            firmware = str(drive.value(_FIRMWARE, word))
+        except Refused:
+            firmware = None
+    now = datetime.now(timezone.utc).replace(microsecond=0)
+    return Origin(
+        profile.family, profile.title, drive.unit, identification, firmware, profile.version, __version__, now
+    )
+
+
+async def take(
+    drive: Registers, path: Path | None, *, resume: bool, force: bool, unverified: bool, progress: Progress | None
+) -> Backup:
+    """Reads every parameter that can be read. What was read before a break is not read again.
+
+    Raises:
+        NotAllowed: Where the file would be, another drive's is; nothing but the identity was asked.
+        Refused: The drive is locked by a password.
+        NoAnswer, BadAnswer, PortError: The line failed; what was read is in the file's `.part`.
+    """
+    rules = Rules(drive.profile)
+    codes = rules.codes()
+    if not codes:
+        raise NotAllowed(f"{drive.profile.name} has no parameters that are known: there is nothing to keep")
+    unread = {code: reason for code in codes if (reason := rules.unread(code, unverified)) is not None}
+    codes = [code for code in codes if code not in unread]
+    origin = await origin_of(drive)
+    raw: dict[str, int] = {}
+    if path is not None:
+        _check_old(path, origin, drive, force)
+        before = _begun(disk.part_of(path), origin, drive) if resume else None
+        if before is not None:
+            origin = replace(origin, taken=before.origin.taken)
+            raw = {code: word for code, word in before.raw.items() if code in codes}
+    reader = Reader(drive, [code for code in codes if code not in raw])
+    total, done, steps = len(codes), len(raw), 0
+
+    def keep() -> None:
+        if path is not None:
+            Backup(origin, raw, unread, drive.profile, complete=False).save(disk.part_of(path))
+
+    # Whether it can be written there at all is known before the drive is asked for an hour.
+    keep()
+    try:
+        if progress is not None:
+            progress(done, total)
+        while (words := await reader.next()) is not None:
+            raw.update(words.raw)
+            unread.update(words.unread)
+            steps += 1
+            if steps % _REQUESTS_A_STEP == 0:
+                keep()
+            if progress is not None and (words.raw or words.unread):
+                done += len(words.raw) + len(words.unread)
+                progress(done, total)
+    except BaseException:
+        keep()
+        raise
+    backup = Backup(origin, raw, unread, drive.profile)
+    if path is not None:
+        backup.save(path)
+        disk.remove(disk.part_of(path))
+    return backup
+
+
+def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> None:
+    """Refuses to put a backup in the place of another drive's, or of what is none."""
+    if force or not path.exists():
+        return
+    try:
+        others = Backup.load(path, drive.profile).origin.other(origin, unit=True)
+    except NotAllowed as error:
+        raise NotAllowed(
+            f"{path} is there and would be replaced, but: {error}; take another name, or force=True"
+        ) from None
+    if others:
+        raise NotAllowed(
+            f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or "
+            "force=True",
+            unit=drive.unit,
+        )
+
+
+def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
+    """What was read before a break, if it was read of this drive."""
+    if not part.exists():
+        return None
+    before = Backup.load(part, drive.profile)
+    others = before.origin.other(origin, unit=True)
+    if before.origin.profile_version != origin.profile_version:
+        others.append(f"it was read with version {before.origin.profile_version} of the profile")
+    if others:
+        raise NotAllowed(
+            f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With resume=False it is "
+            "begun anew",
+            unit=drive.unit,
+        )
+    return before

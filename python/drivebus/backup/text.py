@@ -1,0 +1,111 @@
+"""How a backup looks in its file: TOML, one parameter a line, always in the same order.
+
+The same drive gives the same lines, so that version control shows what changed and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from drivebus.backup.rules import Rules
+from drivebus.errors import NotAllowed
+from drivebus.protocols import ProfileProtocol
+from drivebus.values import Choice, Value
+
+if TYPE_CHECKING:
+    from drivebus.backup.model import Origin
+
+__all__ = ["FORMAT", "number", "text", "worded"]
+
+FORMAT = 1
+
+_HEAD = """\
+# The parameters of one drive. A line may be changed or taken out: change the value, and the raw word with it or take
+# `raw = …` out. `drivebus diff` compares this file with the drive, `drivebus restore` shows what it would write first.
+"""
+
+
+def text(
+    origin: Origin, raw: Mapping[str, int], unread: Mapping[str, str], profile: ProfileProtocol, complete: bool
+) -> str:
+    """The whole file."""
+    header: dict[str, Any] = {"format": FORMAT, "complete": complete}
+    lines = [_HEAD.rstrip("\n"), *(f"{key} = {_toml(value)}" for key, value in header.items()), "", "[drive]"]
+    for key in ("family", "title", "unit", "identification", "firmware", "profile_version", "drivebus", "taken"):
+        value = getattr(origin, key)
+        if key == "identification" and value is not None:
+            lines.append(f"identification = 0x{value:04X}")
+        elif key == "taken":
+            lines.append(f"taken = {value:%Y-%m-%dT%H:%M:%SZ}")
+        else:
+            lines.append(f"# {key}: not known" if value is None else f"{key} = {_toml(value)}")
+    rules = Rules(profile)
+    sections: dict[str, list[str]] = {"parameters": [], "readings": []}
+    for code in sorted({*raw, *unread}, key=rules.place):
+        section = sections["parameters" if rules.uncompared(code) is None else "readings"]
+        if code in raw:
+            section.append(_line(profile, code, raw[code]))
+        else:
+            section.append(_comment(f"# {code} ({profile.describe(code).label}) is not here: {unread[code]}"))
+    lines += ["", "[parameters]", *sections["parameters"]]
+    if sections["readings"]:
+        lines += [
+            "",
+            "# Never restored: what can only be read, the fault history, and what does something when written.",
+        ]
+        lines += ["[readings]", *sections["readings"]]
+    return "\n".join(lines) + "\n"
+
+
+def _line(profile: ProfileProtocol, code: str, raw: int) -> str:
+    known = profile.describe(code)
+    value = worded(profile, code, raw)
+    fields = {"value": number(value, known.scale), "raw": str(raw)}
+    if known.unit:
+        fields = {"value": fields["value"], "unit": _toml(known.unit), "raw": fields["raw"]}
+    if _is_beyond(profile, code, raw):
+        fields["beyond"] = "true"
+    comment = f"{known.label}: {value.label}" if isinstance(value, Choice) else known.label
+    inside = ", ".join(f"{key} = {shown}" for key, shown in fields.items())
+    return _comment(f"{code} = {{ {inside} }}  # {comment}")
+
+
+def _is_beyond(profile: ProfileProtocol, code: str, raw: int) -> bool:
+    """Whether the drive told a value that its family's documents do not allow."""
+    if profile.describe(code).words > 1:
+        return False
+    try:
+        profile.encode(code, profile.decode(code, raw))
+    except NotAllowed:
+        return True
+    return False
+
+
+def number(value: Value, scale: float) -> str:
+    """*value* with as many digits after the point as the drive counts."""
+    if isinstance(value, int):
+        return str(int(value))
+    digits = 0
+    while digits < 9 and 10**digits < scale:
+        digits += 1
+    shown = f"{value:.{digits}f}"
+    return shown if float(shown) == value else repr(value)
+
+
+def worded(profile: ProfileProtocol, code: str, raw: int) -> Value:
+    """*raw* in engineering units, and with its label where the profile has one."""
+    value = profile.decode(code, raw)
+    label = profile.describe(code).choices.get(value) if isinstance(value, int) else None
+    return value if label is None else Choice(int(value), label)
+
+
+def _toml(value: object) -> str:
+    """*value* as TOML has it: JSON writes plain text, numbers, true and false in the same way."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _comment(line: str) -> str:
+    """*line* as one line: a label is a profile's, and may hold anything."""
+    return "".join(letter if letter.isprintable() else " " for letter in line)

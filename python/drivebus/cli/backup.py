@@ -1,0 +1,193 @@
+"""Commands that keep what a drive is set to in a file, compare it, and give it back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import drivebus
+from drivebus.cli.output import show
+from drivebus.cli.session import Session, pass_session, yes_option
+
+__all__ = ["COMMANDS"]
+
+_FACTORY = "factory"
+"""Stands for what the factory set, where a file could."""
+
+_file = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.argument("file", type=_file)
+@click.option("--fresh", is_flag=True, help="Begin anew, whatever an interrupted backup left behind.")
+@click.option("--force", is_flag=True, help="Replace a FILE that is another drive's, or no backup.")
+@pass_session
+def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
+    """Read every parameter into FILE, a text for people and version control. Writes nothing to the drive.
+
+    Interrupted, the same command goes on where it was. Passwords are not read.
+    """
+    with session.drive() as drive, _progress(session, "reading") as progress:
+        kept = drive.backup(file, not fresh, progress, force=force)
+    if session.out.as_json:
+        origin = {name: value for name, value in vars(kept.origin).items() if name != "taken"}
+        taken = f"{kept.origin.taken:%Y-%m-%dT%H:%M:%SZ}"
+        session.out.record(
+            {"file": str(file), **origin, "taken": taken, "parameters": len(kept), "unread": kept.unread}
+        )
+        return
+    session.out.say(f"{file}: {len(kept)} parameters of unit {drive.unit}, {kept.origin.title}.")
+    if kept.unread:
+        session.out.say(f"Not read: {len(kept.unread)}.")
+        session.out.rows(["code", "reason"], kept.unread.items())
+
+
+@click.command()
+@click.argument("file", type=_file)
+@click.option(
+    "--group", "groups", multiple=True, metavar="GROUP", help="Only this group (P00) or code; may be repeated."
+)
+@click.option("--serial", is_flag=True, help="Also the serial settings. The drive may not be heard afterwards.")
+@click.option("--motor", is_flag=True, help="Also the data of the motor.")
+@click.option("--force", is_flag=True, help="Also to another family, identification or firmware.")
+@click.option("--dry-run", is_flag=True, help="Only show what would be written.")
+@yes_option
+@pass_session
+def restore(
+    session: Session,
+    file: Path,
+    groups: tuple[str, ...],
+    serial: bool,
+    motor: bool,
+    force: bool,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Give the drive back what FILE has. Shows what it would write, and asks.
+
+    Writes only what differs, to the memory that outlives the power, and reads each back. Interrupted, the same command
+    goes on where it was. Exit code 1: something was not restored.
+    """
+    kept = _load(session, file)
+    options: dict[str, Any] = {
+        "groups": groups or None,
+        "serial": serial,
+        "motor": motor,
+        "force": force,
+    }
+    with session.drive() as drive:
+        plan = drive.restore(kept, dry_run=True, **options)
+        planned = plan.having("planned")
+        if dry_run or not planned:
+            _show_report(session, plan, "Nothing to write." if not planned else "Nothing was written.")
+        else:
+            if not session.out.as_json:
+                _show_report(session, plan, "")
+            session.ask(_question(drive, [item.code for item in planned]), yes)
+            with _progress(session, "writing") as progress:
+                plan = drive.restore(kept, progress=progress, **options)
+            _show_report(session, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
+    if not plan.ok:
+        failed = sum(item.failed for item in plan)
+        what = "parameter was" if failed == 1 else "parameters were"
+        click.echo(f"{failed} {what} not restored: see above.", err=True)
+        raise click.exceptions.Exit(1)
+
+
+@click.command()
+@click.argument("a", metavar="A")
+@click.argument("b", metavar="[B]", required=False)
+@click.option("--all", "everything", is_flag=True, help="Also what changes by itself, such as the fault history.")
+@click.option("--force", is_flag=True, help="Also with a drive of another identification or firmware.")
+@pass_session
+def diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> None:
+    """Show how B, or the drive, differs from A.
+
+    A and B are files; "factory" stands for what the factory set, as far as that is known. Only what A has is compared
+    with the drive. Exit code 0: nothing differs; 1: something does; others as always.
+    """
+    try:
+        found = _diff(session, a, b, everything, force)
+    except KeyboardInterrupt:
+        # What click makes of it would read as a difference.
+        raise click.exceptions.Exit(130) from None
+    if session.out.as_json:
+        for each in found:
+            session.out.record(vars(each))
+    else:
+        sides = (found.left if a == _FACTORY else a, found.right if b is None else b)
+        session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.")
+        if found:
+            rows = [[each.code, each.left, each.right, each.unit, each.label, each.reason] for each in found]
+            session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
+    if found:
+        raise click.exceptions.Exit(1)
+
+
+def _diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> drivebus.Diff:
+    first = None if a == _FACTORY else _load(session, Path(a))
+    if b is None:
+        with session.drive() as drive:
+            return drive.diff(first, everything=everything, force=force)
+    if b == _FACTORY:
+        raise click.UsageError(f"{_FACTORY} comes first: drivebus diff {_FACTORY} {a}")
+    second = _load(session, Path(b))
+    return second.diff(None, everything=everything) if first is None else first.diff(second, everything=everything)
+
+
+def _load(session: Session, file: Path) -> drivebus.Backup:
+    """The backup in *file*; a wrong one is told before any port is opened."""
+    profile = None if session.profile is None else drivebus.Profile.find(session.profile)
+    return drivebus.Backup.load(file, profile)
+
+
+def _question(drive: drivebus.Drive, codes: list[str]) -> str:
+    text = f"This writes {len(codes)} parameter{'' if len(codes) == 1 else 's'} to the drive's memory"
+    sources = [item["code"] for item in drive.profile.control() if item["code"] in codes]
+    if sources:
+        text += f", and with {', '.join(sources)} where it takes commands from: one that is told to run there may start"
+    return text
+
+
+def _show_report(session: Session, report: drivebus.Restoration, end: str) -> None:
+    """Every parameter as JSON; for people, those of which there is something to say."""
+    if session.out.as_json:
+        for item in report:
+            session.out.record(vars(item))
+        return
+    told = [item for item in report if item.result != "same" and item.before != item.wanted]
+    told = [item for item in told if item.result != "skipped" or item.before is not None]
+    if told:
+        rows = [[item.code, item.before, item.wanted, item.unit, item.result, item.label, item.reason] for item in told]
+        session.out.rows(["code", "drive", "backup", "unit", "result", "label", "reason"], rows)
+    counts = {result: len(report.having(result)) for result in ("same", "skipped")}
+    session.out.say(
+        f"{end} {counts['same']} are the same; {counts['skipped']} are left alone (fault history, read-only, and what "
+        "has to be asked for: serial settings, motor data).".strip()
+    )
+
+
+@contextmanager
+def _progress(session: Session, what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar for who watches a terminal."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=session.out.console, transient=True, disable=not session.out.live) as bar:
+        task = bar.add_task(what, total=None)
+        first = True
+
+        def progress(done: int, total: int) -> None:
+            nonlocal first
+            if first and done and what == "reading":
+                click.echo(f"Going on where it was: {show(done)} of {show(total)} are there.", err=True)
+            first = False
+            bar.update(task, completed=done, total=total)
+
+        yield progress
+
+
+COMMANDS = [backup, restore, diff]

@@ -1,0 +1,170 @@
+"""A restore that is cut off at any moment goes on where it was, and wears the memory of no parameter twice."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivebus import Backup, Bus, Drive, Simulator
+
+RAM = 0x8000
+MOMENTS = 50
+SEED = 5
+SET = {
+    "P00.03": 60.0,
+    "P00.04": 55.0,
+    "P00.06": 8,
+    "P00.11": 3.0,
+    "P00.12": 4.0,
+    "P01.08": 1,
+    "P01.20": 1.5,
+    "P08.06": 700,
+    "P09.01": -12.5,
+    "P10.01": 1,
+}
+"""Values that are not those of the factory."""
+BAUD, SILENCE = 921_600, 0.0002
+"""A line in real time, and as quick as that may be."""
+
+
+class Killed(BaseException):
+    """Ends everything, as kill -9 does: nothing that is written in Python may hold it up."""
+
+
+class Deadly:
+    """A process that dies at its *moment*th request: before it is sent, or when its answer would come."""
+
+    def __init__(self, moment: int, sent: bool) -> None:
+        self.left, self.sent = moment, sent
+
+    def __call__(self, request: Any, *args: Any, **how: Any) -> Any:
+        self.left -= 1
+        if self.left == 0 and not self.sent:
+            raise Killed
+        answer = request(*args, **how)
+        if self.left == 0:
+            raise Killed
+        return answer
+
+
+def set_back(drive: Drive, factory: Mapping[str, Any]) -> None:
+    """What is limited goes down before its limit."""
+    drive.write({"P00.04": factory["P00.04"]}, store=True)
+    drive.write({code: value for code, value in factory.items() if code != "P00.04"}, store=True)
+
+
+def stored(simulator: Simulator) -> Counter[int]:
+    """How often each address of EEPROM was written since it was asked last."""
+    return Counter(address for _, address, _ in simulator.drive(1).take_writes() if not address & RAM)
+
+
+def ready(simulator: Simulator) -> tuple[Backup, dict[str, Any]]:
+    """A drive with other values than its backup has."""
+    with Bus(simulator) as bus:
+        drive = bus.drive(1, "gd350")
+        factory = drive.read(*SET)
+        assert isinstance(factory, dict)
+        # A response delay of a real drive is no part of what is shown here.
+        drive.write({**SET, "P14.03": 0}, store=True)
+        kept = drive.backup()
+        set_back(drive, factory)
+        assert len(drive.diff(kept)) == len(SET)
+    return kept, factory
+
+
+def requests_of_a_restore() -> int:
+    with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
+        kept, _ = ready(simulator)
+        before = simulator.line.requests
+        with Bus(simulator) as bus:
+            bus.drive(1, "gd350").restore(kept)
+        return int(simulator.line.requests - before)
+
+
+def test_cut_off_at_fifty_moments_and_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each attempt is cut off a second time before the last one is let through."""
+    chance = random.Random(SEED)
+    requests = requests_of_a_restore()
+    read, write = Bus.read, Bus.write
+    for _ in range(MOMENTS):
+        with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
+            kept, _ = ready(simulator)
+            stored(simulator)
+            for _ in range(2):
+                deadly = Deadly(chance.randint(1, requests), chance.random() < 0.5)
+                with monkeypatch.context() as patch, Bus(simulator) as bus:
+                    patch.setattr(Bus, "read", lambda *args, _d=deadly, **how: _d(read, *args, **how))
+                    patch.setattr(Bus, "write", lambda *args, _d=deadly, **how: _d(write, *args, **how))
+                    with contextlib.suppress(Killed):
+                        bus.drive(1, "gd350").restore(kept)
+            with Bus(simulator) as bus:
+                drive = bus.drive(1, "gd350")
+                assert drive.restore(kept).ok
+                simulator.drive(1).power_cycle()
+                assert not drive.diff(kept)
+            assert stored(simulator) == dict.fromkeys(map(drive.profile.address, SET), 1)
+
+
+CHILD = f"""
+import os, sys
+from drivebus import Bus
+
+path = sys.argv[1]
+for port in map(str.strip, sys.stdin):
+    child = os.fork()
+    if child == 0:
+        with Bus(port, baudrate={BAUD}, silence={SILENCE}) as bus:
+            bus.drive(1, "gd350").restore(path)
+        os._exit(0)
+    print(child, flush=True)
+    _, status = os.waitpid(child, 0)
+    print(status, flush=True)
+"""
+"""For each port it is told, a process of its own restores the drive there; forked, for to start one takes long."""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty, and no kill -9")
+def test_killed_in_earnest(tmp_path: Path) -> None:
+    """A process of its own is killed at a seeded request of its restore; the line and the drive live on."""
+    chance = random.Random(SEED)
+    requests = requests_of_a_restore()
+    path = tmp_path / "drive.toml"
+    pause = threading.Event()
+    ends: Counter[int] = Counter()
+    words = [sys.executable, "-c", CHILD, str(path)]
+    with (
+        Simulator({1: "gd350"}, baudrate=BAUD, silence=SILENCE) as simulator,
+        subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent,
+    ):
+        assert parent.stdin is not None
+        assert parent.stdout is not None
+        kept, factory = ready(simulator)
+        kept.save(path)
+        for _ in range(MOMENTS):
+            stored(simulator)
+            moment = simulator.line.requests + chance.randint(1, requests - 1)
+            print(simulator.port, file=parent.stdin, flush=True)
+            child = int(parent.stdout.readline())
+            while simulator.line.requests < moment:  # the limit is the test's own
+                pause.wait(0.0005)
+            os.kill(child, signal.SIGKILL)
+            ends[int(parent.stdout.readline())] += 1
+            with Bus(simulator) as bus:
+                drive = bus.drive(1, "gd350")
+                assert drive.restore(path).ok
+                assert not drive.diff(path)
+                assert stored(simulator) == dict.fromkeys(map(drive.profile.address, SET), 1)
+                set_back(drive, factory)
+        parent.stdin.close()
+    assert ends[signal.SIGKILL] > MOMENTS // 2

@@ -1,0 +1,151 @@
+"""The commands backup, restore and diff: what they print, what they ask, what they exit with."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import drivebus
+from drivebus.cli import cli
+
+BAUD = 115_200
+
+
+@pytest.fixture
+def simulator() -> Iterator[drivebus.Simulator]:
+    with drivebus.Simulator({1: "gd350"}, transport="tcp" if os.name == "nt" else "pty", baudrate=BAUD) as simulator:
+        # A response delay of a real drive is no part of what is shown here.
+        with drivebus.Bus(simulator) as bus:
+            bus.drive(1).write("P14.03", 0, store=True)
+        yield simulator
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "drive.toml"
+
+
+def run(simulator: drivebus.Simulator | None, *words: object, **options: Any) -> Result:
+    port = [] if simulator is None else ["--port", simulator.port, "--baud", str(BAUD)]
+    return CliRunner().invoke(cli, [*port, *map(str, words)], prog_name="drivebus", **options)
+
+
+def rows(result: Result) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def store(simulator: drivebus.Simulator, *assignments: str) -> None:
+    assert run(simulator, "write", "--store", *assignments).exit_code == 0
+
+
+def test_a_whole_round(simulator: drivebus.Simulator, file: Path) -> None:
+    taken = run(simulator, "backup", file)
+    assert taken.exit_code == 0
+    assert "53 parameters of unit 1, INVT Goodrive350" in taken.stdout
+    assert "P07.00  a password has no place in a file" in taken.stdout
+    store(simulator, "P00.11=3.0", "P00.12=4.0")
+
+    differs = run(simulator, "diff", file)
+    assert (differs.exit_code, "2 of 46 parameters differ" in differs.stdout) == (1, True)
+
+    asked = run(simulator, "restore", file)
+    assert (asked.exit_code, "needs --yes" in asked.stderr) == (2, True)
+    assert "planned" in asked.stdout
+
+    before = simulator.drive(1).eeprom_writes
+    dry = run(simulator, "restore", file, "--dry-run")
+    assert (dry.exit_code, "Nothing was written" in dry.stdout) == (0, True)
+    assert simulator.drive(1).eeprom_writes == before
+
+    done = run(simulator, "restore", file, "--yes")
+    assert (done.exit_code, "2 of 2 restored." in done.stdout) == (0, True)
+    assert simulator.drive(1).eeprom_writes == before + 2
+    assert run(simulator, "diff", file).exit_code == 0
+    assert "Nothing to write." in run(simulator, "restore", file).stdout
+
+
+def test_json_is_one_object_a_line(simulator: drivebus.Simulator, file: Path) -> None:
+    [taken] = rows(run(simulator, "--json", "backup", file))
+    assert (taken["family"], taken["identification"], taken["parameters"]) == ("gd350", 0x01A0, 53)
+    assert [*taken["unread"]] == ["P07.00"]
+    store(simulator, "P09.00=6")
+    [found] = rows(run(simulator, "--json", "diff", file))
+    assert (found["code"], found["left"]["value"], found["right"]["value"]) == ("P09.00", 0, 6)
+    assert found["right"]["label"] == "Modbus"
+    report = rows(run(simulator, "--json", "restore", file, "--yes", "--group", "P09"))
+    assert {row["code"]: row["result"] for row in report}["P09.00"] == "restored"
+    assert all(row["code"].startswith("P09") for row in report)
+
+
+def test_what_is_not_restored_is_exit_1(simulator: drivebus.Simulator, file: Path) -> None:
+    store(simulator, "P00.03=90", "P00.04=80")
+    run(simulator, "backup", file)
+    store(simulator, "P00.04=50")
+    store(simulator, "P00.03=50")
+    result = run(simulator, "restore", file, "--group", "P00.04", "--yes")
+    assert (result.exit_code, "1 parameter was not restored" in result.stderr) == (1, True)
+    assert "it would be beyond P00.03" in result.stdout
+
+
+def test_taking_commands_from_elsewhere_is_said_first(simulator: drivebus.Simulator, file: Path) -> None:
+    run(simulator, "backup", file)
+    store(simulator, "P00.01=2")
+    result = run(simulator, "restore", file, "--yes")
+    assert "with P00.01 where it takes commands from" in result.stderr
+
+
+def test_a_spoilt_file_is_exit_2_and_opens_no_port(file: Path) -> None:
+    file.write_text(
+        'format = 1\n[drive]\nfamily = "gd350"\n[parameters]\nP00.11 = { value = 1.0, raw = 11 }\nP0.99 = 3\n'
+    )
+    for words in (["restore", file, "--yes"], ["diff", file], ["diff", file, file]):
+        result = run(None, *words)
+        assert result.exit_code == 2
+        assert f"{file}:5: P00.11" in result.stderr
+        assert f"{file}:6: " in result.stderr
+
+
+def test_files_are_compared_without_a_port(simulator: drivebus.Simulator, file: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.toml"
+    run(simulator, "backup", file)
+    store(simulator, "P00.11=3.0")
+    run(simulator, "backup", other)
+    result = run(None, "diff", file, other)
+    assert (result.exit_code, f"{file} -> {other}: 1 of 46 parameters differ" in result.stdout) == (1, True)
+    assert run(None, "diff", file, file).exit_code == 0
+
+
+def test_the_factory_is_a_side(simulator: drivebus.Simulator, file: Path) -> None:
+    store(simulator, "P14.03=5")
+    assert run(simulator, "diff", "factory").exit_code == 0
+    store(simulator, "P00.03=60")
+    assert "50.0  60.0  Hz" in run(simulator, "diff", "factory").stdout
+    run(simulator, "backup", file)
+    assert run(None, "diff", "factory", file).exit_code == 1
+    assert run(None, "diff", file, "factory").exit_code == 2
+
+
+def test_an_interrupted_diff_is_no_difference(
+    simulator: drivebus.Simulator, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    run(simulator, "backup", file)
+    monkeypatch.setattr(drivebus.Drive, "diff", interrupted)
+    assert run(simulator, "diff", file).exit_code == 130
+
+
+def test_going_on_is_said(simulator: drivebus.Simulator, file: Path) -> None:
+    run(simulator, "backup", file)
+    lines = file.read_text().replace("complete = true", "complete = false").splitlines(keepends=True)
+    file.with_name("drive.toml.part").write_text("".join(line for line in lines if not line.startswith("P0")))
+    assert "Going on where it was: 11 of 53 are there." in run(simulator, "backup", file).stderr
+    file.with_name("drive.toml.part").write_text("".join(lines))
+    assert "Going on" not in run(simulator, "backup", file, "--fresh").stderr
