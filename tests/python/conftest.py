@@ -10,7 +10,7 @@ import asyncio
 import importlib.util
 import os
 import signal
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from typing import Any
 
 import pytest
@@ -119,3 +119,29 @@ def virtual_drive(virtual_bus: drivebus.Bus) -> drivebus.Drive:
     drive = virtual_bus.drive(1)
     drive.prepare_control()
     return drive
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Makes a drive that has nothing at an address."""
+    read = drivebus.Bus.read
+
+    def refuse(address: int) -> None:
+        def refusing(bus: drivebus.Bus, unit: int, first: int, count: int = 1, /, **how: bool) -> list[int]:
+            # 6300H is nowhere: the drive itself refuses.
+            return read(bus, unit, 0x6300 if first <= address < first + count else first, count, **how)
+
+        monkeypatch.setattr(drivebus.Bus, "read", refusing)
+
+    return refuse
+
+
+@pytest.fixture
+def store() -> Callable[[drivebus.Drive, Mapping[str, object]], None]:
+    """Stores parameters in EEPROM, whatever is known of them: the drive is the judge."""
+
+    def put(drive: drivebus.Drive, values: Mapping[str, object]) -> None:
+        for code, value in values.items():
+            drive.bus.write(drive.unit, drive.profile.address(code, store=True), drive.profile.encode(code, value))
+
+    return put

@@ -230,6 +230,27 @@ def test_a_value_that_no_document_allows_is_kept_as_the_drive_told_it(
     assert not virtual_drive.diff(file)
 
 
+def test_a_file_is_written_whole_or_not_at_all(
+    virtual_drive: Drive, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full, or the power gone, before the new file is whole."""
+    virtual_drive.backup(file)
+    before = file.read_bytes()
+    virtual_drive.write("P00.11", 3.0, store=True)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(NotAllowed, match="cannot be written: No space left on device"):
+            virtual_drive.backup(file)
+    assert file.read_bytes() == before
+    virtual_drive.backup(file)
+    assert Backup.load(file)["P00.11"] == 3.0
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="links need a right of their own there")
 def test_a_link_goes_on_leading_to_the_file(virtual_drive: Drive, tmp_path: Path) -> None:
     place = tmp_path / "place.toml"

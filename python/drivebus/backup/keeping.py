@@ -94,10 +94,8 @@ class Keeping(Registers):
         A refusal of one parameter ends nothing: it stands in the report.
         """
         kept = self._kept(backup, force)
-        work = Restore(self, kept, unverified=unverified)
-        return await work.run(
-            dry_run=dry_run, groups=groups, serial=serial, motor=motor, force=force, progress=progress
-        )
+        work = Restore(self, kept, dry_run=dry_run, unverified=unverified, progress=progress)
+        return await work.run(groups=groups, serial=serial, motor=motor, force=force)
 
     async def diff(self, backup: Kept | None = None, *, everything: bool = False, force: bool = False) -> Diff:
         """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.

@@ -43,7 +43,8 @@ class Order:
         self._pairs = [(low, high) for low, high in pairs if low in now and high in now and low != high]
         bounding = {code for pair in self._pairs for code in pair}
         place = {code: index for index, code in enumerate(last)}
-        self._rest = sorted(wanted, key=lambda code: (place.get(code, -1), code not in bounding))
+        self._every = sorted(wanted, key=lambda code: (place.get(code, -1), code not in bounding))
+        self._rest = list(self._every)
         self._stepped: set[str] = set()
 
     def next(self) -> Step | None:
@@ -69,6 +70,15 @@ class Order:
         """*code* is not written any more."""
         if code in self._rest:
             self._rest.remove(code)
+
+    def again(self, codes: Iterable[str]) -> None:
+        """*codes*, which were left, are written after all."""
+        back = {*self._rest, *codes}
+        self._rest = [code for code in self._every if code in back]
+
+    def cannot(self, step: Step) -> None:
+        """The drive cannot have the value of *step*, which was one on the way."""
+        self._stepped.add(step.code)
 
     @property
     def rest(self) -> list[str]:

@@ -12,48 +12,43 @@ from typing import TYPE_CHECKING
 from drivebus.backup.compare import amount
 from drivebus.backup.model import Backup
 from drivebus.backup.order import Order, Step
-from drivebus.backup.reading import Reader, word_of
+from drivebus.backup.reading import Reader
 from drivebus.backup.report import Restoration, Restored
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
-from drivebus.errors import BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused
+from drivebus.backup.writing import LINE_ERRORS, write
+from drivebus.errors import DrivebusError, NotAllowed, Refused
 
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping
 
 __all__ = ["Restore"]
 
-_ATTEMPTS = 3
-"""How often a write is sent that the drive shows not to have heard."""
-
 
 class Restore:
     """One restore of one drive."""
 
-    def __init__(self, drive: Keeping, backup: Backup, *, unverified: bool) -> None:
+    def __init__(
+        self, drive: Keeping, backup: Backup, *, dry_run: bool, unverified: bool, progress: Progress | None
+    ) -> None:
         self._drive = drive
         self._profile = drive.profile
         self._backup = backup
         self._rules = Rules(drive.profile)
+        self._dry_run = dry_run
         self._unverified = unverified
+        self._progress = progress
+        self._pending = self._done = 0
         self._had: dict[str, int] = {}
         self._has: dict[str, int] = {}
         # What the backup of another family has and this one does not.
         lost = backup.unread if backup.translated_from else {}
         self._results: dict[str, tuple[str, str]] = {code: ("missing", reason) for code, reason in lost.items()}
+        self._refused: list[str] = []
         self._order: list[str] = []
 
-    async def run(
-        self,
-        *,
-        dry_run: bool,
-        groups: Sequence[str] | None,
-        serial: bool,
-        motor: bool,
-        force: bool,
-        progress: Progress | None,
-    ) -> Restoration:
+    async def run(self, *, groups: Sequence[str] | None, serial: bool, motor: bool, force: bool) -> Restoration:
         """See `Drive.restore`."""
         chosen = self._rules.selected(self._backup, groups)
         wanted = [code for code in chosen if not self._leave(code)]
@@ -66,25 +61,16 @@ class Restore:
             if code not in self._results and code not in asked:
                 self._results[code] = ("skipped", self._rules.unasked(code, serial=serial, motor=motor) or "")
         pending = [code for code in asked if code not in self._results and self._has_a_place(code)]
-        if pending and not dry_run:
+        if pending and not self._dry_run:
             await self._check_stopped(pending)
-        order = Order(
-            {code: float(self._profile.decode(code, word)) for code, word in self._has.items()},
-            {code: float(self._backup[code]) for code in pending},
-            pairs,
-            self._rules.last(),
-        )
-        done = 0
-        while (step := order.next()) is not None:
-            await self._take(step, order, dry_run)
-            done += step.final
-            if progress is not None and step.final:
-                progress(done, len(pending))
-        self._block(order)
-        if not dry_run:
+        self._pending = len(pending)
+        lines = [code for code in pending if self._rules.is_serial(code)]
+        await self._carry_out([code for code in pending if code not in lines], pairs)
+        if not self._dry_run:
             await self._look_again()
+        await self._change_line(lines)
         lost = [code for code in self._results if code not in self._backup]
-        return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, dry_run)
+        return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, self._dry_run)
 
     def _leave(self, code: str) -> bool:
         reason = self._rules.unread(code, self._unverified) or self._rules.uncompared(code)
@@ -140,72 +126,85 @@ class Restore:
                 unit=self._drive.unit,
             )
 
-    async def _take(self, step: Step, order: Order, dry_run: bool) -> None:
-        """Does one step, and says to *order* what came of it."""
-        code = step.code
-        raw = self._backup.raw[code] if step.final else self._profile.encode(code, step.value)
-        self._order.append(code)
-        if dry_run:
-            if step.final:
-                self._results[code] = ("planned", "")
-            order.wrote(step, step.value)
-            return
-        try:
-            shown = await self._write(code, raw, store=step.final)
-        except Refused as error:
-            self._results[code] = ("refused", _meaning(error))
-            order.leave(code)
-            return
-        except (NoAnswer, BadAnswer, PortError, NotAllowed) as error:
-            _note(error, [done for done, (result, _) in self._results.items() if result == "restored"])
-            raise
-        self._has[code] = shown
-        order.wrote(step, float(self._profile.decode(code, shown)))
-        if step.final:
-            self._results[code] = ("restored", "") if shown == raw else ("differs", "the drive shows another value")
-
-    async def _write(self, code: str, raw: int, *, store: bool) -> int:
-        """Writes *raw*, for good if *store*, and returns what the drive then shows.
-
-        A confirmation that was lost is cleared up by reading. The write is repeated only where the drive shows what it
-        had before: then it has not heard it, and has not worn its memory.
-        """
-        known = self._profile.describe(code)
-        address = self._address(code, store)
-        words = [raw >> 16 * index & 0xFFFF for index in range(known.words)]
-        for _ in range(_ATTEMPTS):
-            try:
-                await self._drive._put(code, address, words[0] if known.words == 1 else words, store=store)
-            except (NoAnswer, BadAnswer, PortError) as error:
-                if error.started is None:
-                    raise
-                shown = await self._look(code)
-                if shown == self._has[code]:
-                    continue
-                return shown
-            return await self._look(code)
-        return self._has[code]
-
-    def _address(self, code: str, store: bool) -> int:
-        try:
-            return self._profile.address(code, store=store)
-        except NotAllowed:
-            if store:
-                raise
-            # The family knows no write that is forgotten: the step on the way wears the memory too.
-            return self._profile.address(code, store=True)
-
-    async def _look(self, code: str) -> int:
-        known = self._profile.describe(code)
-        words = await self._drive.read_words(self._profile.address(code), known.words)
-        return word_of(words)
-
-    def _block(self, order: Order) -> None:
-        """Says of what is left why it could not be written."""
+    async def _carry_out(self, pending: Sequence[str], pairs: Sequence[tuple[str, str]]) -> None:
+        """Writes *pending*, step by step. What was refused is tried again after the others: these may have hindered."""
+        order = Order(
+            {code: float(self._profile.decode(code, word)) for code, word in self._has.items()},
+            {code: float(self._backup[code]) for code in pending},
+            pairs,
+            self._rules.last(),
+        )
+        written = -1
+        while written != len(self._order):
+            written = len(self._order)
+            order.again(self._refused)
+            self._refused.clear()
+            while (step := order.next()) is not None:
+                await self._take(step, order)
+            if not self._refused:
+                break
         for code in order.rest:
             by = order.hindrance(code, float(self._backup[code]))
             limit = "another parameter" if by is None else f"{by}, which the drive has at {self._shown(by)}"
             self._results[code] = ("blocked", f"it would be beyond {limit}")
+
+    async def _take(self, step: Step, order: Order) -> None:
+        """Does one step, and says to *order* what came of it."""
+        try:
+            raw = self._backup.raw[step.code] if step.final else self._profile.encode(step.code, step.value)
+        except NotAllowed:
+            order.cannot(step)
+            return
+        try:
+            shown = await self._write(step.code, raw, store=step.final)
+        except Refused:
+            self._refused.append(step.code)
+            order.leave(step.code)
+            return
+        except (*LINE_ERRORS, NotAllowed) as error:
+            _note(error, [code for code, (result, _) in self._results.items() if result == "restored"])
+            raise
+        order.wrote(step, float(self._profile.decode(step.code, shown)))
+
+    async def _change_line(self, codes: Sequence[str]) -> None:
+        """Writes settings of the serial line, after all else and the address last: the drive may obey them at once."""
+        gone = None
+        for code in reversed(codes):
+            if gone is not None:
+                self._results[code] = ("blocked", f"the drive is not heard any more since {gone} was written")
+                continue
+            try:
+                await self._write(code, self._backup.raw[code], store=True)
+            except Refused:
+                continue
+            except LINE_ERRORS as error:
+                if error.started is None:
+                    raise
+                gone = code
+                self._results[code] = (
+                    "differs",
+                    "it was written, and the drive is not heard any more as the line is set",
+                )
+
+    async def _write(self, code: str, raw: int, *, store: bool) -> int:
+        """Writes one parameter, or says that it would, and notes what came of it."""
+        if self._dry_run:
+            shown = raw
+        else:
+            try:
+                shown = await write(self._drive, code, raw, self._has[code], store=store)
+            except Refused as error:
+                self._results[code] = ("refused", _meaning(error))
+                raise
+            self._has[code] = shown
+        self._order.append(code)
+        if store:
+            result = "planned" if self._dry_run else "restored"
+            self._results[code] = (result, "") if shown == raw else ("differs", "the drive shows another value")
+            self._done += 1
+            if self._progress is not None:
+                self._progress(self._done, self._pending)
+        return shown
 
     def _shown(self, code: str) -> str:
         return amount(self._profile, code, worded(self._profile, code, self._has[code]))

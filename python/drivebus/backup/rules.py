@@ -62,11 +62,15 @@ class Rules:
 
     def unasked(self, code: str, *, serial: bool, motor: bool) -> str | None:
         """Why *code* is not given back unless that is asked for; None if it is."""
-        if not serial and _among(code, self._serial):
+        if not serial and self.is_serial(code):
             return "a setting of the serial line; given back only where that is asked for"
         if not motor and _among(code, self._motor):
             return "data of the motor; given back only where that is asked for"
         return None
+
+    def is_serial(self, code: str) -> bool:
+        """Whether *code* is a setting of the serial line."""
+        return _among(code, self._serial)
 
     def selected(self, codes: Iterable[str], groups: Sequence[str] | None) -> list[str]:
         """Those of *codes* that are in *groups* (groups such as `"P00"`, or single codes); all for None.
