@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import tomli
+from hypothesis import given
+from hypothesis import strategies as st
 
 import drivebus
 from drivebus import Backup, Bus, Drive, NotAllowed, Simulator
+from drivebus.backup.parse import parse
 
 HEAD = """\
 format = 1
@@ -165,6 +169,7 @@ HEADS: list[tuple[Callable[[str], str], str]] = [
     (lambda head: head.replace("unit = 1", "unit = 1\nunit = 2"), "6: unit is given twice"),
     (lambda head: head.replace("2026-11-21T12:00:00Z", '"today"'), "7: taken must be a moment"),
     (lambda head: head.replace("taken", "token"), "did you mean 'taken'?"),
+    (lambda head: head.replace("2026-11-21T12:00:00Z", "0001-01-01T00:00:00+01:00"), "7: taken is no moment"),
 ]
 
 
@@ -181,6 +186,31 @@ def test_an_unknown_family_names_the_closest(file: Path) -> None:
 def test_one_parameter_stands_in_one_line(file: Path) -> None:
     [found] = wrong(file, HEAD + "P00.01 = { value = 2 }\nP00.01 = { value = 1 }\n")
     assert found.startswith(f"{FIRST + 1}: P00.01 is given twice; it stands in line {FIRST} already")
+
+
+WHOLE = HEAD + "".join(
+    f"{line}\n"
+    for line in (
+        'P00.03 = { value = 50.00, unit = "Hz", raw = 5000 }  # Maximum output frequency',
+        "P00.11 = { value = 20.0, raw = 200 }",
+        "P09.00 = { value = 6, raw = 6, beyond = false }",
+    )
+)
+
+
+@given(st.integers(0, len(WHOLE)), st.integers(0, 30), st.binary(max_size=20))
+def test_any_edit_is_taken_or_refused_in_words(place: int, length: int, edit: bytes) -> None:
+    data = WHOLE.encode()
+    path = Path("drive.toml")
+    said: list[str] = []
+    raw: dict[str, int] = {}
+    try:
+        raw = parse(path, data[:place] + edit + data[place + length :], drivebus.Profile.builtin).raw
+    except NotAllowed as error:
+        said = str(error).splitlines()[1:]
+    assert all(re.match(r"drive\.toml:\d+: ", line) for line in said)
+    profile = drivebus.Profile.builtin("gd350")
+    assert all(profile.encode(code, profile.decode(code, word)) == word for code, word in raw.items())
 
 
 @pytest.mark.parametrize(

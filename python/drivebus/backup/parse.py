@@ -174,7 +174,10 @@ def _head(file: _File, key: str, value: object) -> None:
     if key in place:
         raise Wrong(f"{key} is given twice")
     if isinstance(value, datetime):
-        value = (value if value.tzinfo else value.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+        try:
+            value = (value if value.tzinfo else value.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+        except OverflowError:
+            raise Wrong(f"{key} is no moment that can be told") from None
     place[key] = value
 
 
