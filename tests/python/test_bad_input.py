@@ -158,7 +158,7 @@ def test_a_bad_policy_is_named(port: str, arguments: dict[str, Any], message: st
         (None, "no port"),
         (7, "no port"),
         ("sock://localhost:1", "sock://.*did you mean 'socket'"),
-        ("sim://gd355", "gd355.*did you mean 'gd350'"),
+        ("sim://gd355", "gd355.*did you mean 'gd35"),
         ("sim://0=gd350", r"unit 0 .*1\.\.247"),
         ("sim://x=gd350", r"unit 'x' .*1\.\.247"),
         ("sim://1=gd350,1=gd350", "twice"),
@@ -189,7 +189,7 @@ def test_a_port_that_cannot_be_opened_is_named(port: str) -> None:
         (({},), "units {} name no drive"),
         (("gd350",), "units 'gd350' name no drive"),
         (({0: "gd350"},), "unit 0"),
-        (({1: "gd35O"},), "gd35O.*did you mean 'gd350'"),
+        (({1: "gd35O"},), "gd35O.*did you mean 'gd35"),
     ],
     ids=str,
 )
@@ -257,7 +257,7 @@ class TestProfileFolders:
 
 
 @pytest.mark.parametrize(
-    ("code", "says"), [(0x010A, "010AH, which is a gd300"), (0x4242, "4242H, which no list names")]
+    ("code", "says"), [(0x010B, "010BH, which is a gd100"), (0x4242, "4242H, which no list names")]
 )
 def test_a_family_without_a_profile_is_not_taken_for_another(
     virtual: Simulator, virtual_bus: Bus, code: int, says: str

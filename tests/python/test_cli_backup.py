@@ -47,12 +47,12 @@ def store(simulator: drivebus.Simulator, *assignments: str) -> None:
 def test_a_whole_round(simulator: drivebus.Simulator, file: Path) -> None:
     taken = run(simulator, "backup", file)
     assert taken.exit_code == 0
-    assert "53 parameters of unit 1, INVT Goodrive350" in taken.stdout
+    assert "52 parameters of unit 1, INVT Goodrive350" in taken.stdout
     assert "P07.00  a password has no place in a file" in taken.stdout
     store(simulator, "P00.11=3.0", "P00.12=4.0")
 
     differs = run(simulator, "diff", file)
-    assert (differs.exit_code, "2 of 46 parameters differ" in differs.stdout) == (1, True)
+    assert (differs.exit_code, "2 of 45 parameters differ" in differs.stdout) == (1, True)
 
     asked = run(simulator, "restore", file)
     assert (asked.exit_code, "needs --yes" in asked.stderr) == (2, True)
@@ -72,8 +72,8 @@ def test_a_whole_round(simulator: drivebus.Simulator, file: Path) -> None:
 
 def test_json_is_one_object_a_line(simulator: drivebus.Simulator, file: Path) -> None:
     [taken] = rows(run(simulator, "--json", "backup", file))
-    assert (taken["family"], taken["identification"], taken["parameters"]) == ("gd350", 0x01A0, 53)
-    assert [*taken["unread"]] == ["P07.00"]
+    assert (taken["family"], taken["identification"], taken["parameters"]) == ("gd350", 0x01A0, 52)
+    assert [*taken["unread"]] == ["P02.01", "P07.00"]
     store(simulator, "P09.00=6")
     [found] = rows(run(simulator, "--json", "diff", file))
     assert (found["code"], found["left"]["value"], found["right"]["value"]) == ("P09.00", 0, 6)
@@ -117,7 +117,7 @@ def test_files_are_compared_without_a_port(simulator: drivebus.Simulator, file: 
     store(simulator, "P00.11=3.0")
     run(simulator, "backup", other)
     result = run(None, "diff", file, other)
-    assert (result.exit_code, f"{file} -> {other}: 1 of 46 parameters differ" in result.stdout) == (1, True)
+    assert (result.exit_code, f"{file} -> {other}: 1 of 45 parameters differ" in result.stdout) == (1, True)
     assert run(None, "diff", file, file).exit_code == 0
 
 
@@ -146,6 +146,6 @@ def test_going_on_is_said(simulator: drivebus.Simulator, file: Path) -> None:
     run(simulator, "backup", file)
     lines = file.read_text().replace("complete = true", "complete = false").splitlines(keepends=True)
     file.with_name("drive.toml.part").write_text("".join(line for line in lines if not line.startswith("P0")))
-    assert "Going on where it was: 11 of 53 are there." in run(simulator, "backup", file).stderr
+    assert "Going on where it was: 11 of 52 are there." in run(simulator, "backup", file).stderr
     file.with_name("drive.toml.part").write_text("".join(lines))
     assert "Going on" not in run(simulator, "backup", file, "--fresh").stderr

@@ -12,7 +12,7 @@
 //! let gd350 = Profile::builtin("gd350")?;
 //!
 //! let current = gd350.find("output_current")?;
-//! assert_eq!(current.address(), 0x3004);
+//! assert_eq!(current.address(), Some(0x3004));
 //! assert_eq!(current.decode(57).to_string(), "5.7");
 //! assert_eq!(current.quantity().unit(), "A");
 //!

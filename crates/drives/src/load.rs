@@ -109,7 +109,19 @@ macro_rules! builtin {
     };
 }
 
-static BUILTINS: [Builtin; 1] = [builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv")];
+static BUILTINS: [Builtin; 11] = [
+    builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gd35": "registers.csv"),
+    builtin!("gd35-h1": "registers.csv"),
+    builtin!("gd300": "registers.csv" "parameters.csv"),
+    builtin!("gd600": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gd600-rectifier": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gd3000": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gd3000-rectifier": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vfd500": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
+];
 
 impl Builtin {
     fn files(&self) -> Files {

@@ -225,11 +225,6 @@ impl Profile {
         Some((self.command_address?, self.commands.get(&command)?.code))
     }
 
-    /// Why `command` is not verified; `None` where it is, or where there is no such command.
-    pub fn command_note(&self, command: Command) -> Option<&str> {
-        self.commands.get(&command).filter(|known| !known.verified).map(|_| self.commands_note.as_str())
-    }
-
     /// The commands of the family, with their words.
     pub fn commands(&self) -> &BTreeMap<Command, CommandCode> {
         &self.commands

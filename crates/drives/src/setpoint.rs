@@ -28,8 +28,10 @@ pub enum Setpoint {
     /// The voltage where it is separate from the frequency.
     VfVoltage,
     /// The first analog output.
+    #[serde(rename = "analog_output_1")]
     AnalogOutput1,
     /// The second analog output.
+    #[serde(rename = "analog_output_2")]
     AnalogOutput2,
     /// Digital inputs as the bus sets them.
     VirtualInputs,

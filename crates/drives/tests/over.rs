@@ -87,7 +87,7 @@ fn a_sister_family_is_trusted_as_far_as_its_own_documents_go() {
     assert!(profile.find("rev_upper_frequency").is_err());
 
     assert_eq!(profile.command(Command::Stop), Some((0x2000, 5)));
-    assert_eq!(profile.command_note(Command::Stop), Some("The leaflet calls it compatible with the GD350."));
+    assert_eq!(profile.command_reason(Command::Stop), Some("The leaflet calls it compatible with the GD350."));
     assert!(!profile.state_word().unwrap().verified);
     assert_eq!(profile.state(3), State::Stopped);
     assert!(profile.control().iter().all(|item| !item.verified));

@@ -250,7 +250,7 @@ impl Profile {
     #[pyo3(signature = (name, /))]
     fn command_reason(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
         let command: Command = text("command", name)?.parse().map_err(refuse)?;
-        Ok(self.0.command_note(command))
+        Ok(self.0.command_reason(command))
     }
 
     fn commands(&self) -> std::collections::BTreeMap<&'static str, u16> {
@@ -288,7 +288,7 @@ impl Profile {
 
     /// Why the states are not verified; `None` where they are, or where there are none.
     fn state_reason(&self) -> Option<&str> {
-        self.0.state_word().filter(|word| !word.verified).map(|word| word.note.as_str())
+        self.0.state_reason()
     }
 
     fn control<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {

@@ -165,7 +165,8 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
                 rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}"])
             else:
                 known = drive.describe(place)
-                rows.append([known.name, drive.read(place, verify=verify), known.unit, known.label])
+                value = drive.read(place, verify=verify)
+                rows.append([known.code or known.name, value, known.unit, known.label])
         session.out.rows(["name", "value", "unit", "label"], rows)
 
 

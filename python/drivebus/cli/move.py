@@ -129,7 +129,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, yes: bool
         rows = []
         for name in wanted:
             known = drive.describe(name)
-            rows.append([known.name, drive.read(name), known.unit, known.label])
+            rows.append([known.code or known.name, drive.read(name), known.unit, known.label])
         _say_kept([name for name, value, *_ in rows if name in before and before[name] == value])
         session.out.rows(["name", "value", "unit", "label"], rows)
 

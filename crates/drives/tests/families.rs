@@ -1,0 +1,354 @@
+//! Every family against `tests/vectors/families.toml`, a table typed from the manuals: commands, states, memory,
+//! exceptions, identification codes, and worked examples. Python walks the same file in `tests/python/test_families.py`.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use drivebus_drives::{Command, Entry, Evidence, Input, Profile, Store, UnitKind, Value};
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    family: Vec<Family>,
+    example: Vec<Example>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Family {
+    name: String,
+    kind: String,
+    functions: Vec<u8>,
+    max_words: u16,
+    across_groups: bool,
+    commands: Commands,
+    states: Option<States>,
+    memory: Option<Memory>,
+    exceptions: BTreeMap<String, String>,
+    identification: Identification,
+}
+
+/// A number, or "none" where the family has nothing.
+#[derive(Deserialize, Clone)]
+#[serde(untagged)]
+enum Word {
+    Is(u16),
+    None(String),
+}
+
+impl Word {
+    fn get(&self) -> Option<u16> {
+        match self {
+            Self::Is(word) => Some(*word),
+            Self::None(text) => {
+                assert_eq!(text, "none");
+                None
+            }
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct Commands {
+    source: String,
+    register: Word,
+    needs_unverified: Vec<String>,
+    other: BTreeMap<String, String>,
+    moves: Vec<u16>,
+    #[serde(flatten)]
+    codes: BTreeMap<String, Word>,
+}
+
+#[derive(Deserialize)]
+struct States {
+    source: String,
+    register: u16,
+    needs_unverified: bool,
+    #[serde(flatten)]
+    words: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Memory {
+    source: String,
+    parameter: String,
+    ram: Word,
+    eeprom: u16,
+    needs_unverified: bool,
+}
+
+#[derive(Deserialize)]
+struct Identification {
+    source: String,
+    register: Word,
+    #[serde(flatten)]
+    codes: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Example {
+    family: String,
+    name: String,
+    variant: Option<String>,
+    value: String,
+    words: Vec<u16>,
+    source: String,
+}
+
+fn document() -> Document {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/vectors/families.toml");
+    toml::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Every family of the table, with its profile.
+fn families() -> impl Iterator<Item = (Family, Arc<Profile>)> {
+    document().family.into_iter().map(|family| {
+        let profile = Profile::builtin(&family.name).unwrap();
+        (family, profile)
+    })
+}
+
+fn hex(text: &str) -> u16 {
+    u16::from_str_radix(text.strip_prefix("0x").unwrap(), 16).unwrap()
+}
+
+#[test]
+fn the_table_has_every_family_and_every_command() {
+    let names: Vec<String> = document().family.into_iter().map(|family| family.name).collect();
+    let listed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    assert_eq!(listed, Profile::builtin_names().collect());
+    assert_eq!((names.len(), listed.len()), (11, 11));
+    for (family, profile) in families() {
+        let commands: BTreeSet<&str> = family.commands.codes.keys().map(String::as_str).collect();
+        assert_eq!(commands, Command::ALL.map(Command::name).into(), "{}", family.name);
+        assert!(!family.commands.source.is_empty() && !family.identification.source.is_empty(), "{}", family.name);
+        let kind = if profile.kind() == UnitKind::Rectifier { "rectifier" } else { "inverter" };
+        assert_eq!(kind, family.kind, "{}", family.name);
+    }
+}
+
+#[test]
+fn every_command_of_every_family_is_that_of_the_table() {
+    for (family, profile) in families() {
+        let (name, table) = (&family.name, &family.commands);
+        assert_eq!(profile.command_address(), table.register.get(), "{name}");
+        let mut defined: BTreeSet<u16> = BTreeSet::new();
+        for command in Command::ALL {
+            let code = table.codes[command.name()].get();
+            let expected = code.map(|code| (table.register.get().unwrap(), code));
+            assert_eq!(profile.command(command), expected, "{name} {}", command.name());
+            let in_doubt = profile.command_reason(command).is_some();
+            assert_eq!(
+                in_doubt,
+                table.needs_unverified.iter().any(|name| name == command.name()),
+                "{name} {command:?}"
+            );
+            if let Some(code) = code {
+                assert_eq!(profile.command_of(code), Some(command), "{name} {code}");
+                defined.insert(code);
+            }
+        }
+        for (code, label) in &table.other {
+            let code = code.parse().unwrap();
+            assert_eq!(profile.command_codes().get(&code), Some(&label.as_str()), "{name} {code}");
+            defined.insert(code);
+        }
+        assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
+        let moving: Vec<u16> = (0..0x8000).filter(|&address| profile.is_command(address)).collect();
+        assert_eq!(moving, table.moves, "{name}");
+    }
+}
+
+/// What is dangerous to mix up, in words: one family's stop must never be the other's.
+#[test]
+fn the_vfd500_has_habits_of_its_own() {
+    let code = |family, command| Profile::builtin(family).unwrap().command(command).map(|(_, code)| code);
+    assert_eq!((code("gd350", Command::Stop), code("vfd500", Command::Stop)), (Some(5), Some(6)));
+    assert_eq!((code("gd350", Command::Coast), code("vfd500", Command::Coast)), (Some(6), Some(5)));
+    assert_eq!((code("gd350", Command::ResetFault), code("vfd500", Command::ResetFault)), (Some(7), Some(8)));
+    assert_eq!((code("gd350", Command::JogStop), code("vfd500", Command::JogStop)), (Some(8), None));
+}
+
+#[test]
+fn every_state_of_every_family_is_that_of_the_table() {
+    for (family, profile) in families() {
+        let Some(table) = family.states else {
+            assert!(profile.state_word().is_none(), "{}", family.name);
+            continue;
+        };
+        let word = profile.state_word().unwrap();
+        let register = profile.find(&word.register).unwrap();
+        assert_eq!(register.address(), Some(table.register), "{}", family.name);
+        let in_doubt = profile.state_reason().is_some();
+        assert_eq!(in_doubt, table.needs_unverified, "{}: {}", family.name, table.source);
+        for (raw, state) in &table.words {
+            assert_eq!(profile.state(hex(raw)).name(), state, "{} {raw}", family.name);
+        }
+    }
+}
+
+#[test]
+fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
+    for (family, profile) in families() {
+        let Some(table) = family.memory else {
+            assert!(profile.entries().all(|entry| entry.code().is_none()), "{}", family.name);
+            continue;
+        };
+        let entry = profile.find(&table.parameter).unwrap();
+        let ram = profile.write_address(entry, Store::Ram);
+        assert_eq!(ram.as_ref().ok().copied(), table.ram.get(), "{}: {ram:?}", family.name);
+        assert_eq!(profile.write_address(entry, Store::Eeprom), Ok(table.eeprom), "{}: {}", family.name, table.source);
+        let in_doubt = profile.memory().is_some_and(|memory| !memory.verified);
+        assert_eq!(in_doubt, table.needs_unverified, "{}", family.name);
+        assert_eq!(profile.memory().is_some(), table.ram.get().is_some(), "{}", family.name);
+    }
+}
+
+/// The bit is about parameters: no register gets it, whatever the family.
+#[test]
+fn the_memory_bit_is_never_set_on_a_register() {
+    for (family, profile) in families() {
+        for entry in profile.entries().filter(|entry| entry.code().is_none()) {
+            if let Ok(address) = profile.write_address(entry, Store::Ram) {
+                assert_eq!(Some(address), entry.address(), "{} {}", family.name, entry.name());
+            }
+            assert!(profile.write_address(entry, Store::Eeprom).is_err(), "{} {}", family.name, entry.name());
+        }
+    }
+}
+
+#[test]
+fn requests_and_exceptions_are_those_of_the_table() {
+    for (family, profile) in families() {
+        assert_eq!(profile.functions(), family.functions, "{}", family.name);
+        assert_eq!(profile.max_words(), family.max_words, "{}", family.name);
+        assert_eq!(profile.requests().across_groups, family.across_groups, "{}", family.name);
+        let listed = family.exceptions.iter().filter(|(code, _)| *code != "source");
+        let mut known = 0;
+        for (code, name) in listed {
+            let exception = profile.exception(u8::try_from(hex(code)).unwrap());
+            assert_eq!(&exception.name, name, "{} {code}", family.name);
+            assert!(!exception.meaning.is_empty(), "{} {code}", family.name);
+            known += usize::from(name != "unknown");
+        }
+        assert_eq!(profile.exceptions().count(), known, "{}", family.name);
+    }
+}
+
+#[test]
+fn every_identification_code_stands_once() {
+    let mut seen: BTreeMap<u16, String> = BTreeMap::new();
+    for (family, profile) in families() {
+        let listed: BTreeMap<u16, &str> =
+            family.identification.codes.iter().map(|(code, name)| (hex(code), name.as_str())).collect();
+        let known = profile.identifications().iter().map(|row| (row.code, row.family.as_str()));
+        assert_eq!(known.collect::<BTreeMap<u16, &str>>(), listed, "{}", family.name);
+        if family.identification.register.get().is_none() {
+            assert!(listed.is_empty(), "{}", family.name);
+        }
+        for (code, _) in listed {
+            let twice = seen.insert(code, family.name.clone());
+            assert_eq!(twice, None, "{code:04X}");
+        }
+        for row in profile.identifications() {
+            let own = Profile::builtin(&row.family).is_ok();
+            assert!(!own || row.family == family.name, "{:04X} stands in {}", row.code, family.name);
+        }
+    }
+    assert_eq!(seen.len(), 10);
+    let gd300 = Profile::builtin("gd300").unwrap();
+    let shared = &gd300.identify(0x010A).unwrap().shared;
+    assert!(shared.iter().any(|title| title.contains("300L")), "{shared:?}");
+}
+
+#[test]
+fn values_are_those_of_the_worked_examples() {
+    for example in document().example {
+        let mut profile = (*Profile::builtin(&example.family).unwrap()).clone();
+        if let Some(variant) = &example.variant {
+            profile = profile.with_variants([("speed_unit", variant.as_str())]).unwrap();
+        }
+        let entry = profile.find(&example.name).unwrap();
+        let what = format!("{} {} = {} ({})", example.family, example.name, example.value, example.source);
+        assert_eq!(usize::from(entry.words()), example.words.len(), "{what}");
+        let value = entry.quantity().decode_words(&example.words).unwrap();
+        assert_eq!(value.to_string(), example.value, "{what}");
+        if let [word] = example.words[..] {
+            assert_eq!(entry.encode(Input::Decimal(&example.value)), Ok(word), "{what}");
+        }
+    }
+}
+
+/// A family takes nothing over unsaid: what is not its own says why it may be used, and is never taken for documented.
+#[test]
+fn what_is_taken_over_says_so() {
+    for (name, own) in [("gd35", 8), ("gd35-h1", 0), ("gd300", 20)] {
+        let profile = Profile::builtin(name).unwrap();
+        let base = Profile::builtin("gd350").unwrap();
+        for entry in profile.entries() {
+            assert!(entry.verified() || !entry.note().is_empty(), "{name} {}", entry.name());
+            if entry.verified() {
+                let title = name.to_uppercase();
+                assert!(entry.source().contains(&title), "{name} {}: {}", entry.name(), entry.source());
+            }
+        }
+        assert_eq!(profile.entries().filter(|entry| entry.verified()).count(), own, "{name}");
+        assert_eq!(profile.entries().count(), base.entries().count(), "{name}");
+        assert!(!profile.faults().any(|fault| fault.evidence == Evidence::Verified), "{name}");
+    }
+}
+
+/// 2101H bit 0: 1 is ready on GD350 and GD300, 0 is ready on GD35, and on GD35-H1 nobody knows.
+#[test]
+fn ready_is_told_as_each_family_tells_it() {
+    let ready = |family: &str, raw| {
+        let profile = Profile::builtin(family).unwrap();
+        let word = profile.find("status_word_2").unwrap();
+        word.bits().iter().find(|bit| bit.name() == "ready").map(|bit| bit.meaning(raw).into_owned())
+    };
+    for (family, zero, one) in
+        [("gd350", "not ready", "ready"), ("gd300", "not ready", "ready"), ("gd35", "ready", "not ready")]
+    {
+        assert_eq!((ready(family, 0).as_deref(), ready(family, 1).as_deref()), (Some(zero), Some(one)), "{family}");
+    }
+    assert_eq!(ready("gd35-h1", 0), None);
+    let inputs = |family: &str| {
+        let profile = Profile::builtin(family).unwrap();
+        profile.find("virtual_input").unwrap().quantity().high().map(Value::count)
+    };
+    assert_eq!(["gd350", "gd35", "gd35-h1", "gd300"].map(inputs), [0x3FF, 0x1FF, 0x1FF, 0x1FF].map(Some));
+}
+
+#[test]
+fn every_row_of_every_family_names_its_source_or_its_reason() {
+    for name in Profile::builtin_names() {
+        let profile = Profile::builtin(name).unwrap();
+        let says = |what: &str, evidence: Evidence, source: &str, note: &str| {
+            assert!(!source.is_empty() || evidence == Evidence::Assumed, "{name} {what} has no source");
+            assert!(!note.is_empty() || evidence == Evidence::Verified, "{name} {what} has no reason");
+        };
+        for entry in profile.entries() {
+            says(entry.name(), entry.evidence(), entry.source(), entry.note());
+        }
+        for fault in profile.faults() {
+            says(&format!("fault {}", fault.code), fault.evidence, &fault.source, &fault.note);
+        }
+        for item in profile.control().iter().chain(profile.setpoints().values().flat_map(|role| &role.needs)) {
+            assert!(item.verified || !item.note.is_empty(), "{name} {}", item.code);
+        }
+        // A setpoint and the list of what must be set say the same of the same parameter.
+        for need in profile.setpoints().values().flat_map(|role| &role.needs) {
+            for same in profile.control().iter().filter(|item| item.code == need.code) {
+                assert_eq!((same.raw, same.verified), (need.raw, need.verified), "{name} {}", need.code);
+            }
+        }
+        let serial: Vec<&str> = profile.serial_parameters().map(Entry::name).collect();
+        assert!(profile.last_parameters().all(|entry| !serial.contains(&entry.name())), "{name}");
+    }
+}

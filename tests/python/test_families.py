@@ -1,0 +1,139 @@
+"""Every family against `tests/vectors/families.toml`, a table typed from the manuals, through the Python API.
+
+Rust walks the same file in `crates/drives/tests/families.rs`. The format is explained in `tests/vectors/README.md`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli
+
+import drivebus
+from drivebus import NotAllowed, Profile
+
+TABLE = tomli.loads((Path(__file__).resolve().parent.parent / "vectors" / "families.toml").read_text(encoding="utf-8"))
+FAMILIES: list[dict[str, Any]] = TABLE["family"]
+EXAMPLES: list[dict[str, Any]] = TABLE["example"]
+COMMANDS = [
+    "run_forward",
+    "run_reverse",
+    "jog_forward",
+    "jog_reverse",
+    "stop",
+    "coast",
+    "reset_fault",
+    "jog_stop",
+]
+
+every_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family["name"])
+
+
+def given(word: int | str) -> int | None:
+    """A number of the table; None for what a family does not have."""
+    assert isinstance(word, int) or word == "none"
+    return word if isinstance(word, int) else None
+
+
+def words(section: dict[str, Any]) -> dict[int, str]:
+    """What a section of the table says of words: those of its keys that are hex."""
+    return {int(key, 16): value for key, value in section.items() if key.startswith("0x")}
+
+
+def test_the_table_has_every_family() -> None:
+    assert {family["name"] for family in FAMILIES} == set(drivebus.profiles())
+    assert len(FAMILIES) == 11
+
+
+@every_family
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_is_that_of_the_table(family: dict[str, Any], command: str) -> None:
+    profile, table = Profile.builtin(family["name"]), family["commands"]
+    code = given(table[command])
+    if code is None:
+        with pytest.raises(NotAllowed, match=family["name"]):
+            profile.command(command)
+        assert command not in profile.commands()
+        return
+    assert profile.command(command) == (table["register"], code)
+    assert profile.commands()[command] == code
+    assert (profile.command_reason(command) is not None) == (command in table["needs_unverified"])
+
+
+@every_family
+def test_no_other_code_is_defined(family: dict[str, Any]) -> None:
+    profile, table = Profile.builtin(family["name"]), family["commands"]
+    codes: dict[int | None, str] = {given(table[command]): command for command in COMMANDS}
+    codes.pop(None, None)
+    codes.update({int(code): label for code, label in table["other"].items()})
+    assert profile.command_codes() == codes
+    assert profile.command_address == given(table["register"])
+    assert [address for address in range(0x8000) if profile.is_command(address)] == table["moves"]
+    assert profile.kind == family["kind"]
+
+
+@every_family
+def test_states_are_those_of_the_table(family: dict[str, Any]) -> None:
+    profile, table = Profile.builtin(family["name"]), family.get("states")
+    register = profile.role("state")
+    if table is None:
+        assert register is None
+        return
+    assert register is not None
+    assert profile.address(register) == table["register"]
+    assert (profile.state_reason() is not None) == table["needs_unverified"]
+    for raw, state in words(table).items():
+        assert profile.state(raw) == state, f"{raw:04X}"
+
+
+@every_family
+def test_ram_and_eeprom_are_reached_by_the_familys_own_rule(family: dict[str, Any]) -> None:
+    profile, table = Profile.builtin(family["name"]), family.get("memory")
+    if table is None:
+        assert profile.memory() is None
+        return
+    ram = given(table["ram"])
+    assert profile.address(table["parameter"], store=True) == table["eeprom"]
+    if ram is None:
+        assert profile.memory() is None
+        with pytest.raises(NotAllowed):
+            profile.address(table["parameter"], store=False)
+    else:
+        memory = profile.memory()
+        assert memory is not None
+        assert profile.address(table["parameter"], store=False) == ram
+        assert (memory["reason"] is not None) == table["needs_unverified"]
+
+
+@every_family
+def test_requests_exceptions_and_codes_are_those_of_the_table(family: dict[str, Any]) -> None:
+    profile = Profile.builtin(family["name"])
+    assert profile.functions == family["functions"]
+    assert profile.max_words == family["max_words"]
+    assert profile.requests()["across_groups"] == family["across_groups"]
+    for code, name in words(family["exceptions"]).items():
+        assert profile.exception(code)[0] == name, f"{code:02X}"
+    table = family["identification"]
+    assert {row["code"]: row["family"] for row in profile.identifications()} == words(table)
+    register = given(table["register"])
+    assert profile.identification_address == register
+
+
+def test_every_code_is_known_whichever_profile_holds_it() -> None:
+    for family in FAMILIES:
+        for code, name in words(family["identification"]).items():
+            assert drivebus.profile.identify(code) == name, f"{code:04X}"
+    assert drivebus.profile.identify(0x0110) is None
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: f"{example['family']} {example['name']}")
+def test_a_value_is_that_of_the_worked_example(example: dict[str, Any]) -> None:
+    profile = Profile.builtin(example["family"])
+    if "variant" in example:
+        profile = profile.with_variants({"speed_unit": example["variant"]})
+    raw = sum(word << (16 * place) for place, word in enumerate(example["words"]))
+    assert profile.decode(example["name"], raw) == float(example["value"])
+    if len(example["words"]) == 1:
+        assert profile.encode(example["name"], float(example["value"])) == raw
