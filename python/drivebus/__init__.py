@@ -29,6 +29,7 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
+from drivebus.found import Found, Identification
 from drivebus.poll import Poll
 from drivebus.polling import Batch, Sample
 from drivebus.profile import Profile, profiles
@@ -40,7 +41,6 @@ from drivebus.values import (
     ControlSource,
     Description,
     Fault,
-    Found,
     Link,
     Snapshot,
     State,
@@ -66,6 +66,7 @@ __all__ = [
     "DrivebusWarning",
     "Fault",
     "Found",
+    "Identification",
     "Link",
     "NoAnswer",
     "NotAllowed",

@@ -69,9 +69,11 @@ class BlockingBus:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        force: bool = False,
     ) -> None:
         """See `BusProtocol`."""
-        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection)
+        forced = {"force": True} if force else {}
+        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **forced)
 
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""

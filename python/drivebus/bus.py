@@ -16,11 +16,12 @@ from drivebus._native import SerialFormat
 from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
+from drivebus.found import Found, Identification
 from drivebus.opening import BusFace, Opening
 from drivebus.poll import Poll
 from drivebus.polling import Sample
 from drivebus.profile import Profile
-from drivebus.values import Found, Link
+from drivebus.values import Link
 
 __all__ = ["Bus"]
 
@@ -159,10 +160,13 @@ class Bus(BusFace[_native.Bus]):
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        force: bool = False,
     ) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
 
-        Nothing here asks what stands at *address*: a word in a command register moves the motor.
+        A word in a command register moves the motor. Of units for which `drive` was asked, the family is known: a word
+        that would be a command which that family does not define, or the command register of another one, is refused
+        unless *force*. Of other units nothing is known here.
 
         A unit that may still owe another answer is first asked for an echo, or for a read that cannot be mistaken; if
         it answers neither, the write is not sent. An *urgent* write does without it and overtakes all who wait: that is
@@ -177,7 +181,8 @@ class Bus(BusFace[_native.Bus]):
         again since, for another unit may have the address now: `PortError`, whose `started` is None.
 
         Raises:
-            NotAllowed: An argument is out of range, or the bus is read-only. Nothing was sent.
+            NotAllowed: An argument is out of range, the bus is read-only, or it would be such a command. Nothing was
+                sent.
             NoAnswer, BadAnswer, PortError: The unit may have taken it all the same, unless the error's `started` is
                 None: then it was not sent.
             Refused: The unit did not take it.
@@ -188,15 +193,21 @@ class Bus(BusFace[_native.Bus]):
         if connection is not None:
             connection = checks.whole("connection", connection, 0, 2**63)
         unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
+        self._known.check(unit, address, words, checks.flag("force", force))
         return self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
         return Link(*self._native.link(checks.unit(unit)))
 
-    def broadcast(self, address: int, value: int | Sequence[int]) -> None:
-        """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once."""
-        return self._native.broadcast(checks.address(address), checks.payload(value))
+    def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
+        """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once.
+
+        Refused as `write` refuses it if one of the units whose family is known would take it for something else.
+        """
+        address, words = checks.address(address), checks.payload(value)
+        self._known.check(0, address, words, checks.flag("force", force))
+        return self._native.broadcast(address, words)
 
     def echo(self, unit: int, word: int | None = None) -> float:
         """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
@@ -204,10 +215,18 @@ class Bus(BusFace[_native.Bus]):
             word = checks.whole("word", word, 0, 0xFFFF, hexadecimal=True)
         return self._native.echo(checks.unit(unit), word)
 
-    def transact(self, unit: int, pdu: bytes | bytearray | memoryview, reply_length: int | None = None) -> bytes:
+    def transact(
+        self,
+        unit: int,
+        pdu: bytes | bytearray | memoryview,
+        reply_length: int | None = None,
+        *,
+        force: bool = False,
+    ) -> bytes:
         """Sends any PDU (1..253 bytes) and returns the answer's PDU; unit and CRC are added and checked. Sent once.
 
         *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence.
+        What 06H and 10H would write is refused as `write` refuses it, unless *force*.
         """
         try:
             body = bytes(memoryview(pdu))
@@ -217,13 +236,16 @@ class Bus(BusFace[_native.Bus]):
             raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1..253 bytes, function code first")
         if reply_length is not None:
             reply_length = checks.whole("reply_length", reply_length, 1, 253)
-        return self._native.transact(checks.unit(unit), body, reply_length)
+        unit = checks.unit(unit)
+        self._known.check_pdu(unit, body, checks.flag("force", force))
+        return self._native.transact(unit, body, reply_length)
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
         """Asks each of *units* who it is, and yields those that answer as they do.
 
-        One read of the identification register each, not repeated. A unit that refuses has answered too, and so has one
-        whose answer is damaged: its `problem` says how (often two units with one address, or a wrong parity).
+        One read of the identification register each, not repeated, and a few more of those that answer and give no code
+        that is known (see `identify`). A unit that refuses has answered too, and so has one whose answer is damaged:
+        its `problem` says how (often two units with one address, or a wrong parity).
 
         Args:
             units: Addresses, 1..247.
@@ -240,21 +262,43 @@ class Bus(BusFace[_native.Bus]):
             if found is not None:
                 yield found
 
-    def drive(self, unit: int, profile: str | os.PathLike[str] | Profile | None = None) -> Drive:
+    def identify(self, unit: int) -> Identification:
+        """What the unit is, as far as it tells, and how sure that is. Only reads.
+
+        By its identification code; where it has none that is known, by which words it answers and which it refuses.
+
+        Raises:
+            NoAnswer, BadAnswer, PortError: It did not answer at all.
+        """
+        return at_once(who.identified(BlockingBus(self), checks.unit(unit)))
+
+    def drive(
+        self,
+        unit: int,
+        profile: str | os.PathLike[str] | Profile | None = None,
+        *,
+        unverified: bool = False,
+        variants: Mapping[str, str] | None = None,
+    ) -> Drive:
         """The drive at *unit*.
 
         Args:
             unit: Its address, 1..247.
-            profile: A shipped name, a folder, or a `Profile`. None asks the drive, by one read of its identification.
+            profile: A shipped name, a folder, or a `Profile`. None asks the drive, by reads: see `identify`. It must be
+                sure then: a code that documents print for one family with a profile.
+            unverified: Whether what no document of its family proves is done all the same, in every call. Without a
+                *profile* also: take it for what it may be, where there is one candidate only.
+            variants: What a parameter of the drive decides, where it is known: `{"speed_unit": "Hz"}` of a VFD500.
 
         Raises:
-            NotAllowed: No such profile, or the drive names a family that no profile knows: give one.
-            NoAnswer, BadAnswer, Refused: The drive did not tell; only if *profile* is None.
+            NotAllowed: No such profile or variant; or what the drive tells is not sure enough: give a profile.
+            NoAnswer, BadAnswer: The drive did not tell; only if *profile* is None.
         """
         unit = checks.unit(unit)
-        if profile is not None:
-            return Drive(self, unit, Profile.find(profile))
-        return Drive(self, unit, *at_once(who.ask(BlockingBus(self), unit)))
+        known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        drive = Drive(self, unit, known, code, unverified=unverified)
+        self._known.add(unit, known)
+        return drive
 
     def poll(
         self,

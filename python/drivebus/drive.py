@@ -6,6 +6,7 @@ profile stands in `drivebus.protocols`. Time is the line's clock, so everything 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import overload
@@ -14,10 +15,29 @@ from drivebus.at_once import BlockingBus, at_once, blocking, documented_by
 from drivebus.moving import Moving
 from drivebus.operations import Operations
 from drivebus.protocols import BusProtocol, ProfileProtocol
+from drivebus.setpoints import SETPOINTS
 from drivebus.values import Description, Value
 from drivebus.watchdog import Watchdog
 
 __all__ = ["Drive"]
+
+
+class _Setpoint:
+    """One thing that a drive is told besides commands, to read and to set."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.__doc__ = SETPOINTS[name]
+
+    @overload
+    def __get__(self, drive: None, owner: type[Drive]) -> _Setpoint: ...
+    @overload
+    def __get__(self, drive: Drive, owner: type[Drive]) -> float: ...
+    def __get__(self, drive: Drive | None, owner: type[Drive]) -> float | _Setpoint:
+        return self if drive is None else at_once(drive._operations.ask(self._name))
+
+    def __set__(self, drive: Drive, value: float) -> None:
+        at_once(drive._operations.give(self._name, value))
 
 
 class Drive:
@@ -31,26 +51,39 @@ class Drive:
         bus: The line it hangs on.
         unit: Its address, 1..247.
         profile: What its words mean.
+        unverified: Whether what no document of its family proves is done all the same, in every call.
 
     *identification* is what it said when it was asked what it is; None if it was not.
     """
 
     def __init__(
-        self, bus: BusProtocol, unit: int, profile: ProfileProtocol, identification: int | None = None
+        self,
+        bus: BusProtocol,
+        unit: int,
+        profile: ProfileProtocol,
+        identification: int | None = None,
+        *,
+        unverified: bool = False,
     ) -> None:
         self.bus = bus
         self.unit = unit
         self.profile = profile
-        self._operations = Operations(BlockingBus(bus), unit, profile, identification)
+        self._operations = Operations(BlockingBus(bus), unit, profile, identification, unverified=unverified)
 
     def __repr__(self) -> str:
-        return f"<Drive {self.unit}: {self.profile.name}>"
+        return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
+
+    @property
+    def unverified(self) -> bool:
+        """Whether what no document of its family proves is done all the same, in every call."""
+        return self._operations.unverified
 
     run = blocking(Operations.run)
     jog = blocking(Operations.jog)
     stop = blocking(Operations.stop)
     coast = blocking(Operations.coast)
     jog_stop = blocking(Operations.jog_stop)
+    end_jog = blocking(Operations.end_jog)
     reset_fault = blocking(Operations.reset_fault)
     look = blocking(Operations.look)
     state = blocking(Operations.state)
@@ -60,6 +93,16 @@ class Drive:
     monitor = blocking(Operations.monitor)
     snapshot = blocking(Operations.snapshot)
     read_words = blocking(Operations.read_words)
+    write_words = blocking(Operations.write_words)
+    bits = blocking(Operations.bits)
+    inputs = blocking(Operations.inputs)
+    outputs = blocking(Operations.outputs)
+    set_virtual_inputs = blocking(Operations.set_virtual_inputs)
+    set_virtual_outputs = blocking(Operations.set_virtual_outputs)
+    special_control = blocking(Operations.special_control)
+    ask = blocking(Operations.ask)
+    give = blocking(Operations.give)
+    ping = blocking(Operations.ping)
     wait_for_speed = blocking(Operations.wait_for_speed)
     wait_until_stopped = blocking(Operations.wait_until_stopped)
     check_control = blocking(Operations.check_control)
@@ -67,6 +110,21 @@ class Drive:
     backup = blocking(Operations.backup)
     restore = blocking(Operations.restore)
     diff = blocking(Operations.diff)
+
+    torque = _Setpoint("torque")
+    pid = _Setpoint("pid")
+    pid_feedback = _Setpoint("pid_feedback")
+    forward_limit = _Setpoint("forward_limit")
+    reverse_limit = _Setpoint("reverse_limit")
+    motoring_torque_limit = _Setpoint("motoring_torque_limit")
+    braking_torque_limit = _Setpoint("braking_torque_limit")
+    vf_voltage = _Setpoint("vf_voltage")
+    analog_output_1 = _Setpoint("analog_output_1")
+    analog_output_2 = _Setpoint("analog_output_2")
+
+    def monitored(self) -> list[str]:
+        """The monitor registers of the family that may be read."""
+        return self._operations.monitored()
 
     def describe(self, name: str) -> Description:
         """All that is known of a register or parameter. Nothing is sent.
@@ -99,29 +157,44 @@ class Drive:
         at_once(self._operations.set_setpoint(hz))
 
     @overload
-    def read(self, name: str, /, *, verify: bool = False) -> Value: ...
+    def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
     @overload
-    def read(self, first: str, second: str, /, *more: str, verify: bool = False) -> dict[str, Value]: ...
+    def read(
+        self, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
+    ) -> dict[str, Value]: ...
     @documented_by(Operations.read)
-    def read(self, *names: str, verify: bool = False) -> Value | dict[str, Value]:
+    def read(self, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
         """See `Operations.read`."""
-        return at_once(self._operations.read(*names, verify=verify))
+        return at_once(self._operations.read(*names, verify=verify, unverified=unverified))
 
     @overload
-    def write(self, name: str, value: object, store: bool = False) -> None: ...
+    def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
     @overload
-    def write(self, name: Mapping[str, object], *, store: bool = False) -> None: ...
+    def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
     @documented_by(Operations.write)
-    def write(self, name: str | Mapping[str, object], value: object = None, store: bool = False) -> None:
+    def write(
+        self,
+        name: str | Mapping[str, object],
+        value: object = None,
+        store: bool = False,
+        *,
+        unverified: bool = False,
+    ) -> None:
         """See `Operations.write`."""
         if isinstance(name, Mapping):
-            at_once(self._operations.write(name, store=store))
+            at_once(self._operations.write(name, store=store, unverified=unverified))
         else:
-            at_once(self._operations.write(name, value, store))
+            at_once(self._operations.write(name, value, store, unverified=unverified))
 
     @contextmanager
     def running(
-        self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False
+        self,
+        hz: float | None = None,
+        reverse: bool = False,
+        *,
+        confirm: float = 1.0,
+        force: bool = False,
+        unverified: bool = False,
     ) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
@@ -137,19 +210,26 @@ class Drive:
                 motor is left as it was. Or from stopping, when the block itself went well.
             Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn.
         """
-        with self._moving(lambda: self.run(hz, reverse, confirm=confirm, force=force), lambda: self.stop()):
+        run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
+        with self._moving(run, lambda: self.stop()):
             yield self
 
     @contextmanager
-    def jogging(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> Iterator[Drive]:
-        """Jogs the motor inside a `with` block and ends the jog whatever happens there. Otherwise as `running`."""
-        with self._moving(lambda: self.jog(reverse, confirm=confirm, force=force), lambda: self.jog_stop()):
+    def jogging(
+        self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+    ) -> Iterator[Drive]:
+        """Jogs the motor inside a `with` block and ends the jog whatever happens there. Otherwise as `running`.
+
+        It is ended by the family's jog stop, or where it has none by a stop.
+        """
+        jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
+        with self._moving(jog, lambda: self.end_jog()):
             yield self
 
-    def watchdog(self, timeout: float, action: str = "coast") -> Watchdog:
+    def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
         """Makes the drive act by itself when it hears nothing for *timeout* seconds, and keeps it from that until then.
 
-            with drive.watchdog(1.0), drive.running(hz=10.0):
+            with drive.watchdog(1.0, unverified=True), drive.running(hz=10.0):
                 ...
 
         For what no program can look after: kill -9, a computer that hangs, a cable that is cut. The drive's own
@@ -165,16 +245,17 @@ class Drive:
                 than the bus's own time-out, or one lost answer is enough.
             action: `"coast"` takes the voltage off the motor and trips a fault (GD350: CE), whoever is in control;
                 `"stop"` stops it as the drive is set to, without a fault.
+            unverified: Also where the parameters are not verified for the family, as they are not for the GD350.
 
         Raises:
-            NotAllowed: The family has no such thing, or *timeout* or *action* is not among what it takes. Nothing was
-                sent.
+            NotAllowed: The family has no such thing, it is not verified, or *timeout* or *action* is not among what it
+                takes. Nothing was sent.
             Refused: The drive kept what it had.
             NoAnswer, BadAnswer, PortError: The line failed. The drive may have taken the settings: then it acts when
                 *timeout* is over.
             Unconfirmed: The drive took the settings and shows others; it was given back those it had.
         """
-        return Watchdog(self._operations, timeout, action)
+        return Watchdog(self._operations.trusting(unverified), timeout, action)
 
     @contextmanager
     def _moving(self, start: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:

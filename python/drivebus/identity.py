@@ -3,12 +3,16 @@
 A port that was lost and opened again may be another one: an adapter plugged in elsewhere, a cable moved to another
 machine, where the same address is another drive. So what the unit says of itself is asked again before anything goes
 out that moves a motor or changes a value. A stop does not wait for it.
+
+Families that have an identification code are known by it, and others by which words they answer and which they refuse.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.protocols import AwaitableBus
+from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
 
@@ -19,13 +23,13 @@ class Identity:
     Args:
         bus: The line it hangs on; only for how often that was opened again.
         unit: Its address, 1..247.
-        address: Where it says what it is; None where that is not known, and it is not asked.
+        profile: Where its family says what it is.
         code: What it said, if it was asked before.
     """
 
-    def __init__(self, bus: AwaitableBus, unit: int, address: int | None, code: int | None = None) -> None:
+    def __init__(self, bus: AwaitableBus, unit: int, profile: ProfileProtocol, code: int | None = None) -> None:
         self._unit = unit
-        self._address = address
+        self._code_at, self._probes = _questions(profile)
         self._known = None if code is None else _named(code)
         self._opened = bus.reconnects
 
@@ -42,11 +46,10 @@ class Identity:
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
         opened = bus.reconnects
-        address = self._address
-        if address is None or (self._known is not None and opened == self._opened):
+        if self._known is not None and opened == self._opened:
             return opened
         try:
-            told = await self._ask(bus, address)
+            told = await self._ask(bus)
         except (NoAnswer, BadAnswer, PortError) as error:
             if self._known is None:
                 return opened
@@ -69,12 +72,36 @@ class Identity:
         self._opened = opened
         return opened
 
-    async def _ask(self, bus: AwaitableBus, address: int) -> str:
+    async def _ask(self, bus: AwaitableBus) -> str:
+        if self._code_at is not None:
+            told = await self._answer(bus, self._code_at)
+            return told if isinstance(told, str) else _named(told)
+        answers = [(address, await self._answer(bus, address)) for address in self._probes]
+        return ", ".join(
+            f"{_named(address)} {told if isinstance(told, str) else 'answered'}" for address, told in answers
+        )
+
+    async def _answer(self, bus: AwaitableBus, address: int) -> int | str:
+        """The word at *address*, or how the unit refused to tell."""
         try:
-            [code] = await bus.read(self._unit, address)
+            [word] = await bus.read(self._unit, address)
         except Refused as error:
             return f"refused with exception {error.code:02X}H"
-        return _named(code)
+        return word
+
+
+def _questions(profile: ProfileProtocol) -> tuple[int | None, Sequence[int]]:
+    """Where the family says what it is; where it does not, the words that are asked instead."""
+    register = profile.role("identification")
+    address = None if register is None else profile.describe(register).address
+    if address is not None:
+        return address, ()
+    signature = profile.signature()
+    if signature is not None:
+        return None, (*signature["answers"], *signature["refuses"])
+    # Whether it has the words that are always asked of its family is better than nothing.
+    known = [profile.describe(name).address for role in ("state", "fault") if (name := profile.role(role))]
+    return None, [address for address in known if address is not None]
 
 
 def _named(code: int) -> str:

@@ -6,20 +6,18 @@ never repeated. Success is what the drive's own state says afterwards; if that c
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
-from drivebus.registers import Registers
-from drivebus.values import ControlSource, Fault, State, Value
+from drivebus.commanding import Commanding
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.looking import Seen
+from drivebus.values import ControlSource, State
 
-__all__ = ["POLL_INTERVAL", "Motion", "Seen"]
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
-POLL_INTERVAL = 0.02
-"""Seconds of the line's clock between two looks at the state."""
-
-_LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
+__all__ = ["Motion"]
 
 _FAILURES_ALLOWED = 1
 """Of the last ten exchanges with a unit. One answer in ten may be lost on a line that works, to a burst of noise. Where
@@ -28,168 +26,140 @@ two are, the next may be the one that stops the motor."""
 _LOOKS_TO_PROVE = 10
 """Looks at the state that prove a link in doubt: as many as `Link` counts, so that the old ones count no more."""
 
-_MAY = {
-    "run_forward": "the motor may turn",
-    "run_reverse": "the motor may turn",
-    "jog_forward": "the motor may turn",
-    "jog_reverse": "the motor may turn",
-    "stop": "the motor may still turn",
-    "coast": "the motor may still be fed",
-    "jog_stop": "the motor may still turn",
-    "reset_fault": "the fault may be reset, and a drive that is still told to run may start",
-}
-"""What may have happened when a command was sent and nothing is known of it."""
 
-_HALTS = ("stop", "coast", "jog_stop")
-"""Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
-
-
-class Seen(NamedTuple):
-    """The status words of one read, decoded."""
-
-    state: State
-    fields: Mapping[str, str]
-    fault: Fault | None
-    time: float
-
-    @property
-    def source(self) -> ControlSource | None:
-        """Where the drive takes its commands from, if its words tell."""
-        channel = self.fields.get("control_channel")
-        return next((source for source in ControlSource if source.value == channel), None)
-
-    def __str__(self) -> str:
-        return f"{self.state}, {self.fault}" if self.fault else str(self.state)
-
-
-class Motion(Registers):
+class Motion(Commanding):
     """Starts, stops and resets one drive. Times are seconds of the line's clock, real or simulated."""
 
     async def run(
-        self, hz: float | None = None, reverse: bool = False, *, confirm: float = 1.0, force: bool = False
+        self,
+        hz: float | None = None,
+        reverse: bool = False,
+        *,
+        confirm: float = 1.0,
+        force: bool = False,
+        unverified: bool = False,
     ) -> None:
         """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
 
-        Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`.
+        Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`. Where the
+        family has no state that may be used, when the drive has confirmed the command and shows no fault.
 
         Args:
             hz: Setpoint in Hz, 0 to the drive's own maximum; None keeps the one it has.
             reverse: Turn the other way.
             confirm: Seconds until the state word must show it; 0 does not look.
             force: Start although the link is bad. Then it may be impossible to stop the motor over the bus.
+            unverified: Also where command, states or setpoint are not verified for the family. What ends it then needs
+                no such word.
 
         Where two or more of the last ten exchanges failed, the link is proved first, by ten looks at the state.
 
         Raises:
-            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum; the link is bad; or
-                another drive answers at this address since the port was opened again. Nothing was sent that moves it.
+            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum; the link is bad;
+                another drive answers at this address since the port was opened again; or something is not verified for
+                the family: the command, or both ways to stop what it starts. Nothing was sent that moves it.
             Refused: The drive did not start.
             NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
             Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        await self._prove_link(force)
-        raw = None if hz is None else await self._setpoint_word(hz)
-        before = await self._ready_to_start()
-        await self._start("run_reverse" if reverse else "run_forward", raw, reverse, before, confirm)
+        command = "run_reverse" if reverse else "run_forward"
+        drive = self.trusting(unverified)
+        drive._check_start(command)
+        await drive._prove_link(force)
+        if hz is not None:
+            drive = await drive._with_setpoint("frequency")
+        raw = None if hz is None else await drive._setpoint_word(hz)
+        await drive._start(command, raw, reverse, await drive._ready_to_start(), confirm)
 
-    async def jog(self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False) -> None:
+    async def jog(
+        self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+    ) -> None:
         """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
 
         A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
         not end it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        await self._prove_link(force)
-        before = await self._ready_to_start()
+        command = "jog_reverse" if reverse else "jog_forward"
+        drive = self.trusting(unverified)
+        drive._check_start(command)
+        await drive._prove_link(force)
+        before = await drive._ready_to_start()
         if before.state.running:
             raise NotAllowed(
                 f"unit {self.unit} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
                 "wait_until_stopped(), before a jog",
                 unit=self.unit,
             )
-        await self._start("jog_reverse" if reverse else "jog_forward", None, reverse, before, confirm)
+        await drive._start(command, None, reverse, before, confirm)
 
-    async def stop(self, *, confirm: float = 1.0) -> None:
+    async def stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
 
-        Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end.
+        Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end. Where the
+        family has no state that may be used, when the drive has confirmed the command.
 
         It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
         seems deaf too. Sent once.
 
         Raises:
+            NotAllowed: The command is not verified for the family, and nothing was started as *unverified* either. It
+                was not sent.
             Refused: The drive did not take it; it still runs if it ran.
             PortError: It could not be sent; the drive goes on as it was.
             Unconfirmed: It was sent, and the drive does not show it: the motor may still turn.
         """
-        await self._halt("stop", confirm)
+        await self.trusting(unverified)._halt("stop", confirm)
 
-    async def coast(self, *, confirm: float = 1.0) -> None:
+    async def coast(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`."""
-        await self._halt("coast", confirm)
+        await self.trusting(unverified)._halt("coast", confirm)
 
-    async def jog_stop(self, *, confirm: float = 1.0) -> None:
-        """Ends a jog by the jog's own ramp. Errors as for `stop`."""
-        await self._halt("jog_stop", confirm)
+    async def jog_stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
+        """Ends a jog by the jog's own ramp. Errors as for `stop`; without such a command they say what does."""
+        drive = self.trusting(unverified)
+        if not drive._has_jog_stop():
+            raise NotAllowed(
+                f"{self.profile.title} has no command that ends a jog alone: stop() ends it along the ramp, coast() "
+                f"takes the voltage off; nothing was sent to unit {self.unit}",
+                unit=self.unit,
+            )
+        await drive._halt("jog_stop", confirm)
 
-    async def reset_fault(self, *, confirm: float = 1.0) -> None:
+    async def end_jog(self, *, unverified: bool = False) -> None:
+        """Ends a jog as the family does: by its jog stop, or else by a stop. Errors as for `stop`."""
+        drive = self.trusting(unverified)
+        by_itself = drive._has_jog_stop() and drive._halting("jog_stop")._evidence.unusable("jog_stop") is None
+        await (drive.jog_stop() if by_itself else drive.stop())
+
+    def _has_jog_stop(self) -> bool:
+        return "jog_stop" in self.profile.commands()
+
+    async def reset_fault(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Resets a fault whose cause is gone. Sends nothing where there is none.
 
         Raises:
-            NotAllowed: Another drive answers at this address since the port was opened again. Nothing was sent.
+            NotAllowed: The command is not verified for the family, or another drive answers at this address since the
+                port was opened again. Nothing was sent.
             Refused: The drive did not take it.
             NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
             Unconfirmed: It was sent, once, and the fault is still there: its cause is, most likely. Or nothing is
                 known of it.
         """
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        if (await self.look()).state is not State.FAULT:
+        drive = self.trusting(unverified)
+        drive._evidence.commands("reset_fault")
+        before = await drive._glance()
+        untold = "state" in before.missing and "fault" in before.missing
+        if not (before.tripped or untold):
             return
 
         async def shows(seen: Seen) -> bool:
-            return seen.state not in (State.FAULT, State.UNKNOWN)
+            return not seen.tripped if "state" in seen.missing else seen.state not in (State.FAULT, State.UNKNOWN)
 
-        await self._command("reset_fault")
-        await self._confirm("reset_fault", shows, confirm)
-
-    async def ask_setpoint(self) -> float:
-        """The setpoint last given over the bus, in Hz."""
-        return float(await self.read("set_frequency"))
-
-    async def set_setpoint(self, hz: float) -> None:
-        """Gives a setpoint in Hz: changes the speed of a motor that runs.
-
-        Raises:
-            NotAllowed: Above the drive's own maximum or out of range, or another drive answers at this address since
-                the port was opened again; nothing was sent.
-            NoAnswer, BadAnswer, PortError: The drive may have taken it all the same, unless the error's `started` is
-                None. A confirmation that was lost was cleared up by reading, as `write` does, and that failed too.
-            Unconfirmed: The drive shows another setpoint, however often it was written.
-            Refused: The drive kept the old one.
-        """
-        await self._write_setpoint(await self._setpoint_word(hz))
-
-    async def _write_setpoint(self, word: int) -> None:
-        await self._write(
-            self.profile.address("set_frequency"), word, read_back=self.profile.read_back("set_frequency")
-        )
-
-    async def look(self, *, urgent: bool = False) -> Seen:
-        """The status words, in one read."""
-        names = ("status_word_1", "status_word_2", "fault_code")
-        first, *_ = places = [self.profile.address(name) for name in names]
-        with self._explained():
-            words, time, _ = await self.bus.read_stamped(self.unit, first, max(places) - first + 1, urgent=urgent)
-        state, fields, fault = (words[place - first] for place in places)
-        seen = Seen(
-            self._state_of(state),
-            self.profile.fields("status_word_2", fields),
-            self.profile.fault(fault) if fault else None,
-            time,
-        )
-        self._remember(str(seen))
-        return seen
+        await drive._command("reset_fault")
+        await drive._confirm("reset_fault", shows, confirm)
 
     async def _prove_link(self, force: bool) -> None:
         """No motor starts on a link that may not carry its stop. Sends nothing where the last exchanges went well."""
@@ -200,7 +170,7 @@ class Motion(Registers):
         while looks < _LOOKS_TO_PROVE and lost <= _FAILURES_ALLOWED:
             looks += 1
             try:
-                await self.state()
+                await self.ping()
             except Refused:
                 pass
             except (NoAnswer, BadAnswer):
@@ -214,23 +184,9 @@ class Motion(Registers):
                 unit=self.unit,
             )
 
-    async def _setpoint_word(self, hz: float) -> int:
-        hz = checks.number("setpoint", hz, 0.0)
-        raw = self.profile.encode("set_frequency", hz)
-        limit = self.profile.maximum_frequency
-        if limit is not None:
-            highest: Value = await self.read(limit)
-            if hz > highest:
-                raise NotAllowed(
-                    f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
-                    f"allowed is 0..{highest:g} Hz. No setpoint was sent to unit {self.unit}",
-                    unit=self.unit,
-                )
-        return raw
-
-    async def _ready_to_start(self) -> Seen:
-        seen = await self.look()
-        if seen.state is State.FAULT:
+    async def _ready_to_start(self, *, by_bus: bool = True) -> Seen:
+        seen = await self._glance()
+        if seen.tripped:
             raise NotAllowed(
                 f"unit {self.unit} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
                 "Remove the cause, then reset_fault()",
@@ -240,7 +196,7 @@ class Motion(Registers):
             raise NotAllowed(
                 f"unit {self.unit} has no voltage on its DC bus; nothing that moves it was sent", unit=self.unit
             )
-        if seen.source not in (ControlSource.COMMUNICATION, None):
+        if by_bus and seen.source not in (ControlSource.COMMUNICATION, None):
             raise NotAllowed(
                 f"unit {self.unit} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
                 "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
@@ -251,105 +207,50 @@ class Motion(Registers):
     async def _start(self, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
         wanted = State.REVERSE if reverse else State.FORWARD
         turning_round = before.state.running and before.state is not wanted
-        frequency = await self._running_frequency() if turning_round else 0.0
+        frequency = await self.output_frequency() if turning_round else None
+        # Who started it so must not be kept from stopping it.
+        self._ventured.update([command] if self.unverified else [])
         await self._command(command, setpoint)
 
         async def shows(seen: Seen) -> bool:
+            if "state" in seen.missing:
+                return seen.fault is None
+            if seen.state is wanted:
+                return True
             # A motor that turns the other way must slow down first; its state word follows at zero.
-            return seen.state is wanted or (turning_round and await self._running_frequency() < frequency)
+            now = await self.output_frequency() if turning_round else None
+            return now is not None and frequency is not None and now < frequency
 
         await self._confirm(command, shows, confirm)
 
     async def _halt(self, command: str, confirm: float) -> None:
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-        await self._command(command)
-        first: list[float] = []
+        drive = self._halting(command)
+        drive._evidence.commands(command)
+        await drive._command(command)
+        if drive._evidence.without_state() is not None:
+            return  # its confirmation is all there is
+        first: list[float | None] = []
 
         async def shows(seen: Seen) -> bool:
             if seen.state is State.UNKNOWN:
                 return False
             if not seen.state.running:
                 return True
-            first.append(await self._running_frequency(urgent=True))
-            return first[-1] < first[0]
+            now = await drive.output_frequency(urgent=True)
+            first.append(now)
+            return now is None or (first[0] is not None and now < first[0])
 
-        await self._confirm(command, shows, confirm)
+        await drive._confirm(command, shows, confirm)
 
-    async def _running_frequency(self, *, urgent: bool = False) -> float:
-        [word] = await self.read_words(self.profile.address("running_frequency"), urgent=urgent)
-        return float(self.value("running_frequency", word))
+    def _halting(self, command: str) -> Self:
+        """Itself; where a start was forced on what is not verified, as *command* is, with the same trust."""
+        return self.trusting(bool(self._ventured) and self._evidence.unusable(command) is not None)
 
-    async def _command(self, name: str, setpoint: int | None = None) -> None:
-        """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
-        urgent = name in _HALTS
-        address, code = self.profile.command(name)
-        words: int | list[int] = code
-        if setpoint is not None:
-            place = self.profile.address("set_frequency")
-            if place == address + 1:
-                words = [code, setpoint]
-            else:
-                await self._write_setpoint(setpoint)
-        try:
-            if urgent:
-                await self._send(address, words, urgent=True)
-            else:
-                await self._write(address, words)
-        except _LINE_ERRORS as error:
-            if error.started is None:
-                if not urgent:
-                    raise
-                raise type(error)(
-                    f"{name} could not be sent to unit {self.unit} ({error}); {_MAY[name]}",
-                    unit=self.unit,
-                    request=error.request,
-                    ended=error.ended,
-                ) from error
-            raise Unconfirmed(
-                f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
-                f"{await self._state_afterwards(urgent)}. It was not repeated",
-                unit=self.unit,
-                request=error.request,
-                raw=error.raw,
-                started=error.started,
-                ended=error.ended,
-            ) from error
-
-    async def _state_afterwards(self, urgent: bool) -> str:
-        try:
-            return f"State seen afterwards: {await self.look(urgent=urgent)}"
-        except (*_LINE_ERRORS, Refused) as error:
-            return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
-
-    async def _confirm(self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float) -> None:
-        if within == 0:
-            return
-        deadline = self.bus.now() + within
-        while True:
-            try:
-                seen = await self.look(urgent=command in _HALTS)
-                if await shows(seen):
-                    return
-                last = f"state seen last: {seen}"
-                source = seen.source
-                if source not in (ControlSource.COMMUNICATION, None):
-                    last += f", with commands from the {source}"
-                if seen.fault is not None and command != "reset_fault":
-                    break
-            except (NoAnswer, BadAnswer, Refused) as error:
-                # A refusal here is one of a read: it says nothing about the command.
-                last = f"its last answer: {error}; {self._seen_last()}"
-            except PortError as error:
-                raise Unconfirmed(
-                    f"{command} was sent to unit {self.unit}; the port was lost before its state showed it ({error}): "
-                    f"{_MAY[command]}; {self._seen_last()}. It was not repeated",
-                    unit=self.unit,
-                ) from error
-            if self.bus.now() >= deadline:
-                break
-            await self.bus.sleep(POLL_INTERVAL)
-        raise Unconfirmed(
-            f"{command} was sent to unit {self.unit}, and its state does not show it: {_MAY[command]}; {last}. "
-            "It was not repeated",
-            unit=self.unit,
-        )
+    async def output_frequency(self, *, urgent: bool = False) -> float | None:
+        """In Hz; None where the family does not tell."""
+        register = self.profile.role("frequency")
+        if register is None or self._evidence.unreadable(register) is not None:
+            return None
+        [word] = await self.read_words(self.profile.address(register), urgent=urgent)
+        return float(self.value(register, word))

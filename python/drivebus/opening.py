@@ -8,6 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from drivebus import checks, ports
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
+from drivebus.known import KnownUnits
 from drivebus.sim import Simulator
 from drivebus.values import Stats
 
@@ -23,6 +24,7 @@ class Opening:
         keywords: What else the core is told.
         simulator: The simulator behind it, if there is one.
         owned: What was made here, and ends with the bus.
+        known: What is known of its units.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class Opening:
         if isinstance(target, Simulator):
             target = target._native if target.transport == "process" else target.port
         self.target = target
+        self.known = KnownUnits()
 
 
 class _Native(Protocol):
@@ -96,6 +99,7 @@ class BusFace(Generic[_N]):
         self.format = opening.format
         self._owned = opening.owned
         self._timeout = opening.timeout
+        self._known = opening.known
         self._native = native
 
     @property

@@ -6,12 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from drivebus import checks
 from drivebus.backup import Keeping
-from drivebus.errors import Unconfirmed
-from drivebus.motion import POLL_INTERVAL, Motion, Seen
-from drivebus.values import Control, ControlItem, Fault, Snapshot, State, Status
+from drivebus.commanding import POLL_INTERVAL
+from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.looking import Seen
+from drivebus.terminals import Terminals
+from drivebus.values import Fault, Snapshot, State, Status
 
 __all__ = ["Operations"]
 
@@ -19,7 +22,7 @@ _STANDSTILL = 0.05
 """Output frequency in Hz below which a drive that has stopped counts as stopped."""
 
 
-class Operations(Keeping, Motion):
+class Operations(Keeping, Terminals):
     """All that can be asked of a drive.
 
     Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,
@@ -27,64 +30,128 @@ class Operations(Keeping, Motion):
     which others may come.
     """
 
-    async def status(self) -> Status:
-        """State, readiness, control source, frequency and fault, in two reads.
+    async def status(self, *, unverified: bool = False) -> Status:
+        """State, readiness, control source, frequency and fault, in two reads where the family has them together.
+
+        What the family does not tell, or what is not verified, is None (the state: `State.UNKNOWN`), and `missing` has
+        the reason.
 
         Raises:
+            NotAllowed: Nothing of it may be read. Nothing was sent.
             NoAnswer, BadAnswer, Refused: See each.
         """
-        return await self._status(await self.look())
+        drive = self.trusting(unverified)
+        seen = await drive._glance()
+        status = await drive._status(seen)
+        if drive._planned_look().plan is None and status.frequency is None and status.setpoint is None:
+            raise NotAllowed(
+                f"nothing of the status of unit {self.unit} may be read: {seen.missing['state'].rstrip('.')}. Nothing "
+                "was sent; with unverified=True (`--unverified`) what is assumed of it is used",
+                unit=self.unit,
+            )
+        return status
 
     async def _status(self, seen: Seen) -> Status:
-        frequencies = await self.snapshot("running_frequency", "set_frequency_actual")
+        missing = dict(seen.missing)
+        names = {}
+        for role in ("frequency", "setpoint"):
+            name = self.profile.role(role)
+            reason = f"no such register of {self.profile.title} is known"
+            if name is not None:
+                reason = self._evidence.unreadable(name) or ""
+            if name is None or reason:
+                missing[role] = reason
+            else:
+                names[role] = name
+        frequencies = await self.snapshot(*names.values()) if names else {}
+        told = {role: float(frequencies[name]) for role, name in names.items()}
         motor = seen.fields.get("motor", "")
         ready = seen.fields.get("ready")
         alarm = seen.fields.get("overload_alarm")
+        for what, field in (
+            ("ready", ready),
+            ("source", seen.source),
+            ("motor", motor or None),
+            ("overload_alarm", alarm),
+        ):
+            if field is None:
+                missing[what] = f"no status word of {self.profile.title} that may be read tells it"
         return Status(
             state=seen.state,
             ready=None if ready is None else ready == "ready",
             source=seen.source,
             motor=int(motor.removeprefix("motor ")) if motor.startswith("motor ") else None,
             overload_alarm=None if alarm is None else alarm != "none",
-            frequency=float(frequencies["running_frequency"]),
-            setpoint=float(frequencies["set_frequency_actual"]),
+            frequency=told.get("frequency"),
+            setpoint=told.get("setpoint"),
             fault=seen.fault,
             fields=seen.fields,
-            time=seen.time,
+            time=seen.time or getattr(frequencies, "time", 0.0),
+            missing=missing,
         )
 
-    async def fault(self) -> Fault | None:
-        """The present fault, or None."""
-        return (await self.look()).fault
+    async def fault(self, *, unverified: bool = False) -> Fault | None:
+        """The present fault, or None.
 
-    async def fault_history(self) -> list[Fault]:
-        """The last faults, the latest first; as many as the drive keeps."""
-        names = self.profile.fault_history
+        Raises:
+            NotAllowed: The family has no fault register that is known, or verified. Nothing was sent.
+        """
+        drive = self.trusting(unverified)
+        reason = drive._planned_look().missing.get("fault")
+        if reason is not None:
+            raise NotAllowed(
+                f"the present fault of unit {self.unit} may not be read: {reason.rstrip('.')}. Nothing was sent; with "
+                "unverified=True (`--unverified`) what is assumed of it is used",
+                unit=self.unit,
+            )
+        return (await drive._glance()).fault
+
+    async def fault_history(self, *, unverified: bool = False) -> list[Fault]:
+        """The last faults, the latest first; as many as the drive keeps.
+
+        The latest has its `values`: what the drive saw when it tripped, where it keeps that.
+        """
+        drive = self.trusting(unverified)
+        names = drive._evidence.readable(drive.profile.fault_history)
         if not names:
             return []
-        return [self.profile.fault(int(code)) for code in (await self.snapshot(*names)).values() if code]
+        codes = (await drive.snapshot(*names)).values()
+        faults = [drive.profile.fault(int(code)) for code in codes if code]
+        kept = drive._evidence.readable(drive.profile.fault_values)
+        if faults and kept:
+            faults[0] = replace(faults[0], values=await drive.snapshot(*kept))
+        return faults
 
-    async def monitor(self, *names: str) -> Snapshot:
+    async def monitor(self, *names: str, unverified: bool = False) -> Snapshot:
         """Reads *names*, or all monitor registers of the family, in the fewest requests, under one time stamp.
 
         The result is a mapping whose names are attributes too: `drive.monitor().output_current`; its `units` say in
-        what each is.
+        what each is. Without names, what is not verified is left out.
 
         Raises:
-            NotAllowed: An unknown name; nothing was sent.
+            NotAllowed: An unknown name, or one that is not verified; nothing was sent.
             NoAnswer, BadAnswer, Refused: See each.
         """
-        return await self.snapshot(*(names or self.profile.monitor_names()))
+        drive = self.trusting(unverified)
+        return await drive.snapshot(*(names or drive.monitored()))
 
-    async def wait_for_speed(self, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0) -> Status:
+    def monitored(self) -> list[str]:
+        """The monitor registers of the family that may be read."""
+        return self._evidence.readable(self.profile.monitor_names())
+
+    async def wait_for_speed(
+        self, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False
+    ) -> Status:
         """Waits until the output frequency is *hz*, or the setpoint in force if None.
 
         Args:
             hz: Wanted output frequency in Hz, whichever way the motor turns.
             tolerance: How far off it may be, in Hz.
             timeout: Seconds of the line's clock.
+            unverified: Also by words that are not verified for the family.
 
         Raises:
+            NotAllowed: State or frequency of the family are not known, or not verified. Nothing was sent.
             Unconfirmed: The drive tripped meanwhile, or the time was up; the message says where it stands. The drive
                 keeps running if it ran.
             NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
@@ -95,68 +162,47 @@ class Operations(Keeping, Motion):
 
         def reached(status: Status) -> bool:
             target = status.setpoint if wanted is None else wanted
+            if status.frequency is None or target is None:
+                return False
             # Hundredths are what drives count in; binary floats must not turn 0.1 into a miss.
             return status.state.running and abs(status.frequency - target) <= tolerance + 1e-9
 
-        return await self._wait(reached, f"{goal} was not reached", timeout)
+        drive = self.trusting(unverified)
+        drive._check_told("waiting for the speed", "frequency", *(["setpoint"] if wanted is None else []))
+        return await drive._wait(reached, f"{goal} was not reached", timeout)
 
-    async def wait_until_stopped(self, timeout: float = 60.0) -> Status:
+    def _check_told(self, what: str, *roles: str) -> None:
+        """Raises `NotAllowed` if the family does not tell its state, or one of *roles*."""
+        self._state_word(what)
+        for role in roles:
+            name = self.profile.role(role)
+            if name is None:
+                raise NotAllowed(
+                    f"{what} of unit {self.unit} needs its {role}, and {self.profile.title} has no register of it that "
+                    "is known",
+                    unit=self.unit,
+                )
+            self._evidence.reads([name])
+
+    async def wait_until_stopped(self, timeout: float = 60.0, *, unverified: bool = False) -> Status:
         """Waits until the drive is stopped and its output frequency is zero.
 
         A motor that coasts has no output frequency: its shaft may still turn, and the drive does not know.
 
         Raises:
+            NotAllowed: The state of the family is not known, or not verified. Nothing was sent.
             Unconfirmed: The drive tripped meanwhile, or the time was up.
             NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
         """
 
         def stopped(status: Status) -> bool:
             known = status.state is not State.UNKNOWN
-            return known and not status.state.running and status.frequency <= _STANDSTILL
+            turns = status.state.running or (status.frequency is not None and status.frequency > _STANDSTILL)
+            return known and not turns
 
-        return await self._wait(stopped, "it did not stop", timeout)
-
-    async def check_control(self) -> Control:
-        """Whether the drive is set to obey the bus: a list that is true when every item is as it must be."""
-        wanted = self.profile.control()
-        actual = await self.snapshot(*(item["code"] for item in wanted))
-        return Control(
-            ControlItem(
-                code=item["code"],
-                wanted=self.value(item["code"], item["value"]),
-                actual=actual[item["code"]],
-                ok=actual[item["code"]] == item["value"],
-                verified=item["verified"],
-                label=item["label"],
-                note=item["note"] or "",
-            )
-            for item in wanted
-        )
-
-    async def prepare_control(self, store: bool = False) -> Control:
-        """Sets the drive to obey the bus, writing only what differs, and returns what `check_control` then says.
-
-        To RAM: the drive forgets it when it is switched off, unless *store*, which keeps what this object set in RAM
-        before as well.
-
-        Raises:
-            Refused: The drive kept what it had; parameters are locked while it runs, or by a password.
-            Unconfirmed: It took the values, and shows others.
-        """
-        needed = {
-            item.code: item.wanted
-            for item in await self.check_control()
-            if not item.ok or (store and item.code in self._in_ram)
-        }
-        if needed:
-            await self.write(needed, store=store)
-        control = await self.check_control()
-        if not control:
-            raise Unconfirmed(
-                f"unit {self.unit} took the settings and shows others:\n{control}",
-                unit=self.unit,
-            )
-        return control
+        drive = self.trusting(unverified)
+        drive._check_told("waiting for the standstill")
+        return await drive._wait(stopped, "it did not stop", timeout)
 
     async def _wait(self, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
         timeout = checks.number("timeout", timeout, 0.0)

@@ -43,12 +43,13 @@ class BusProtocol(Protocol):
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        force: bool = False,
     ) -> None:
         """Writes one word or several; *urgent* before all who wait, whatever is in doubt.
 
         Sent once. With *read_back*, the address where it can be read, a lost confirmation is cleared up by reading, and
         only where the unit shows another value is the write repeated. With *connection*, nothing is sent where
-        `reconnects` is another number by then: PortError.
+        `reconnects` is another number by then: PortError. With *force* also what the family does not define.
         """
 
     def link(self, unit: int, /) -> Link:
@@ -95,6 +96,7 @@ class AwaitableBus(Protocol):
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        force: bool = False,
     ) -> None:
         """See `BusProtocol`."""
 
@@ -150,6 +152,10 @@ class ProfileProtocol(Protocol):
     def title(self) -> str:
         """The family as its maker calls it."""
 
+    @property
+    def functions(self) -> Sequence[int]:
+        """The function codes that the drive takes."""
+
     def names(self) -> list[str]:
         """Every register name and parameter code."""
 
@@ -162,11 +168,21 @@ class ProfileProtocol(Protocol):
     def monitor_names(self) -> list[str]:
         """The registers worth watching."""
 
+    def role(self, what: str, /) -> str | None:
+        """The register for `"state"`, `"fault"`, `"frequency"`, `"setpoints.torque"` …, if the family has one."""
+
+    @property
+    def status_words(self) -> Sequence[str]:
+        """The words whose bit fields tell more of the state."""
+
     def describe(self, name: str, /) -> Description:
         """All that is known of one register or parameter."""
 
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """Where *name* is read, or written to RAM (*store* False) or EEPROM (*store* True)."""
+
+    def memory(self) -> dict[str, Any] | None:
+        """How an address tells RAM from EEPROM: `bit`, `means`, `reason`. None where it does not."""
 
     def read_back(self, name: str, /) -> int | None:
         """Where what was written to *name* can be read; None where that would not tell whether the drive took it."""
@@ -183,14 +199,30 @@ class ProfileProtocol(Protocol):
     def compile(self, names: Sequence[str], /) -> PlanProtocol:
         """The fewest reads that hold all *names*, and the way from their words to values."""
 
+    @property
+    def command_address(self) -> int | None:
+        """Where commands are written, if the family has such a register."""
+
     def command(self, name: str, /) -> tuple[int, int]:
         """Address and code of a command."""
+
+    def commands(self) -> dict[str, int]:
+        """The code of each command that the family has, verified or not."""
+
+    def command_reason(self, name: str, /) -> str | None:
+        """Why a command may not be given unless it is said that it may; None if it may."""
+
+    def command_codes(self) -> dict[int, str]:
+        """Every code that the family defines, with or without a method of ours."""
 
     def is_command(self, address: int, /) -> bool:
         """Whether a write to *address* can move a motor."""
 
     def state(self, raw: int, /) -> str:
         """The first status word by name."""
+
+    def state_reason(self) -> str | None:
+        """Why the states may not be used unless it is said that they may; None if they may."""
 
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus."""
@@ -200,6 +232,19 @@ class ProfileProtocol(Protocol):
 
     def needs(self, setpoint: str, /) -> list[dict[str, Any]]:
         """What must be set before the drive heeds a setpoint."""
+
+    def variants(self) -> dict[str, dict[str, Any]]:
+        """What a parameter of the drive decides of the meaning of registers: `parameter`, `choices`, `reason`."""
+
+    @property
+    def variants_chosen(self) -> Mapping[str, str]:
+        """Which of the variants are fixed, and how."""
+
+    def with_variants(self, chosen: Mapping[str, str], /) -> ProfileProtocol:
+        """The same family with variants fixed."""
+
+    def signature(self) -> dict[str, list[int]] | None:
+        """The words that a unit of this family `answers`, and those it `refuses`, where it has no code."""
 
     def fault(self, code: int, /) -> Fault:
         """One fault by its number."""
@@ -211,16 +256,8 @@ class ProfileProtocol(Protocol):
         """Every fault that is known, by number."""
 
     @property
-    def identification_address(self) -> int | None:
-        """Where the drive says what it is, if that is known."""
-
-    @property
     def watchdog(self) -> WatchdogSettings | None:
         """What makes the drive act by itself when its bus falls silent, if it has such a thing."""
-
-    @property
-    def maximum_frequency(self) -> str | None:
-        """The parameter that holds the drive's highest output frequency, if it has one."""
 
     @property
     def fault_history(self) -> Sequence[str]:

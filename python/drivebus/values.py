@@ -6,7 +6,7 @@ Plain data: nothing here reads from a drive or knows how its words are laid out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -17,7 +17,6 @@ __all__ = [
     "ControlSource",
     "Description",
     "Fault",
-    "Found",
     "Link",
     "Snapshot",
     "State",
@@ -100,6 +99,7 @@ class Fault:
         verified: Whether number and meaning were printed for this very family.
         evidence: `"verified"`, `"unverified"` (printed in part or for a sister series) or `"assumed"`.
         note: What else is known about it; says what is missing where it is not verified.
+        values: What the drive saw when it tripped, by parameter; a `Snapshot` with units. Empty where it keeps none.
     """
 
     code: int
@@ -110,6 +110,7 @@ class Fault:
     verified: bool = True
     evidence: str = "verified"
     note: str = ""
+    values: Mapping[str, Value] = field(default_factory=dict, compare=False)
 
     def __str__(self) -> str:
         text = f"{self.mnemonic} ({self.code}): {self.label}" if self.mnemonic else f"{self.code}: {self.label}"
@@ -133,6 +134,7 @@ class Status:
         fault: The present fault, or None.
         fields: Every field of the status word in the drive's own words.
         time: Unix time in seconds at which the status words were asked for.
+        missing: What is not told here, by attribute, and why.
     """
 
     state: State
@@ -140,14 +142,17 @@ class Status:
     source: ControlSource | None
     motor: int | None
     overload_alarm: bool | None
-    frequency: float
-    setpoint: float
+    frequency: float | None
+    setpoint: float | None
     fault: Fault | None
     fields: Mapping[str, str]
     time: float
+    missing: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        parts = [str(self.state), f"{self.frequency:.2f} of {self.setpoint:.2f} Hz"]
+        parts = [str(self.state)]
+        if self.frequency is not None or self.setpoint is not None:
+            parts.append(f"{_hertz(self.frequency)} of {_hertz(self.setpoint)} Hz")
         if self.ready is not None:
             parts.append("ready" if self.ready else "not ready")
         if self.source is not None:
@@ -156,7 +161,13 @@ class Status:
             parts.append("overload pre-alarm")
         if self.fault is not None:
             parts.append(f"fault {self.fault}")
+        elif "fault" in self.missing:
+            parts.append("fault not told")
         return ", ".join(parts)
+
+
+def _hertz(frequency: float | None) -> str:
+    return "?" if frequency is None else f"{frequency:.2f}"
 
 
 @dataclass(frozen=True)
@@ -166,7 +177,7 @@ class ControlItem:
     Attributes:
         code: The parameter, such as `"P00.01"`.
         wanted: The value it needs.
-        actual: The value it has.
+        actual: The value it has; None if it may not be read.
         ok: Whether they are equal.
         verified: Whether a document of this family prints the wanted value.
         label: The parameter in words.
@@ -175,7 +186,7 @@ class ControlItem:
 
     code: str
     wanted: Value
-    actual: Value
+    actual: Value | None
     ok: bool
     verified: bool
     label: str
@@ -195,27 +206,9 @@ class Control(tuple[ControlItem, ...]):
         for item in self:
             verdict = "ok" if item.ok else f"needs {int(item.wanted)}"
             unverified = "" if item.verified else " [value unverified]"
-            lines.append(f"{item.code} {item.label}: {int(item.actual)}, {verdict}{unverified}")
+            actual = "not read" if item.actual is None else int(item.actual)
+            lines.append(f"{item.code} {item.label}: {actual}, {verdict}{unverified}")
         return "\n".join(lines)
-
-
-@dataclass(frozen=True)
-class Found:
-    """A unit that answered a scan.
-
-    Attributes:
-        unit: Its address, 1..247.
-        profile: The family it was identified as; None if it is unknown or would not tell.
-        identification: Its identification code; None if it would not tell.
-        round_trip: Seconds from the request's first bit to the answer's last.
-        problem: What was wrong with its answer, or None.
-    """
-
-    unit: int
-    profile: str | None
-    identification: int | None
-    round_trip: float
-    problem: str | None = None
 
 
 @dataclass(frozen=True)

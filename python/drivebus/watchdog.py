@@ -15,8 +15,10 @@ from types import TracebackType
 
 from drivebus import checks
 from drivebus.at_once import at_once
+from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
-from drivebus.motion import POLL_INTERVAL, Motion
+from drivebus.evidence import not_verified
+from drivebus.motion import Motion
 from drivebus.values import State, Value
 
 __all__ = ["Settings", "Watchdog"]
@@ -48,6 +50,14 @@ class Settings:
         if settings is None:
             raise NotAllowed(
                 f"{drive.profile.title} has no communication time-out that is known; nothing was sent", unit=drive.unit
+            )
+        if not (settings.verified or drive.unverified):
+            described = map(drive.profile.describe, (settings.timeout, settings.action))
+            reason = next((known.reason or known.note for known in described if known.reason or known.note), None)
+            raise not_verified(
+                f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})",
+                reason,
+                drive.unit,
             )
         high = drive.profile.describe(settings.timeout).high
         self.timeout = checks.number("timeout", timeout, 0.0, math.inf if high is None else high, above=True)
@@ -105,7 +115,7 @@ class Settings:
     async def ask(self) -> bool:
         """Keeps the drive from acting for now. Whether that makes sense again: not on a line that was closed."""
         try:
-            await self._drive.state()
+            await self._drive.ping()
         except DrivebusError as error:
             self.error = error
             return not self._drive.bus.closed
@@ -121,9 +131,9 @@ class Settings:
         bus = self._drive.bus
         lowest, deadline = math.inf, bus.now()
         while await self._drive.state() not in _AT_REST:
-            frequency = float(await self._drive.read("running_frequency"))
+            frequency = await self._drive.output_frequency()
             now = bus.now()
-            if frequency < lowest:
+            if frequency is not None and frequency < lowest:
                 lowest, deadline = frequency, now + _PATIENCE
             elif now >= deadline:
                 return False

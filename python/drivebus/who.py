@@ -1,18 +1,19 @@
-"""Who answers on a line, and what they say they are."""
+"""Who answers on a line, and the profile of who does."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable
+import os
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
-from drivebus.profile import Profile, identify, profiles
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
+from drivebus.found import Found, Identification
+from drivebus.identify import identify, usable
+from drivebus.profile import Profile, profiles
 from drivebus.protocols import AwaitableBus
-from drivebus.values import Found
 
-__all__ = ["ask", "look_for", "time_for", "units"]
+__all__ = ["identified", "look_for", "profile_of", "time_for", "units"]
 
-_IDENTIFICATION = "identification_code"
 _SCAN_TIMEOUT = 0.1
 """Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
 
@@ -35,37 +36,62 @@ async def look_for(
 ) -> Found | None:
     """Who answers at *unit*, if somebody does. *read* asks for one word, once."""
     started = now()
-    code: int | None = None
-    problem: str | None = None
+    first: list[float] = []
+
+    async def timed(unit: int, address: int) -> list[int]:
+        try:
+            return await read(unit, address)
+        finally:
+            first.append(now() - started)
+
     try:
-        [code] = await read(unit, _identification_address())
+        found = await identify(timed, unit)
     except NoAnswer:
         return None
-    except (Refused, BadAnswer) as error:
-        problem = str(error)
-    family = None if code is None else identify(code)
-    return Found(unit, family, code, now() - started, problem)
+    except BadAnswer as error:
+        return Found(unit, None, None, first[0], str(error))
+    family = usable(found, unverified=True) or found.family
+    problem = found.reason if found.certainty == "unknown" and found.code is None else None
+    return Found(unit, family, found.code, first[0], problem, found.certainty, found.candidates)
 
 
-async def ask(bus: AwaitableBus, unit: int) -> tuple[Profile, int]:
-    """The profile of the drive at *unit*, and what it says it is."""
-    [code] = await bus.read(unit, _identification_address())
-    return _profile_of(unit, code), code
+async def identified(bus: AwaitableBus, unit: int) -> Identification:
+    """What the unit is, as far as it tells."""
+    return await identify(bus.read, unit)
 
 
-def _profile_of(unit: int, code: int) -> Profile:
-    family = identify(code)
-    if family not in profiles():
-        known = "no list names" if family is None else f"is a {family}, a family without a profile yet"
-        raise NotAllowed(
-            f"unit {unit} identifies itself as {code:04X}H, which {known}; the registers and command codes of "
-            "another family may differ. If you know that it behaves like one of "
-            f"{', '.join(profiles())}, give profile=…",
-            unit=unit,
-        )
-    return Profile.builtin(family)
+async def profile_of(
+    bus: AwaitableBus,
+    unit: int,
+    profile: str | os.PathLike[str] | Profile | None,
+    variants: Mapping[str, str] | None,
+    unverified: bool,
+) -> tuple[Profile, int | None]:
+    """The profile that *profile* means, or else that of the drive at *unit*, and the code that it gave if asked."""
+    code: int | None = None
+    if profile is None:
+        found = await identified(bus, unit)
+        name, code = usable(found, checks.flag("unverified", unverified)), found.code
+        if name is None:
+            raise _not_sure(found)
+        known = Profile.builtin(name)
+    else:
+        known = Profile.find(profile)
+    return known if variants is None else known.with_variants(variants), code
 
 
-def _identification_address() -> int:
-    """Where a drive says what it is. All shipped families use one register."""
-    return Profile.builtin(profiles()[0]).address(_IDENTIFICATION)
+def _not_sure(found: Identification) -> NotAllowed:
+    shipped = [name for name in found.candidates if name in profiles()]
+    if found.candidates and not shipped:
+        known = f"it is {found.title}, a family without a profile yet"
+    elif found.candidates:
+        known = f"it may be {' or '.join(found.candidates)}"
+    else:
+        known = "what it is, is not known"
+    with_one = ", or unverified=True to take it for that" if len(found.candidates) == len(shipped) == 1 else ""
+    return NotAllowed(
+        f"unit {found.unit} is not surely of one family: {known} ({found.certainty}: {found.reason}). The registers "
+        "and command codes of another family may differ; if you know that it behaves like one of "
+        f"{', '.join(shipped or profiles())}, give profile=…{with_one}",
+        unit=found.unit,
+    )

@@ -141,7 +141,7 @@ class TestControl:
     def test_prepare_control_writes_only_what_differs(self, simulator: Simulator, drive: Drive) -> None:
         control = drive.prepare_control()
         assert control
-        assert [(item.code, int(item.actual)) for item in control] == [("P00.01", 2), ("P00.02", 0), ("P00.06", 8)]
+        assert [(item.code, item.actual) for item in control] == [("P00.01", 2), ("P00.02", 0), ("P00.06", 8)]
         assert drive.status().source is ControlSource.COMMUNICATION
         written = len(simulator.drive(1).writes())
         drive.prepare_control()

@@ -71,10 +71,11 @@ class StandIn:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        force: bool = False,
     ) -> None:
         if connection is not None and connection != self.reconnects:
             raise drivebus.PortError("opened again; nothing was sent")
-        self._take("write", address, value=value, urgent=urgent, read_back=read_back)
+        self._take("write", address, value=value, urgent=urgent, read_back=read_back, force=force)
         words = [value] if isinstance(value, int) else value
         self.words.update(enumerate(words, address & ~RAM))
         if address == CONTROL:

@@ -17,9 +17,10 @@ from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
+from drivebus.found import Found, Identification
 from drivebus.opening import BusFace, Opening
 from drivebus.profile import Profile
-from drivebus.values import Found, Link
+from drivebus.values import Link
 
 __all__ = ["Bus"]
 
@@ -174,12 +175,24 @@ class Bus(BusFace[Line]):
             if found is not None:
                 yield found
 
-    async def drive(self, unit: int, profile: str | os.PathLike[str] | Profile | None = None) -> Drive:
+    async def identify(self, unit: int) -> Identification:
+        """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
+        return await who.identified(self, checks.unit(unit))
+
+    async def drive(
+        self,
+        unit: int,
+        profile: str | os.PathLike[str] | Profile | None = None,
+        *,
+        unverified: bool = False,
+        variants: Mapping[str, str] | None = None,
+    ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
-        if profile is not None:
-            return Drive(self, unit, Profile.find(profile))
-        return Drive(self, unit, *await who.ask(self, unit))
+        known, code = await who.profile_of(self, unit, profile, variants, unverified)
+        drive = Drive(self, unit, known, code, unverified=unverified)
+        self._known.add(unit, known)
+        return drive
 
     def poll(self, targets: Mapping[Any, Any], interval: float | None = None, *, size: int = 10_000) -> Poll:
         """As `drivebus.Bus.poll`, for `async with` and `async for`. It asks from now on, and keeps no event loop."""

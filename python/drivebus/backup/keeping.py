@@ -15,7 +15,7 @@ from drivebus.backup.restoring import Restore
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress
 from drivebus.errors import NotAllowed
-from drivebus.registers import Registers
+from drivebus.parameters import Parameters
 
 __all__ = ["Keeping"]
 
@@ -23,7 +23,7 @@ Kept = Backup | str | os.PathLike[str]
 """A backup, or the file of one."""
 
 
-class Keeping(Registers):
+class Keeping(Parameters):
     """What a drive is set to, as a whole."""
 
     async def backup(

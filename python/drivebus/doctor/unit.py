@@ -11,7 +11,7 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.doctor.traffic import frames_in, is_frame
 from drivebus.drive import Drive
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, NotAllowed, Refused
-from drivebus.values import Found
+from drivebus.found import Found
 
 __all__ = ["unit_findings"]
 
@@ -259,7 +259,8 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
         yield Finding("unit", "control", Severity.OK, f"unit {unit} is set to obey the bus", unit=unit)
     else:
         wrong = "; ".join(
-            f"{item.code} ({item.label}) is {int(item.actual)}, needs {int(item.wanted)}"
+            f"{item.code} ({item.label}) is {'not known' if item.actual is None else int(item.actual)}, "
+            f"needs {int(item.wanted)}"
             for item in control
             if not item.ok
         )

@@ -1,0 +1,129 @@
+"""What a unit is, as far as it tells: by its identification code, or by which words it answers and which it refuses.
+
+Only reads. A code says what documents say of it, and no more: some families share one, and some codes are known from
+other people's programs alone.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import Any
+
+from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.found import Identification
+from drivebus.profile import Profile, profiles
+
+__all__ = ["identify", "usable"]
+
+Read = Callable[[int, int], Awaitable[list[int]]]
+
+
+async def identify(read: Read, unit: int) -> Identification:
+    """Finds out what *unit* is. *read* asks for one word.
+
+    Raises:
+        NoAnswer, BadAnswer, PortError: From its first answer.
+    """
+    answered: dict[int, bool] = {}
+    told: list[str] = []
+    code: int | None = None
+    for address in _code_registers():
+        try:
+            [code] = await read(unit, address)
+        except Refused as error:
+            answered[address] = False
+            told.append(f"it refuses {address:04X}H (exception {error.code:02X}H)")
+            continue
+        answered[address] = True
+        if code in _codes():
+            return _by_code(unit, code)
+        told.append(f"it says {code:04X}H at {address:04X}H, which no list names")
+    candidates = await _by_answers(read, unit, answered)
+    if not candidates:
+        reason = f"{'; '.join(told)}, and answers like no family that is known by its answers"
+        return Identification(unit, (), None, code, "", "unknown", reason)
+    seen = ", ".join(f"{address:04X}H {'answered' if yes else 'refused'}" for address, yes in sorted(answered.items()))
+    return Identification(
+        unit,
+        candidates,
+        candidates[0] if len(candidates) == 1 else None,
+        code,
+        " or ".join(Profile.builtin(name).title for name in candidates),
+        "by answers",
+        f"it gives no code that is known, and answers as such a unit does: {seen}",
+    )
+
+
+def usable(found: Identification, unverified: bool) -> str | None:
+    """The profile that *found* is sure enough of to command a motor by it; with *unverified*, the only candidate."""
+    shipped = [name for name in found.candidates if name in profiles()]
+    sure = found.certainty in ("certain", "shared") or (unverified and len(found.candidates) == 1)
+    return shipped[0] if sure and len(shipped) == 1 else None
+
+
+def _by_code(unit: int, code: int) -> Identification:
+    rows = _codes()[code]
+    families = tuple(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
+    title = " or ".join(dict.fromkeys(row["title"] for row in rows))
+    printed = next((row for row in rows if row["verified"]), None)
+    says = f"it says {code:04X}H"
+    if printed is None:
+        certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0]['source']}"
+    elif len(families) > 1:
+        certainty, reason = "shared", f"{says}, which {' and '.join(families)} report alike"
+    else:
+        certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
+    return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
+
+
+async def _by_answers(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
+    """The families whose signature *unit* shows. What was asked stands in *answered*, and what is asked goes there."""
+    for signature in _signatures().values():
+        for address in (*signature["answers"], *signature["refuses"]):
+            if address not in answered:
+                try:
+                    await read(unit, address)
+                    answered[address] = True
+                except Refused:
+                    answered[address] = False
+                except (NoAnswer, BadAnswer):
+                    # Neither, then: no signature has it.
+                    continue
+    return tuple(name for name, signature in _signatures().items() if _shows(answered, signature))
+
+
+def _shows(answered: Mapping[int, bool], signature: Mapping[str, Sequence[int]]) -> bool:
+    return all(answered.get(address) is True for address in signature["answers"]) and all(
+        answered.get(address) is False for address in signature["refuses"]
+    )
+
+
+@functools.cache
+def _code_registers() -> tuple[int, ...]:
+    """Where the shipped families say what they are."""
+    registers: dict[int, None] = {}
+    for profile in map(Profile.builtin, profiles()):
+        name = profile.role("identification")
+        address = None if name is None else profile.describe(name).address
+        if address is not None:
+            registers[address] = None
+    return tuple(registers)
+
+
+@functools.cache
+def _codes() -> dict[int, list[dict[str, Any]]]:
+    """What the shipped profiles say of each code; of profiles that say the same of a family, the first."""
+    codes: dict[int, dict[str, dict[str, Any]]] = {}
+    for name in profiles():
+        for row in Profile.builtin(name).identifications():
+            known = codes.setdefault(row["code"], {}).setdefault(row["family"], row)
+            if row["verified"] and not known["verified"]:
+                codes[row["code"]][row["family"]] = row
+    return {code: list(rows.values()) for code, rows in codes.items()}
+
+
+@functools.cache
+def _signatures() -> dict[str, dict[str, list[int]]]:
+    found = {name: Profile.builtin(name).signature() for name in profiles()}
+    return {name: signature for name, signature in found.items() if signature is not None}

@@ -1,0 +1,239 @@
+"""Writing registers and parameters of one unit by name: what is allowed, and where it is kept.
+
+All checks come before the first write: names, ranges (also those that other parameters narrow), the state the drive
+must be in, and evidence. What makes a motor turn is not written here: commands are refused, `Drive` has methods for
+them.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, overload
+
+from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
+from drivebus.looking import Looks
+from drivebus.protocols import ProfileProtocol
+from drivebus.values import Description, Value
+
+__all__ = ["Parameters"]
+
+_STORES_BEFORE_WARNING = 5
+"""EEPROM writes of one parameter by one program that are taken for use; more look like a loop."""
+
+_WRITE_MANY = 0x10
+
+
+class _Planned(NamedTuple):
+    known: Description
+    name: str
+    address: int
+    raw: int
+
+    @property
+    def words(self) -> int | list[int]:
+        """As they are sent: the low word first where there are two."""
+        return self.raw if self.known.words == 1 else [self.raw & 0xFFFF, self.raw >> 16]
+
+
+class _Limit(NamedTuple):
+    """Another parameter that narrows a range."""
+
+    other: str
+    low: bool
+
+
+class Parameters(Looks):
+    """Writes registers and parameters of one drive."""
+
+    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+        super()._know(profile, unverified)
+        self._limits_of_others: dict[str, list[_Limit]] | None = None
+
+    @overload
+    async def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+    @overload
+    async def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
+    async def write(
+        self,
+        name: str | Mapping[str, object],
+        value: object = None,
+        store: bool = False,
+        *,
+        unverified: bool = False,
+    ) -> None:
+        """Writes one value, or several from a mapping, each by its own request.
+
+        A confirmation that was lost is cleared up by reading the value. Only where the drive shows another one is the
+        write repeated, as often as the bus repeats a read. What does something when it is written (P00.15 tunes the
+        motor) tells nothing by being read: it is sent once.
+
+        Parameters go to RAM: they are lost when the drive is switched off. With *store* they go to EEPROM, whose
+        write life is limited; one that already has its value is not written again. A drive tells the value in force,
+        not where it is kept: what this object wrote to RAM is stored, what somebody else did is taken for stored.
+        Where no way to write to RAM alone is known of the family, a parameter is written only with *store*.
+
+        All checks come first: if one value is not allowed, none is sent. A range that another parameter narrows (P00.04
+        is not above P00.03) is asked of the drive, in one go with its state; each of several values sees those before.
+
+        Args:
+            name: A register name or parameter code, or a mapping of them to values.
+            value: In engineering units, or the label of a choice.
+            store: Keep parameters in EEPROM. Registers are kept nowhere, and are written as they are.
+            unverified: Also what is not verified for the family.
+
+        Raises:
+            NotAllowed: Unknown name, out of range, read-only, a command, not verified, or writable only while stopped
+                and the drive runs; or another drive answers at this address since the port was opened again. Nothing
+                was sent.
+            NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same, unless the error's
+                `started` is None: then it was not sent.
+            Refused: The drive kept what it had.
+            Unconfirmed: The drive shows another value, however often it was written.
+
+        Where one of several fails, those before it were written; the error's note names them.
+        """
+        wanted = name if isinstance(name, Mapping) else {name: value}
+        if not isinstance(name, Mapping) and value is None:
+            raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
+        drive = await self.trusting(unverified)._settled(*wanted)
+        planned = [drive._plan_write(key, asked, store) for key, asked in wanted.items()]
+        await drive._check_now(planned)
+        done: list[str] = []
+        for item in planned:
+            try:
+                await drive._write_one(item, store)
+            except DrivebusError as error:
+                if done and hasattr(error, "add_note"):
+                    error.add_note(f"written before it: {', '.join(done)}")
+                raise
+            done.append(item.name)
+
+    def _plan_write(self, name: str, value: object, store: bool) -> _Planned:
+        known = self.profile.describe(name)
+        if not known.writable:
+            raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=self.unit)
+        if known.address is not None and self.profile.is_command(known.address):
+            raise NotAllowed(
+                f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
+                "or reset_fault(), or for terminals and the special control word their own methods",
+                unit=self.unit,
+            )
+        self._evidence.writes(name)
+        raw = self.profile.encode(name, value)
+        address = self.profile.address(name, store=store)
+        if known.kind == "parameter" and (address != known.address or not store):
+            memory = self.profile.memory()
+            kept = "EEPROM" if store else "RAM"
+            reason = None if memory is None else memory["reason"]
+            self._evidence.rule(f"how {self.profile.title} keeps a parameter in {kept}", reason)
+        if known.words > 1 and _WRITE_MANY not in self.profile.functions:
+            raise NotAllowed(
+                f"{name} has {known.words} words, which {self.profile.title} does not take at once; nothing was sent",
+                unit=self.unit,
+            )
+        return _Planned(known, name, address, raw)
+
+    async def _check_now(self, planned: Sequence[_Planned]) -> None:
+        """Checks what only the drive knows: whether it is stopped, and ranges that its parameters narrow."""
+        only_stopped = [item.name for item in planned if item.known.access == "stop"]
+        # Where no state is known the drive has to refuse by itself.
+        state_word = self.profile.role("state") if only_stopped and self._evidence.without_state() is None else None
+        limits = [limit for item in planned for limit in self._limits(item.known)]
+        others = self._evidence.readable(dict.fromkeys(limit.other for limit in limits))
+        names = [*([state_word] if state_word else []), *others]
+        if not names:
+            return
+        values = await self.snapshot(*names)
+        if state_word is not None:
+            state = self._state_of(int(values[state_word]))
+            self._remember(str(state))
+            if state.running:
+                raise NotAllowed(
+                    f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {self.unit} "
+                    f"runs ({state}); nothing was written",
+                    unit=self.unit,
+                )
+        in_force = {_key(self.profile.describe(name)): values[name] for name in others}
+        for item in planned:
+            self._check_range(item, in_force)
+            in_force[_key(item.known)] = self.value(item.name, item.raw)
+
+    def _check_range(self, item: _Planned, in_force: Mapping[str, Value]) -> None:
+        value = self.value(item.name, item.raw)
+        for other, low in self._limits(item.known):
+            narrow = self.profile.describe(other)
+            limit = in_force.get(_key(narrow))
+            if limit is None or (value >= limit if low else value <= limit):
+                continue
+            raise NotAllowed(
+                f"{item.name} ({item.known.label}) = {value:g} {item.known.unit} is {'below' if low else 'above'} "
+                f"{other} ({narrow.label}), which is {limit:g} {narrow.unit} in unit {self.unit}; nothing was written. "
+                f"Write {other} first, or before it in the same call",
+                unit=self.unit,
+            )
+
+    def _limits(self, known: Description) -> list[_Limit]:
+        """The parameters that narrow the range of *known*, by its own row or by theirs."""
+        named = ((known.low_from, True), (known.high_from, False))
+        limits = [_Limit(other, low) for other, low in named if other is not None]
+        if known.kind == "parameter":
+            have = {self.profile.describe(limit.other).code for limit in limits}
+            limits += [limit for limit in self._narrowing().get(_key(known), ()) if limit.other not in have]
+        return limits
+
+    def _narrowing(self) -> Mapping[str, Sequence[_Limit]]:
+        """For each parameter the others whose range it narrows, as limits of its own."""
+        if self._limits_of_others is None:
+            found: dict[str, list[_Limit]] = {}
+            self._limits_of_others = found
+            for other in map(self.profile.describe, self.profile.names()):
+                if other.kind == "parameter":
+                    for bound, low in ((other.low_from, False), (other.high_from, True)):
+                        if bound is not None:
+                            key = _key(self.profile.describe(bound))
+                            found.setdefault(key, []).append(_Limit(_key(other), low))
+        return self._limits_of_others
+
+    async def _write_one(self, item: _Planned, store: bool) -> None:
+        read_back = self.profile.read_back(item.name)
+        key = _key(item.known)
+        if item.known.kind != "parameter" or not store:
+            if item.known.kind == "parameter":
+                # Before it is sent: the drive may take it although its answer is lost.
+                self._in_ram.add(key)
+            await self._write(item.address, item.words, read_back=read_back)
+            return
+        # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
+        low, *high = await self.read_words(self.profile.address(item.name), item.known.words)
+        in_force = low | (high[0] << 16 if high else 0)
+        if in_force == item.raw and key not in self._in_ram:
+            return
+        # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
+        await self._write(item.address, item.words, read_back=None if in_force == item.raw else read_back)
+        self._in_ram.discard(key)
+        self._count_store(key)
+
+    def _count_store(self, name: str) -> None:
+        self._stored[name] = times = self._stored.get(name, 0) + 1
+        if times >= _STORES_BEFORE_WARNING:
+            warnings.warn(
+                f"{name} of unit {self.unit} was stored in EEPROM {times} times by this program; "
+                "its write life is limited: write to RAM (store=False) in a loop",
+                StoreWarning,
+                stacklevel=_level_of_the_program(),
+            )
+
+
+def _key(known: Description) -> str:
+    """One name for a parameter that has two."""
+    return known.code or known.name
+
+
+def _level_of_the_program() -> int:
+    """Where the program stands above the caller, for `warnings.warn`: how deep depends on who carries the work out."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "drivebus":
+        level, frame = level + 1, frame.f_back
+    return level
