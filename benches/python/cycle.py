@@ -93,7 +93,7 @@ def main() -> None:
         for baudrate in given.baud or BAUD_RATES:
             with drivebus.Simulator({UNIT: "gd350"}, baudrate=baudrate, parity="N", stopbits=2) as simulator:
                 with drivebus.Bus(simulator.port, baudrate=baudrate, parity="N", stopbits=2) as bus:
-                    bus.drive(UNIT, "gd350").write(RESPONSE_DELAY, 0)
+                    bus.drive(UNIT, "gd350").write(RESPONSE_DELAY, 0, unverified=True)
                 line = simulator.format
                 for words in given.words or COUNTS:
                     least = shortest(line, words)

@@ -83,7 +83,6 @@ class Drive:
     stop = blocking(Operations.stop)
     coast = blocking(Operations.coast)
     jog_stop = blocking(Operations.jog_stop)
-    end_jog = blocking(Operations.end_jog)
     reset_fault = blocking(Operations.reset_fault)
     look = blocking(Operations.look)
     state = blocking(Operations.state)
@@ -223,7 +222,7 @@ class Drive:
         It is ended by the family's jog stop, or where it has none by a stop.
         """
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-        with self._moving(jog, lambda: self.end_jog()):
+        with self._moving(jog, lambda: self.jog_stop() if self._operations.has_jog_stop() else self.stop()):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:

@@ -38,7 +38,7 @@ async def identify(read: Read, unit: int) -> Identification:
         answered[address] = True
         if code in _codes():
             return _by_code(unit, code)
-        told.append(f"it says {code:04X}H at {address:04X}H, which no list names")
+        told.append(f"it says {code:04X}H, which no list names")
     candidates = await _by_answers(read, unit, answered)
     if not candidates:
         reason = f"{'; '.join(told)}, and answers like no family that is known by its answers"

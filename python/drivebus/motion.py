@@ -119,7 +119,7 @@ class Motion(Commanding):
     async def jog_stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Ends a jog by the jog's own ramp. Errors as for `stop`; without such a command they say what does."""
         drive = self.trusting(unverified)
-        if not drive._has_jog_stop():
+        if "jog_stop" not in self.profile.commands():
             raise NotAllowed(
                 f"{self.profile.title} has no command that ends a jog alone: stop() ends it along the ramp, coast() "
                 f"takes the voltage off; nothing was sent to unit {self.unit}",
@@ -130,11 +130,11 @@ class Motion(Commanding):
     async def end_jog(self, *, unverified: bool = False) -> None:
         """Ends a jog as the family does: by its jog stop, or else by a stop. Errors as for `stop`."""
         drive = self.trusting(unverified)
-        by_itself = drive._has_jog_stop() and drive._halting("jog_stop")._evidence.unusable("jog_stop") is None
-        await (drive.jog_stop() if by_itself else drive.stop())
+        await (drive.jog_stop() if drive.has_jog_stop() else drive.stop())
 
-    def _has_jog_stop(self) -> bool:
-        return "jog_stop" in self.profile.commands()
+    def has_jog_stop(self) -> bool:
+        """Whether the family has a command that ends a jog alone, and it may be given."""
+        return self._halting("jog_stop")._evidence.unusable("jog_stop") is None
 
     async def reset_fault(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Resets a fault whose cause is gone. Sends nothing where there is none.

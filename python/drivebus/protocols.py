@@ -162,9 +162,6 @@ class ProfileProtocol(Protocol):
     def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address*, or None."""
 
-    def role(self, what: str, /) -> str | None:
-        """The register for `"state"`, `"fault"`, `"frequency"`, `"setpoints.torque"` …, if the family has one."""
-
     def monitor_names(self) -> list[str]:
         """The registers worth watching."""
 
@@ -240,7 +237,7 @@ class ProfileProtocol(Protocol):
     def variants_chosen(self) -> Mapping[str, str]:
         """Which of the variants are fixed, and how."""
 
-    def with_variants(self, chosen: Mapping[str, str], /) -> ProfileProtocol:
+    def with_variants(self, chosen: Mapping[str, str]) -> ProfileProtocol:
         """The same family with variants fixed."""
 
     def signature(self) -> dict[str, list[int]] | None:

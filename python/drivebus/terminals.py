@@ -82,11 +82,13 @@ class Terminals(Motion):
         return word
 
     async def _terminals(self, name: str) -> dict[str, bool]:
-        if name not in self.profile.names():
+        try:
+            self.profile.describe(name)
+        except NotAllowed:
             raise NotAllowed(
                 f"no {name.replace('_', ' ')} word of {self.profile.title} is known; unit {self.unit} was not asked",
                 unit=self.unit,
-            )
+            ) from None
         word = await self._word(name)
         return {field: bool(word & mask) for field, mask in self._masks(name).items()}
 

@@ -83,7 +83,7 @@ async def profile_of(
 def _not_sure(found: Identification) -> NotAllowed:
     shipped = [name for name in found.candidates if name in profiles()]
     if found.candidates and not shipped:
-        known = f"it is {found.title}, a family without a profile yet"
+        known = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
     elif found.candidates:
         known = f"it may be {' or '.join(found.candidates)}"
     else:

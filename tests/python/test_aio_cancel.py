@@ -306,12 +306,12 @@ class TestMotor:
                 async with drivebus.aio.Bus(simulator) as bus:
                     drive = await bus.drive(1)
                     await drive.prepare_control()
-                    async with drive.watchdog(30.0, "stop") as watchdog:
+                    async with drive.watchdog(30.0, "stop", unverified=True) as watchdog:
                         assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (True, 300)
                     assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (False, 0)
 
                     async def work() -> None:
-                        async with drive.watchdog(30.0):
+                        async with drive.watchdog(30.0, unverified=True):
                             inside.set()
                             await asyncio.Event().wait()
 

@@ -114,7 +114,7 @@ def test_an_adapter_that_echoes_is_no_fault() -> None:
 def test_a_time_out_that_the_drives_own_delay_fills_is_named() -> None:
     with line() as simulator:
         with Bus(simulator) as bus:
-            bus.drive(1).write("P14.03", 200)
+            bus.drive(1).write("P14.03", 200, unverified=True)
         findings = list(examine(simulator, 1, open=lambda port, **options: Bus(port, timeout=0.3, **options)))
     assert wrong(findings) == {"timeout"}
     assert named(findings, "timeout").values["response_delay"] == 0.2

@@ -284,7 +284,7 @@ def test_what_other_threads_run_is_stopped_before_the_line_is_closed(simulator: 
 @pytest.mark.parametrize("action", ["coast", "stop"])
 def test_a_killed_program_leaves_the_drive_to_its_watchdog(simulator: Simulator, action: str) -> None:
     body = f"""
-    with drive.watchdog(1.0, "{action}"), drive.running(10.0):
+    with drive.watchdog(1.0, "{action}", unverified=True), drive.running(10.0):
         running()
         bus.sleep(100)
     """
@@ -308,7 +308,7 @@ def test_a_killed_program_leaves_the_drive_to_its_watchdog(simulator: Simulator,
 
 def test_a_watchdog_that_nobody_closed_is_left_to_the_drive(simulator: Simulator) -> None:
     body = """
-    watchdog = drive.watchdog(1.0)
+    watchdog = drive.watchdog(1.0, unverified=True)
     drive.run(10.0)
     running()
     """
@@ -322,7 +322,7 @@ def test_a_watchdog_that_nobody_closed_is_left_to_the_drive(simulator: Simulator
 
 def test_a_forked_child_leaves_the_line_to_its_parent(simulator: Simulator) -> None:
     body = """
-    with drive.watchdog(60.0), drive.running(10.0):
+    with drive.watchdog(60.0, unverified=True), drive.running(10.0):
         for leave in (lambda: sys.exit(0), lambda: None):
             child = os.fork()
             if not child:

@@ -34,8 +34,8 @@ def written(simulator: Simulator) -> list[tuple[int, int]]:
 
 
 def test_it_is_set_in_ram_action_first_and_put_back_time_out_first(virtual: Simulator, virtual_drive: Drive) -> None:
-    virtual_drive.write("P14.05", 1)
-    with virtual_drive.watchdog(30.0, "stop") as watchdog:
+    virtual_drive.write("P14.05", 1, unverified=True)
+    with virtual_drive.watchdog(30.0, "stop", unverified=True) as watchdog:
         assert settings(virtual) == (300, 3)
         assert (watchdog.armed, watchdog.timeout, watchdog.action) == (True, 30.0, "stop")
         assert "unverified" in repr(watchdog)
@@ -53,7 +53,7 @@ def test_it_is_set_in_ram_action_first_and_put_back_time_out_first(virtual: Simu
 )
 def test_a_motor_that_stops_is_waited_for(virtual: Simulator, virtual_drive: Drive, ramp: float, hz: float) -> None:
     virtual_drive.write("P00.12", ramp)  # seconds from 50 Hz
-    with virtual_drive.watchdog(40.0), virtual_drive.running(hz, confirm=5.0):
+    with virtual_drive.watchdog(40.0, unverified=True), virtual_drive.running(hz, confirm=5.0):
         virtual_drive.wait_for_speed(timeout=100)
     assert settings(virtual) == (0, 0)
     virtual.advance(100)
@@ -63,7 +63,7 @@ def test_a_motor_that_stops_is_waited_for(virtual: Simulator, virtual_drive: Dri
 def test_a_motor_that_goes_on_is_left_to_the_drive(virtual: Simulator, virtual_drive: Drive) -> None:
     virtual_drive.run(10.0)
     virtual_drive.wait_for_speed(timeout=100)
-    with virtual_drive.watchdog(40.0) as watchdog:
+    with virtual_drive.watchdog(40.0, unverified=True) as watchdog:
         pass
     assert (settings(virtual), watchdog.armed) == ((400, 0), True)
     virtual.advance(39)
@@ -73,7 +73,7 @@ def test_a_motor_that_goes_on_is_left_to_the_drive(virtual: Simulator, virtual_d
 
 
 def test_one_that_cannot_be_asked_is_left_to_the_drive(virtual: Simulator, virtual_drive: Drive) -> None:
-    watchdog = virtual_drive.watchdog(40.0)
+    watchdog = virtual_drive.watchdog(40.0, unverified=True)
     virtual.line.drop_answers(1000)
     watchdog.close()
     assert isinstance(watchdog.error, drivebus.NoAnswer)
@@ -82,7 +82,7 @@ def test_one_that_cannot_be_asked_is_left_to_the_drive(virtual: Simulator, virtu
 
 
 def test_closing_again_does_nothing(virtual: Simulator, virtual_drive: Drive) -> None:
-    watchdog = virtual_drive.watchdog(40.0)
+    watchdog = virtual_drive.watchdog(40.0, unverified=True)
     watchdog.close()
     asked = virtual.line.requests
     watchdog.close()
@@ -90,8 +90,8 @@ def test_closing_again_does_nothing(virtual: Simulator, virtual_drive: Drive) ->
 
 
 def test_one_inside_another_gives_back_what_the_other_set(virtual: Simulator, virtual_drive: Drive) -> None:
-    with virtual_drive.watchdog(40.0):
-        with virtual_drive.watchdog(30.0, "stop"):
+    with virtual_drive.watchdog(40.0, unverified=True):
+        with virtual_drive.watchdog(30.0, "stop", unverified=True):
             assert settings(virtual) == (300, 3)
         assert settings(virtual) == (400, 0)
     assert settings(virtual) == (0, 0)
@@ -103,14 +103,14 @@ def test_a_time_out_that_the_drive_does_not_have_sends_nothing(
 ) -> None:
     asked = virtual.line.requests
     with pytest.raises(drivebus.NotAllowed):
-        virtual_drive.watchdog(timeout)
+        virtual_drive.watchdog(timeout, unverified=True)
     assert virtual.line.requests == asked
 
 
 def test_an_action_that_the_drive_does_not_have_is_named(virtual: Simulator, virtual_drive: Drive) -> None:
     asked = virtual.line.requests
     with pytest.raises(drivebus.NotAllowed, match=r"action 'halt' .*coast, stop"):
-        virtual_drive.watchdog(1.0, "halt")
+        virtual_drive.watchdog(1.0, "halt", unverified=True)
     assert virtual.line.requests == asked
 
 
@@ -122,7 +122,7 @@ def test_a_family_without_one_is_told_so(tmp_path: Path, virtual: Simulator, vir
     manifest.write_text(before + rest.partition("\n\n")[2], "utf-8")
     drive = virtual_bus.drive(1, folder)
     with pytest.raises(drivebus.NotAllowed, match="no communication time-out"):
-        drive.watchdog(1.0)
+        drive.watchdog(1.0, unverified=True)
     assert virtual.drive(1).writes() == []
 
 
@@ -131,7 +131,7 @@ def test_a_drive_that_refuses_keeps_what_it_had(virtual: Simulator, virtual_driv
     virtual.line.answer_with(bytes.fromhex("01 03 04 00 00 00 00 FA 33"))
     virtual.line.answer_with(bytes.fromhex("01 86 08 43 A6"))
     with pytest.raises(drivebus.Refused, match="locked_while_running"):
-        virtual_drive.watchdog(1.0)
+        virtual_drive.watchdog(1.0, unverified=True)
     assert settings(virtual) == (0, 0)
 
 
@@ -145,7 +145,7 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
 
     monkeypatch.setattr(Operations, "snapshot", snapshot)
     with pytest.raises(drivebus.Unconfirmed, match=r"unit 1 took .* and shows"):
-        virtual_drive.watchdog(1.0)
+        virtual_drive.watchdog(1.0, unverified=True)
     assert settings(virtual) == (0, 2)
 
 
@@ -163,7 +163,7 @@ def test_one_that_is_interrupted_gives_back_what_the_drive_had(
 
     monkeypatch.setattr(Operations, "snapshot", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        virtual_drive.watchdog(1.0)
+        virtual_drive.watchdog(1.0, unverified=True)
     assert written(virtual)[:2] == [(ACTION, 0), (TIMEOUT, 10)]
     assert settings(virtual) == (0, 0)
 
@@ -175,7 +175,7 @@ def test_the_thread_says_what_went_wrong_and_goes_on() -> None:
     ):
         drive = bus.drive(1)
         pause = threading.Event()
-        with drive.watchdog(2.0) as watchdog:
+        with drive.watchdog(2.0, unverified=True) as watchdog:
             simulator.line.drop_answers(1)
             while watchdog.error is None:  # the limit is the test's own
                 pause.wait(0.01)
@@ -190,7 +190,7 @@ def test_the_thread_says_what_went_wrong_and_goes_on() -> None:
 def test_the_thread_ends_with_its_bus() -> None:
     with Simulator({1: "gd350"}, transport="process") as simulator:
         bus = Bus(simulator)
-        watchdog = bus.drive(1).watchdog(0.4)
+        watchdog = bus.drive(1).watchdog(0.4, unverified=True)
         bus.close()
         thread = next(thread for thread in threading.enumerate() if "watchdog" in thread.name)
         thread.join()
