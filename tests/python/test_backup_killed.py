@@ -60,7 +60,6 @@ class Deadly:
 
 def set_back(drive: Drive, factory: Mapping[str, Any]) -> None:
     """What is limited goes down before its limit."""
-<<<<<<< HEAD
     store(drive, {"P00.04": factory["P00.04"]})
     store(drive, {code: value for code, value in factory.items() if code != "P00.04"})
 
@@ -69,10 +68,6 @@ def store(drive: Drive, values: Mapping[str, Any]) -> None:
     """Stores parameters, whatever is known of them: the drive is the judge."""
     for code, value in values.items():
         drive.bus.write(drive.unit, drive.profile.address(code, store=True), drive.profile.encode(code, value))
-=======
-    drive.write({"P00.04": factory["P00.04"]}, store=True, unverified=True)
-    drive.write({code: value for code, value in factory.items() if code != "P00.04"}, store=True, unverified=True)
->>>>>>> 035931e (Ask by name in tests for what no document of the GD350 proves)
 
 
 def stored(simulator: Simulator) -> Counter[int]:
@@ -87,11 +82,7 @@ def ready(simulator: Simulator) -> tuple[Backup, dict[str, Any]]:
         factory = drive.read(*SET)
         assert isinstance(factory, dict)
         # A response delay of a real drive is no part of what is shown here.
-<<<<<<< HEAD
         store(drive, {**SET, "P14.03": 0})
-=======
-        drive.write({**SET, "P14.03": 0}, store=True, unverified=True)
->>>>>>> 035931e (Ask by name in tests for what no document of the GD350 proves)
         kept = drive.backup()
         set_back(drive, factory)
         assert len(drive.diff(kept)) == len(SET)
