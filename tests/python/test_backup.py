@@ -40,6 +40,13 @@ def test_every_parameter_is_read_in_the_fewest_reads(virtual: Simulator, drive: 
     assert virtual.drive(1).words_written == 0
 
 
+def test_what_is_only_assumed_is_read_where_that_is_asked_for(virtual_bus: Bus, drive: Drive) -> None:
+    taken = drive.backup()
+    assert taken.unread["P02.01"].startswith("that this family has it is only assumed: ")
+    assert "P02.01" in drive.backup(unverified=True)
+    assert "P02.01" in virtual_bus.drive(1, "gd350", unverified=True).backup()
+
+
 def test_progress_counts_to_the_end(drive: Drive) -> None:
     seen: list[tuple[int, int]] = []
     taken = drive.backup(progress=lambda done, total: seen.append((done, total)))

@@ -89,15 +89,15 @@ def test_sources_of_commands_come_last(drive: Drive, store: Store) -> None:
 
 def test_serial_settings_and_motor_data_only_where_that_is_asked(drive: Drive, store: Store) -> None:
     kept = drive.backup()
-    store(drive, {"P14.03": 7, "P02.01": 5.5, "P00.11": 3.0})
+    store(drive, {"P14.03": 7, "P02.06": 55, "P00.11": 3.0})
     report = drive.restore(kept)
     left = {item.code: item.reason for item in report.having("skipped") if item.before != item.wanted}
     assert [item.code for item in report.having("restored")] == ["P00.11"]
     assert left["P14.03"].startswith("a setting of the serial line")
-    assert left["P02.01"].startswith("data of the motor")
+    assert left["P02.06"].startswith("data of the motor")
     assert report.ok
     assert [item.code for item in drive.restore(kept, serial=True).having("restored")] == ["P14.03"]
-    assert [item.code for item in drive.restore(kept, motor=True).having("restored")] == ["P02.01"]
+    assert [item.code for item in drive.restore(kept, motor=True).having("restored")] == ["P02.06"]
     assert not drive.diff(kept)
 
 

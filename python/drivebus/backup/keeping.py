@@ -53,7 +53,7 @@ class Keeping(Parameters):
             NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
         """
         place = None if path is None else Path(path)
-        return await taking.take(self, place, resume=resume, force=force, unverified=unverified, progress=progress)
+        return await taking.take(self.trusting(unverified), place, resume=resume, force=force, progress=progress)
 
     async def restore(
         self,
@@ -94,7 +94,7 @@ class Keeping(Parameters):
         A refusal of one parameter ends nothing: it stands in the report.
         """
         kept = self._kept(backup, force)
-        work = Restore(self, kept, dry_run=dry_run, unverified=unverified, progress=progress)
+        work = Restore(self.trusting(unverified), kept, dry_run=dry_run, progress=progress)
         return await work.run(groups=groups, serial=serial, motor=motor, force=force)
 
     async def diff(self, backup: Kept | None = None, *, everything: bool = False, force: bool = False) -> Diff:

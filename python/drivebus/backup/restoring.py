@@ -17,7 +17,7 @@ from drivebus.backup.report import Restoration, Restored
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
-from drivebus.backup.writing import LINE_ERRORS, write
+from drivebus.backup.writing import LINE_ERRORS, place, write
 from drivebus.errors import DrivebusError, NotAllowed, Refused
 
 if TYPE_CHECKING:
@@ -26,18 +26,19 @@ if TYPE_CHECKING:
 __all__ = ["Restore"]
 
 
+_WRITE_MANY = 0x10
+"""The function that writes several words at once."""
+
+
 class Restore:
     """One restore of one drive."""
 
-    def __init__(
-        self, drive: Keeping, backup: Backup, *, dry_run: bool, unverified: bool, progress: Progress | None
-    ) -> None:
+    def __init__(self, drive: Keeping, backup: Backup, *, dry_run: bool, progress: Progress | None) -> None:
         self._drive = drive
         self._profile = drive.profile
         self._backup = backup
         self._rules = Rules(drive.profile)
         self._dry_run = dry_run
-        self._unverified = unverified
         self._progress = progress
         self._pending = self._done = 0
         self._had: dict[str, int] = {}
@@ -73,7 +74,7 @@ class Restore:
         return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, self._dry_run)
 
     def _leave(self, code: str) -> bool:
-        reason = self._rules.unread(code, self._unverified) or self._rules.uncompared(code)
+        reason = self._rules.unread(code, self._drive.unverified) or self._rules.uncompared(code)
         if reason is not None:
             self._results[code] = ("skipped", reason)
         return reason is not None
@@ -89,7 +90,7 @@ class Restore:
 
     async def _read(self, wanted: Sequence[str], bounding: set[str]) -> None:
         """What the drive has of *wanted*, and of what bounds it."""
-        readable = [code for code in bounding if self._rules.unread(code, self._unverified) is None]
+        readable = [code for code in bounding if self._rules.unread(code, self._drive.unverified) is None]
         words = await Reader(self._drive, sorted({*wanted, *readable}, key=self._rules.place)).rest()
         self._had, self._has = words.raw, dict(words.raw)
         for code in wanted:
@@ -100,11 +101,16 @@ class Restore:
 
     def _has_a_place(self, code: str) -> bool:
         """Whether the family's rule says where *code* is stored; known of all before the first is written."""
+        reason = None
         try:
-            self._profile.address(code, store=True)
+            place(self._drive, code, store=True)
         except NotAllowed as error:
-            self._results[code] = ("blocked", str(error))
-        return code not in self._results
+            reason = str(error)
+        if self._profile.describe(code).words > 1 and _WRITE_MANY not in self._profile.functions:
+            reason = f"it has two words, which {self._profile.title} does not take at once"
+        if reason is not None:
+            self._results[code] = ("blocked", reason)
+        return reason is None
 
     async def _check_stopped(self, pending: Sequence[str]) -> None:
         """Refuses while the motor turns, where something is written that a drive takes only while it stands.

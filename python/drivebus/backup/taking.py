@@ -49,9 +49,7 @@ async def origin_of(drive: Registers) -> Origin:
     )
 
 
-async def take(
-    drive: Registers, path: Path | None, *, resume: bool, force: bool, unverified: bool, progress: Progress | None
-) -> Backup:
+async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
     """Reads every parameter that can be read. What was read before a break is not read again.
 
     Raises:
@@ -63,7 +61,7 @@ async def take(
     codes = rules.codes()
     if not codes:
         raise NotAllowed(f"{drive.profile.name} has no parameters that are known: there is nothing to keep")
-    unread = {code: reason for code in codes if (reason := rules.unread(code, unverified)) is not None}
+    unread = {code: reason for code in codes if (reason := rules.unread(code, drive.unverified)) is not None}
     codes = [code for code in codes if code not in unread]
     origin = await origin_of(drive)
     raw: dict[str, int] = {}

@@ -10,7 +10,7 @@ from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping
 
-__all__ = ["LINE_ERRORS", "write"]
+__all__ = ["LINE_ERRORS", "place", "write"]
 
 LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
 
@@ -31,7 +31,7 @@ async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool
     """
     size = drive.profile.describe(code).words
     words = [raw >> 16 * index & 0xFFFF for index in range(size)]
-    address = _address(drive, code, store)
+    address = place(drive, code, store=store)
     for attempt in range(1, _ATTEMPTS + 1):
         try:
             await drive._put(code, address, words[0] if size == 1 else words, store=store)
@@ -47,14 +47,26 @@ async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool
     return await _look(drive, code, size)
 
 
-def _address(drive: Keeping, code: str, store: bool) -> int:
+def place(drive: Keeping, code: str, *, store: bool) -> int:
+    """Where *code* is written for good, or for a while; for good as well where no way for a while is known.
+
+    Raises:
+        NotAllowed: How the family keeps a parameter for good is not verified.
+    """
+    profile = drive.profile
+    memory = profile.memory()
+    sure = memory is None or memory["reason"] is None or drive.unverified
     try:
-        return drive.profile.address(code, store=store)
+        address = profile.address(code, store=store)
     except NotAllowed:
         if store:
             raise
-        # The family knows no write that is forgotten: a step on the way wears the memory too.
-        return drive.profile.address(code, store=True)
+        return place(drive, code, store=True)
+    if sure or address == profile.describe(code).address:
+        return address
+    if not store:
+        return place(drive, code, store=True)
+    raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason'] if memory else ''}")
 
 
 async def _look(drive: Keeping, code: str, size: int) -> int:
