@@ -151,3 +151,13 @@ def test_going_on_is_said(simulator: drivebus.Simulator, file: Path) -> None:
     assert "Going on where it was: 11 of 52 are there." in run(simulator, "backup", file).stderr
     file.with_name("drive.toml.part").write_text("".join(lines))
     assert "Going on" not in run(simulator, "backup", file, "--fresh").stderr
+
+
+def test_who_cannot_ask_for_the_state_is_told_to_look(tmp_path: Path) -> None:
+    """The address of the VFD500's state word is printed nowhere."""
+    file = tmp_path / "drive.toml"
+    with drivebus.Simulator({1: "vfd500"}, transport="tcp" if os.name == "nt" else "pty", baudrate=BAUD) as simulator:
+        assert run(simulator, "--profile", "vfd500", "backup", file).exit_code == 0
+        file.write_text(file.read_text().replace("P07.01 = { value = 0, raw = 0 }", "P07.01 = { value = 1 }"))
+        result = run(simulator, "--profile", "vfd500", "restore", file, "--yes")
+    assert (result.exit_code, "cannot be asked of this family: look" in result.stderr) == (0, True)

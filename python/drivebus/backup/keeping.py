@@ -152,11 +152,11 @@ class Keeping(Parameters):
         """Whether this object wrote *code* to RAM, and not to EEPROM since: what it reads as is then not stored."""
         return not self._in_ram.isdisjoint({code, self.profile.describe(code).name})
 
-    async def _put(self, code: str, address: int, words: int | Sequence[int], *, store: bool) -> None:
-        """Writes the words of a parameter, and remembers to which memory."""
+    async def _put(self, code: str, address: int, word: int, *, store: bool) -> None:
+        """Writes the word of a parameter, and remembers to which memory."""
         if not store:
             self._in_ram.add(code)
-        await self._write(address, words)
+        await self._write(address, word)
         if store:
             self._in_ram.difference_update({code, self.profile.describe(code).name})
             self._count_store(code)

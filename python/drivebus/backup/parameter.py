@@ -49,7 +49,7 @@ def word(profile: ProfileProtocol, code: str, fields: object) -> int:
             raise Wrong(_disagree(profile, known, value, raw))
         return int(raw)
     if known.words > 1:
-        raise Wrong(f"{code} has {known.words} words: its line needs `raw`")
+        raise Wrong(f"{code} has two words: its line needs `raw`")
     try:
         meant = profile.encode(code, value)
     except NotAllowed as error:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from drivebus.errors import Refused
 from drivebus.registers import Registers
 
-__all__ = ["Reader", "Words", "word_of"]
+__all__ = ["Reader", "Words"]
 
 _LOCKED = "password_protected"
 """By this name every profile calls a refusal that meets whatever is asked."""
@@ -79,12 +79,9 @@ class Reader:
 
     def _word(self, code: str, words: Sequence[int], address: int) -> int:
         place = self._drive.profile.address(code) - address
-        return word_of(words[place : place + self._drive.profile.describe(code).words])
-
-
-def word_of(words: Sequence[int]) -> int:
-    """The words of one parameter as one number: the low word comes first."""
-    return sum(word << 16 * index for index, word in enumerate(words))
+        parts = words[place : place + self._drive.profile.describe(code).words]
+        # The low word comes first.
+        return sum(part << 16 * index for index, part in enumerate(parts))
 
 
 def _reason(error: Refused) -> str:

@@ -26,10 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["Restore"]
 
 
-_WRITE_MANY = 0x10
-"""The function that writes several words at once."""
-
-
 class Restore:
     """One restore of one drive."""
 
@@ -101,16 +97,11 @@ class Restore:
 
     def _has_a_place(self, code: str) -> bool:
         """Whether the family's rule says where *code* is stored; known of all before the first is written."""
-        reason = None
         try:
             place(self._drive, code, store=True)
         except NotAllowed as error:
-            reason = str(error)
-        if self._profile.describe(code).words > 1 and _WRITE_MANY not in self._profile.functions:
-            reason = f"it has two words, which {self._profile.title} does not take at once"
-        if reason is not None:
-            self._results[code] = ("blocked", reason)
-        return reason is None
+            self._results[code] = ("blocked", str(error))
+        return code not in self._results
 
     async def _check_stopped(self, pending: Sequence[str]) -> None:
         """Refuses while the motor turns, where something is written that a drive takes only while it stands.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drivebus.backup.reading import word_of
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ _ATTEMPTS = 3
 async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool) -> int:
     """Writes *raw* in place of *before*, for good if *store*, and returns what the drive then shows.
 
+    What has two words can only be read, so one word it is.
     A confirmation that was lost is cleared up by reading. The write is repeated only where the drive shows what it had
     before: then it has not heard it, and has not worn its memory.
 
@@ -29,22 +29,20 @@ async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool
         NotAllowed: Another drive answers at this address.
         NoAnswer, BadAnswer, PortError: It could not be sent, or what became of it could not be read.
     """
-    size = drive.profile.describe(code).words
-    words = [raw >> 16 * index & 0xFFFF for index in range(size)]
     address = place(drive, code, store=store)
     for attempt in range(1, _ATTEMPTS + 1):
         try:
-            await drive._put(code, address, words[0] if size == 1 else words, store=store)
+            await drive._put(code, address, raw, store=store)
         except LINE_ERRORS as error:
             # Where the value was in force already, out of RAM, reading does not tell whether it is kept now.
             if error.started is None or raw == before:
                 raise
-            shown = await _look(drive, code, size)
+            shown = await _look(drive, code)
             if shown == before and attempt < _ATTEMPTS:
                 continue
             return shown
         break
-    return await _look(drive, code, size)
+    return await _look(drive, code)
 
 
 def place(drive: Keeping, code: str, *, store: bool) -> int:
@@ -69,5 +67,6 @@ def place(drive: Keeping, code: str, *, store: bool) -> int:
     raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason'] if memory else ''}")
 
 
-async def _look(drive: Keeping, code: str, size: int) -> int:
-    return word_of(await drive.read_words(drive.profile.address(code), size))
+async def _look(drive: Keeping, code: str) -> int:
+    [word] = await drive.read_words(drive.profile.address(code))
+    return word

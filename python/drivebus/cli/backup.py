@@ -151,6 +151,10 @@ def _question(drive: drivebus.Drive, codes: list[str]) -> str:
     sources = [item["code"] for item in drive.profile.control() if item["code"] in codes]
     if sources:
         text += f", and with {', '.join(sources)} where it takes commands from: one that is told to run there may start"
+    try:
+        drive.state()
+    except drivebus.NotAllowed:
+        text += ". Whether the motor turns cannot be asked of this family: look"
     return text
 
 
