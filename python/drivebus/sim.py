@@ -139,7 +139,7 @@ class Simulator:
     """A simulated line with simulated drives on it.
 
     Args:
-        units: The family on each unit address, such as `{1: "gd350"}`.
+        units: The family on each unit address, such as `{1: "gd350", 2: "vfd500"}`: any that has a profile.
         baudrate: Bits per second on the line.
         parity: `"N"`, `"E"` or `"O"`.
         stopbits: 1 or 2.

@@ -40,14 +40,11 @@ pub(crate) struct Map {
 impl Map {
     /// The words of `family`, with the plain parameters of its profile.
     pub(crate) fn new(family: &'static Family) -> Result<Self, ProfileError> {
+        let profile = Profile::builtin(family.name)?;
         let mut words = BTreeMap::new();
-        // A family may be simulated before it has a profile: then with the parameters it describes itself.
-        if Profile::builtin_names().any(|name| name == family.name) {
-            let profile = Profile::builtin(family.name)?;
-            for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
-                if let Some(address) = entry.address() {
-                    words.insert(address, Word::Parameter(parameter(family, &profile, entry, address)));
-                }
+        for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
+            if let Some(address) = entry.address() {
+                words.insert(address, Word::Parameter(parameter(family, &profile, entry, address)));
             }
         }
         words.extend(family.parameters.iter().map(|&known| (known.address, Word::Parameter(known))));

@@ -18,12 +18,20 @@ const GOODRIVE350: &[(u16, u16)] = &[(0x0001, 2), (0x0002, 0), (0x0006, 8)];
 
 const GOODRIVE600: &[(u16, u16)] = &[(0x0001, 2), (0x0006, 8)];
 
-const WAYS: [Way; 4] = [
+const WAYS: [Way; 7] = [
     Way { family: "gd350", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd35", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd35-h1", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd300", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
     Way { family: "gd600", control: GOODRIVE600, command: 0x2000, speed: 0x2001 },
     Way { family: "gd3000", control: GOODRIVE600, command: 0x2000, speed: 0x2001 },
     Way { family: "vfd500", control: &[(0x0002, 2)], command: 0x7000, speed: 0x7001 },
 ];
+
+/// The way of one family.
+fn way(family: &str) -> &'static Way {
+    WAYS.iter().find(|way| way.family == family).unwrap()
+}
 
 impl Way {
     /// A drive of the family that obeys the bus and has 10.00 Hz set.
@@ -103,16 +111,14 @@ fn each_code_does_what_its_family_says() {
 
 #[test]
 fn a_code_that_the_family_does_not_know_is_out_of_range_and_does_nothing() {
-    let unknown: [(&str, &[u16]); 4] =
-        [("gd350", &[0, 9, 0xFFFF]), ("gd600", &[0, 9]), ("gd3000", &[0, 9]), ("vfd500", &[9, 10, 0x0100])];
-    for ((family, codes), way) in unknown.into_iter().zip(&WAYS) {
-        assert_eq!(family, way.family);
+    for way in &WAYS {
+        let codes: &[u16] = if way.family == "vfd500" { &[9, 10, 0x0100] } else { &[0, 9, 10, 0xFFFF] };
         let mut bench = way.bench();
         let before = bench.drive().words_written();
         for &code in codes {
             bench.refuses_write(way.command, code, 0x04);
         }
-        assert_eq!((bench.drive().words_written(), seen(&bench)), (before, STILL), "{family}");
+        assert_eq!((bench.drive().words_written(), seen(&bench)), (before, STILL), "{}", way.family);
     }
 }
 
@@ -135,13 +141,13 @@ fn only_its_own_reset_ends_a_fault_and_nothing_starts_before() {
 #[test]
 fn commands_for_another_family_reach_nothing() {
     for code in 0..=9 {
-        let mut bench = WAYS[3].bench();
+        let mut bench = way("vfd500").bench();
         for address in [0x2000, 0xA000, 0x2001, 0x2009, 0x200A] {
             bench.refuses_write(address, code, 0x02);
         }
         assert_eq!(bench.ask(1, &write_many_pdu(0x2000, &[code, 1_000])), Some(vec![0x90, 0x02]));
         assert_eq!(seen(&bench), STILL, "vfd500 {code}");
-        for way in &WAYS[..3] {
+        for way in WAYS.iter().filter(|way| way.family != "vfd500") {
             let mut bench = way.bench();
             for address in [0x7000, 0xF000, 0x7001] {
                 bench.refuses_write(address, code, 0x02);
@@ -153,10 +159,26 @@ fn commands_for_another_family_reach_nothing() {
 
 #[test]
 fn each_family_is_known_by_its_code_or_by_having_none() {
-    let mut bench = Bench::of("gd350");
-    assert_eq!((bench.read::<1>(0x2103), bench.read::<1>(0x3016)), ([0x01A0], [0x01A0]));
+    for (family, code) in [("gd350", 0x01A0), ("gd35", 0x0108), ("gd35-h1", 0x0109), ("gd300", 0x010A)] {
+        let mut bench = Bench::of(family);
+        assert_eq!((bench.read::<1>(0x2103), bench.read::<1>(0x3016)), ([code], [code]), "{family}");
+    }
     for family in ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
+    }
+}
+
+#[test]
+fn a_goodrive35_is_ready_by_a_zero_and_takes_nine_inputs() {
+    for (family, ready, faulty, inputs) in
+        [("gd350", 0xC01, 0xC00, 0x3FF), ("gd300", 1, 0, 0x1FF), ("gd35", 0, 1, 0x1FF), ("gd35-h1", 0, 1, 0x1FF)]
+    {
+        let mut bench = Bench::of(family);
+        assert_eq!(bench.read::<1>(0x2101), [ready], "{family}");
+        bench.drive().trip(4).unwrap();
+        assert_eq!(bench.read::<1>(0x2101), [faulty], "{family}");
+        bench.write(0x200A, inputs);
+        bench.refuses_write(0x200A, inputs + 1, 0x04);
     }
 }
 
@@ -165,6 +187,8 @@ fn bit_15_means_what_the_family_says() {
     // The family, whether a plain address and one with bit 15 are kept; `None`: there is no such address.
     let rules = [
         ("gd350", 0x000B, true, Some(false)),
+        ("gd35", 0x000B, true, Some(false)),
+        ("gd300", 0x000B, true, Some(false)),
         ("gd600", 0x000A, true, None),
         ("gd3000", 0x0114, true, None),
         ("vfd500", 0x0007, false, Some(true)),
@@ -204,12 +228,12 @@ fn a_factory_reset_takes_every_parameter_back_and_wears_nothing() {
         assert_eq!(bench.drive().eeprom_writes(), worn, "{family}");
     }
     // The address and the history of faults stay; a motor that is fed is not reset under way.
-    let mut bench = WAYS[0].bench();
+    let mut bench = way("gd350").bench();
     bench.drive().trip(4).unwrap();
     bench.drive().factory_reset().unwrap();
     assert_eq!((bench.read::<1>(0x0E00), bench.read::<1>(0x071B), bench.read::<1>(0x0001)), ([1], [4], [0]));
-    let mut bench = WAYS[0].bench();
-    WAYS[0].command(&mut bench, 1);
+    let mut bench = way("gd350").bench();
+    way("gd350").command(&mut bench, 1);
     let refused = bench.drive().factory_reset().unwrap_err().to_string();
     assert_eq!(refused, "unit 1 is running; stop it before its parameters get their factory values");
     assert_eq!(bench.read::<1>(0x0001), [2]);
@@ -218,9 +242,10 @@ fn a_factory_reset_takes_every_parameter_back_and_wears_nothing() {
 #[test]
 fn a_silent_bus_has_the_number_of_the_family() {
     for (family, control, timeout, fault) in [
-        ("gd350", WAYS[0].control, 0x0E04, 18),
-        ("gd3000", WAYS[2].control, 0x0E04, 18),
-        ("vfd500", WAYS[3].control, 0x1E05, 34),
+        ("gd350", GOODRIVE350, 0x0E04, 18),
+        ("gd300", GOODRIVE350, 0x0E04, 18),
+        ("gd3000", GOODRIVE600, 0x0E04, 18),
+        ("vfd500", way("vfd500").control, 0x1E05, 34),
     ] {
         let mut bench = Bench::of(family);
         for &(address, value) in control {
@@ -252,9 +277,8 @@ fn four_families_on_one_line_each_take_their_own_codes() {
     let units = [(1, "gd350"), (2, "vfd500"), (3, "gd600"), (4, "gd3000")];
     let mut bench = Bench::line_of(&units, Options::default());
     assert_eq!(bench.simulator.name(), "sim:1=gd350,2=vfd500,3=gd600,4=gd3000");
-    let ways = [&WAYS[0], &WAYS[3], &WAYS[1], &WAYS[2]];
-    for ((unit, family), way) in units.into_iter().zip(ways) {
-        assert_eq!(family, way.family);
+    for (unit, family) in units {
+        let way = way(family);
         for &(address, value) in way.control.iter().chain([&(way.speed, 1_000), &(way.command, 1)]) {
             bench.write_to(unit, address, value);
         }

@@ -155,9 +155,9 @@ static FAMILIES: [&Family; 11] = [
 ];
 
 impl Family {
-    /// The family called `name`.
+    /// The family called `name`, in upper or lower case.
     pub(crate) fn named(name: &str) -> Option<&'static Self> {
-        FAMILIES.into_iter().find(|family| family.name == name)
+        FAMILIES.into_iter().find(|family| family.name.eq_ignore_ascii_case(name.trim()))
     }
 
     /// The names of all of them.
