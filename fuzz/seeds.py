@@ -221,7 +221,8 @@ def profiles() -> dict[str, bytes]:
         "bits-overlap": instead(0, "bits = [2, 1]", "bits = [15, 0]"),
         "max-words": instead(0, "max_words = 4", "max_words = 125"),
         "over-a-shipped-one": b'=== 0\nname = "a"\nsource = "b"\n[overlay]\nprofile = "gd350"\n',
-        "a-sister": b'=== 0\nname = "a"\nsource = "b"\ndrop = ["P00.03"]\n[extends]\nprofile = "gd350"\nassumption = "c"\n',
+        "a-sister": b'=== 0\nname = "a"\nsource = "b"\ndrop = ["P00.03"]\n'
+        b'[extends]\nprofile = "gd350"\nassumption = "c"\n',
         "over-itself": b'=== 0\nname = "a"\nsource = "b"\n[overlay]\nprofile = "./"\n',
         "two-words-at-the-end": instead(1, "0x3006", "0xFFFF"),
         "two-words-overlap": instead(1, "0x3006", "0x30FF").replace(b"0x7001", b"0x3100"),

@@ -1,9 +1,10 @@
 //! Loading: from the files of a folder to a checked [`Profile`].
 //!
 //! Everything a file can have wrong is found here, with file, line and reason; a `Profile` that exists is consistent.
-//! `manifest` knows the shape of `profile.toml`, `table` that of CSV files, `rows` what their cells mean, `entries` how
-//! rows lie over those of a profile below, `inherit` what may be trusted of that, `facts` and `motion` the tables of
-//! `profile.toml`, `assemble` what must agree between them.
+//! `manifest` knows the shape of `profile.toml`, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
+//! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
+//! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
+//! between them.
 
 mod assemble;
 mod entries;
@@ -13,6 +14,8 @@ mod manifest;
 mod motion;
 mod problems;
 mod rows;
+mod shape;
+mod succeed;
 mod table;
 
 use std::io::Read;
@@ -25,6 +28,8 @@ use problems::Problems;
 use crate::lookup::closest;
 use crate::profile::Profile;
 
+/// The files of a profile.
+const FILES: [&str; 4] = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"];
 /// Most bytes of one file.
 const MOST_BYTES: u64 = 1 << 20;
 /// Most profiles one below the other.
@@ -60,6 +65,18 @@ pub enum ProfileError {
         /// What is wrong with it, and what would be right.
         reason: String,
     },
+}
+
+impl ProfileError {
+    /// Where it stands among others, for people who mend file after file from the top.
+    fn place(&self) -> (usize, u64) {
+        let (file, line) = match self {
+            Self::Unknown { .. } => return (0, 0),
+            Self::Unreadable { file, .. } => (file, 0),
+            Self::Broken { file, line, .. } => (file, *line),
+        };
+        (FILES.iter().position(|name| file.ends_with(name)).unwrap_or_default(), line)
+    }
 }
 
 /// One file of a profile, in memory.
@@ -186,7 +203,9 @@ fn first(loaded: Result<Profile, Vec<ProfileError>>) -> Result<Profile, ProfileE
 /// Loads the profile in `folder`, below those in the folders `above`.
 fn load(folder: &Path, above: &[PathBuf]) -> Result<Profile, Vec<ProfileError>> {
     let manifest = read(folder, "profile.toml").map_err(|error| vec![error])?;
-    let table = |name: &str| folder.join(name).exists().then(|| read(folder, name)).transpose();
+    // A link that leads nowhere is there, and is named.
+    let is_there = |name: &str| folder.join(name).symlink_metadata().is_ok();
+    let table = |name: &str| is_there(name).then(|| read(folder, name)).transpose();
     let mut problems = Problems::default();
     let files = Files {
         manifest,
@@ -203,7 +222,13 @@ fn load(folder: &Path, above: &[PathBuf]) -> Result<Profile, Vec<ProfileError>> 
 /// Puts a profile together from `files`, and from the one below them.
 fn check_files(files: &Files, folder: Option<&Path>, above: &[PathBuf]) -> Result<Profile, Vec<ProfileError>> {
     let file = &files.manifest;
-    let manifest = manifest::read(file).map_err(|error| vec![error])?;
+    let manifest = manifest::read(file).map_err(|mut wrong| {
+        // What does not depend on it is checked all the same.
+        let mut problems = Problems::default();
+        rows::check(files, &mut problems);
+        wrong.append(&mut problems.into_all());
+        wrong
+    })?;
     let base = below(file, &manifest, folder, above)?;
     let mut problems = Problems::default();
     if base.is_none() {
@@ -290,7 +315,7 @@ fn read(folder: &Path, name: &str) -> Result<File, ProfileError> {
     let opened = std::fs::File::open(&path).map_err(|error| unreadable(error.to_string()))?;
     opened.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > MOST_BYTES {
-        return Err(unreadable(format!("the file has more than {MOST_BYTES} bytes")));
+        return Err(unreadable(format!("the file has more than {} MiB", MOST_BYTES >> 20)));
     }
     match String::from_utf8(bytes) {
         Ok(text) => Ok(File { name: file, text }),

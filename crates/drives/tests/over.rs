@@ -181,3 +181,55 @@ fn a_row_without_an_address_waits_for_one() {
     assert_eq!(full.find("oil_pressure").unwrap().address(), Some(0x3020));
     assert_eq!((full.family(), full.entries().count()), ("gd350", partly.entries().count()));
 }
+
+#[test]
+fn a_row_keeps_the_roles_of_the_one_in_whose_place_it_stands() {
+    const PARAMETERS: &str =
+        "code,name,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n";
+    let manifest = |name: &str, below: &str| format!("name = \"{name}\"\nsource = \"x\"\n{below}");
+    let below = r#"
+        title = "x"
+        [requests]
+        functions = [3, 6]
+        max_words = 1
+        source = "x"
+        [parameters]
+        address = "group.index"
+        last = ["P05.01"]
+        source = "x"
+        [commands]
+        register = "control_command"
+        moves = ["control_command"]
+        codes = { stop = 6, coast = 5 }
+        source = "x"
+        [state]
+        register = "status"
+        when = [{ is = "fault", fields = { tripped = 1 } }]
+        source = "x"
+        [bits]
+        status = [{ name = "tripped", bits = [3, 3] }]
+    "#;
+    let command = |place: &str| format!("{REGISTERS}{place},control_command,x,,1,no,,,,wo,yes,,x\n");
+    let status = |code: &str| format!("{PARAMETERS}{code},status,x,,1,no,,,,,,ro,,yes,,x\n");
+    let folder = Folder::new(
+        "roles",
+        &[
+            ("below/profile.toml", &manifest("below", below)),
+            ("below/registers.csv", &command("0x7000")),
+            ("below/parameters.csv", &status("P05.01")),
+            ("below/faults.csv", FAULTS),
+            ("profile.toml", &manifest("over", "[overlay]\nprofile = \"./below\"\n")),
+            ("registers.csv", &command("0x7100")),
+            ("parameters.csv", &status("P06.02")),
+        ],
+    );
+    let profile = folder.load().unwrap();
+    // P06.02 is at 0602H: 6 and 2 in hexadecimal.
+    assert_eq!(profile.role("state").unwrap().address(), Some(0x0602));
+    assert_eq!(profile.state(8), State::Fault);
+    assert_eq!(profile.find("status").unwrap().bits().len(), 1);
+    assert_eq!(profile.find("control_command").unwrap().quantity().choices().len(), 2);
+    assert_eq!(profile.command_address(), Some(0x7100));
+    assert!(profile.is_command(0x7100) && !profile.is_command(0x7000), "the old place is no command register any more");
+    assert!(profile.last_parameters().map(drivebus_drives::Entry::name).eq(["P06.02"]));
+}

@@ -10,7 +10,9 @@ use super::facts;
 use super::manifest::{self, Manifest, line};
 use super::motion;
 use super::problems::Problems;
-use super::{File, inherit, rows};
+use super::{File, inherit, rows, succeed};
+use crate::entry::Entry;
+use crate::lookup::closest;
 use crate::profile::Profile;
 use crate::roles::Roles;
 use crate::rules::{Groups, Requests, UnitKind};
@@ -31,7 +33,7 @@ pub(super) fn profile(
             profile.memory = problems.keep(facts::memory(file, memory));
         }
     }
-    let mut entries = entries(files, &mut profile, problems);
+    let mut entries = entries(files, manifest, &mut profile, problems);
     bits(file, manifest, &mut entries, problems);
 
     if let Some(parameters) = &manifest.parameters {
@@ -56,7 +58,7 @@ pub(super) fn profile(
         let signature = identification.signature.as_ref();
         profile.signature = signature.and_then(|row| facts::signature(file, &entries, row, problems));
     }
-    setpoints(file, manifest, &mut profile.setpoints, &entries, problems);
+    setpoints(file, manifest, profile.kind, &mut profile.setpoints, &entries, problems);
     if let Some(watchdog) = &manifest.watchdog {
         profile.watchdog = facts::watchdog(file, &entries, watchdog, problems);
     }
@@ -162,25 +164,35 @@ fn read_requests(file: &File, requests: &manifest::Requests) -> Result<Requests,
 }
 
 /// The rows of the tables over those of the profile below.
-fn entries(files: &Files, profile: &mut Profile, problems: &mut Problems) -> Entries {
+fn entries(files: &Files, manifest: &Manifest, profile: &mut Profile, problems: &mut Problems) -> Entries {
+    let before = problems.len();
     let mut all = Vec::new();
     let mut bounds = Vec::new();
+    let mut variants = Vec::new();
     let tables = [
         files.registers.as_ref().map(|file| (file, rows::registers(file, problems))),
         files.parameters.as_ref().map(|file| (file, rows::parameters(file, problems))),
     ];
+    let is_missing = profile.entries.is_empty() && tables.iter().any(Option::is_none);
     for (file, rows) in tables.into_iter().flatten() {
-        let of_row = |row: &rows::Located<crate::entry::Entry>| {
+        let of_row = |row: &rows::Located<Entry>| {
             let quantity = &row.item.quantity;
             [&quantity.low_from, &quantity.high_from].map(|bound| bound.clone().map(|bound| (row.line, bound)))
         };
+        let variant = |row: &rows::Located<Entry>| Some((row.line, row.item.quantity.variant.clone()?));
+        variants.push((file, rows.iter().filter_map(variant).collect::<Vec<_>>()));
         bounds.push((file, rows.iter().flat_map(of_row).flatten().collect::<Vec<_>>()));
         all.extend(rows.into_iter().map(|row| (file, row)));
     }
+    succeed::succeed(profile, all.iter_mut().map(|(_, row)| &mut row.item));
     let inherited = std::mem::take(&mut profile.entries);
-    let entries = Entries::merge(inherited, all, &profile.groups.closed, profile.memory.as_ref(), problems);
+    let mut entries = Entries::merge(inherited, all, &profile.groups.closed, profile.memory.as_ref(), problems);
+    entries.incomplete = is_missing || problems.len() > before;
     for (file, bounds) in bounds {
         entries.check_bounds(file, &bounds, problems);
+    }
+    for (file, wanted) in variants {
+        check_variants(file, &wanted, manifest, profile, problems);
     }
     entries
 }
@@ -194,18 +206,26 @@ fn bits(file: &File, manifest: &Manifest, entries: &mut Entries, problems: &mut 
     }
 }
 
-/// Variants first, then the rows that name one: each must be known.
+/// Checks that the variants that rows of `file` name, with their lines, are known.
+fn check_variants(
+    file: &File,
+    rows: &[(u64, String)],
+    manifest: &Manifest,
+    profile: &Profile,
+    problems: &mut Problems,
+) {
+    let known = || manifest.variants.keys().map(Spanned::get_ref).chain(profile.variants.keys()).map(String::as_str);
+    for (line, wanted) in rows.iter().filter(|(_, wanted)| !known().any(|known| known == wanted)) {
+        let closest = closest(wanted, known()).unwrap_or("none");
+        let reason = format!("variant \"{wanted}\" has no table in profile.toml; the closest is \"{closest}\"");
+        problems.add(file, *line, reason);
+    }
+}
+
 fn variants(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entries, problems: &mut Problems) {
     for (name, row) in &manifest.variants {
         let variant = facts::variant(file, entries, row, problems);
         profile.variants.extend(variant.map(|variant| (name.get_ref().clone(), variant)));
-    }
-    for entry in &entries.list {
-        if let Some(wanted) = entry.quantity.variant.as_ref().filter(|wanted| !profile.variants.contains_key(*wanted)) {
-            let reason =
-                format!("{} has the variant \"{wanted}\", and there is no table [variants.{wanted}]", entry.name);
-            problems.add(file, 1, reason);
-        }
     }
 }
 
@@ -242,11 +262,15 @@ fn lists(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entr
 fn setpoints(
     file: &File,
     manifest: &Manifest,
+    kind: UnitKind,
     known: &mut BTreeMap<Setpoint, SetpointRole>,
     entries: &Entries,
     problems: &mut Problems,
 ) {
     for (&setpoint, row) in &manifest.setpoints {
+        if kind == UnitKind::Rectifier && setpoint == Setpoint::Frequency {
+            problems.add(file, line(file, &row.register), "a rectifier feeds no motor: it has no frequency");
+        }
         let needs = facts::control(file, entries, &row.needs, problems);
         let register = entries.get(file, &row.register, problems).map(|entry| entry.name.clone());
         known.extend(register.map(|register| (setpoint, SetpointRole { register, needs })));

@@ -18,7 +18,7 @@ pub(super) struct Entries {
     pub(super) list: Vec<Entry>,
     pub(super) by_address: BTreeMap<u16, usize>,
     /// Some rows were broken, so that a name that is missing may be theirs.
-    incomplete: bool,
+    pub(super) incomplete: bool,
 }
 
 impl Entries {
@@ -30,14 +30,14 @@ impl Entries {
         memory: Option<&Memory>,
         problems: &mut Problems,
     ) -> Self {
-        let incomplete = !problems.is_empty();
         let mut own: Vec<Entry> = Vec::new();
         for (file, Located { line, item }) in rows {
             if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| names(other).any(|own| own == name)))
             {
                 problems.add(file, line, format!("{twice} is there twice"));
             } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
-                problems.add(file, line, format!("{} has the address {address:04X}H too", other.name));
+                let reason = format!("{} is at {address:04X}H, where {} is already", item.name, other.name);
+                problems.add(file, line, reason);
             } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
                 problems.add(file, line, reason);
             } else {
@@ -55,7 +55,7 @@ impl Entries {
             place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
         });
         let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.address?, index))).collect();
-        Self { list, by_address, incomplete }
+        Self { list, by_address, incomplete: false }
     }
 
     /// Checks that the bounds of `entries` of `file`, with their lines, are parameters.
@@ -63,9 +63,15 @@ impl Entries {
         for (line, bound) in bounds {
             let known = parse_code(bound).is_some() && self.list.iter().any(|entry| entry.name == *bound);
             if !known && !self.incomplete {
-                problems.add(file, *line, format!("bound \"{bound}\" is no parameter of this profile"));
+                let closest = closest(bound, self.codes()).unwrap_or("nothing at all");
+                let reason = format!("bound \"{bound}\" is no parameter of this profile; the closest is \"{closest}\"");
+                problems.add(file, *line, reason);
             }
         }
+    }
+
+    fn codes(&self) -> impl Iterator<Item = &str> {
+        self.list.iter().filter(|entry| entry.kind == Kind::Parameter).map(|entry| entry.name.as_str())
     }
 
     pub(super) fn find(&self, name: &str) -> Option<&Entry> {
@@ -134,8 +140,14 @@ fn out_of_place(entry: &Entry, closed_groups: &[u8], memory: Option<&Memory>) ->
     let address = entry.address?;
     let [group, _] = address.to_be_bytes();
     if entry.kind == Kind::Parameter && closed_groups.contains(&group) {
-        return Some(format!("{} is in a closed group", entry.name));
+        return Some(format!("{} is in the group {group}, which is one of \"closed_groups\"", entry.name));
     }
     let mask = memory.map_or(0, Memory::mask);
-    (address & mask != 0).then(|| format!("{} has the bit set that says where a write is kept", entry.name))
+    let bit = memory.map_or(0, |memory| memory.bit);
+    (address & mask != 0).then(|| {
+        format!(
+            "{} is at {address:04X}H, whose bit {bit} says where a write is kept: give the plain address",
+            entry.name
+        )
+    })
 }

@@ -60,6 +60,7 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Spanned<String>], probl
             base.other_commands.clear();
         }
         for entry in &mut base.entries {
+            entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {
                 bound.take_if(|code| *code == gone.name);
             }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{File, ProfileError, line_of};
+use super::{File, ProfileError, line_of, shape};
 use crate::command::Command;
 use crate::memory::MemoryBit;
 use crate::rules::UnitKind;
@@ -314,11 +314,11 @@ fn yes() -> bool {
     true
 }
 
-/// Reads `profile.toml`.
-pub(super) fn read(file: &File) -> Result<Manifest, ProfileError> {
-    toml::from_str(file.text()).map_err(|error| {
-        let start = error.span().map_or(0, |span| span.start);
-        file.broken(line_at(file, start), error.message())
+/// Reads `profile.toml`, or says all that is wrong with its shape.
+pub(super) fn read(file: &File) -> Result<Manifest, Vec<ProfileError>> {
+    toml::from_str(file.text()).map_err(|_| {
+        let problems = shape::problems::<Manifest>(file.text());
+        problems.into_iter().map(|(place, reason)| file.broken(line_at(file, place), reason)).collect()
     })
 }
 

@@ -8,6 +8,7 @@ use super::facts::check;
 use super::manifest::{Manifest, States, line};
 use super::problems::Problems;
 use crate::command::{Command, CommandCode};
+use crate::lookup::closest;
 use crate::profile::Profile;
 use crate::rules::UnitKind;
 use crate::state::{StateRule, StateWord};
@@ -125,8 +126,8 @@ fn by_bits(file: &File, table: &States, entries: &Entries, problems: &mut Proble
         let mut rule = StateRule { state: when.state, mask: 0, value: 0 };
         for (name, &value) in &when.fields {
             let Some(field) = register.bits.iter().find(|field| field.name == *name) else {
-                let known = register.bits.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
-                let reason = format!("{} has no bit field \"{name}\"; it has {known}", register.name);
+                let closest = closest(name, register.bits.iter().map(|field| field.name.as_str())).unwrap_or("none");
+                let reason = format!("{} has no bit field \"{name}\"; the closest is \"{closest}\"", register.name);
                 problems.add(file, line(file, spanned), reason);
                 continue;
             };

@@ -17,12 +17,17 @@ impl Problems {
         self.0.push(file.broken(line, reason));
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// All of them, as far as they can be told apart, in the order in which the files are read.
+    /// All of them, as far as they can be told apart, by file and line.
     pub(super) fn into_all(mut self) -> Vec<ProfileError> {
+        self.0.sort_by_key(ProfileError::place);
         let mut seen = Vec::new();
         self.0.retain(|problem| {
             let new = !seen.contains(problem);

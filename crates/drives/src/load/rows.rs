@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::problems::Problems;
 use super::table::{self, Columns, Row};
-use super::{File, ProfileError};
+use super::{File, Files, ProfileError};
 use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
@@ -16,6 +16,19 @@ use crate::quantity::{Quantity, limits, to_word};
 pub(super) struct Located<T> {
     pub(super) line: u64,
     pub(super) item: T,
+}
+
+/// Checks every row of every table by itself.
+pub(super) fn check(files: &Files, problems: &mut Problems) {
+    if let Some(file) = &files.registers {
+        registers(file, problems);
+    }
+    if let Some(file) = &files.parameters {
+        parameters(file, problems);
+    }
+    if let Some(file) = &files.faults {
+        faults(file, problems);
+    }
 }
 
 /// The rows of `registers.csv`.
@@ -124,9 +137,10 @@ pub(super) fn faults(file: &File, problems: &mut Problems) -> BTreeMap<u16, Faul
 /// How well a row is documented: its evidence, its note and its source. What is not verified says why.
 fn evidence(row: &Row<'_>) -> Result<(Evidence, String, String), ProfileError> {
     let cell = row.required("verified")?;
-    let evidence = Evidence::ALL.into_iter().find(|known| known.cell() == cell).ok_or_else(|| {
-        row.broken(format!("\"verified\" is \"{cell}\" and must be {}", Evidence::ALL.map(Evidence::cell).join(", ")))
-    })?;
+    let evidence = Evidence::ALL
+        .into_iter()
+        .find(|known| known.cell() == cell)
+        .ok_or_else(|| row.broken(format!("\"verified\" is \"{cell}\" and must be yes, no or assumed")))?;
     let (note, source) = (row.text("note"), row.text("source"));
     if evidence != Evidence::Verified && note.is_empty() {
         return Err(row.broken(format!("\"note\" is empty; where \"verified\" is {cell} it says what is missing")));
@@ -216,7 +230,9 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     quantity.low = bound(row, "low", &quantity)?;
     quantity.high = bound(row, "high", &quantity)?;
     match (quantity.low, quantity.high) {
-        (Some(low), Some(high)) if low > high => Err(row.broken("\"low\" is above \"high\"")),
+        (Some(low), Some(high)) if low > high => {
+            Err(row.broken(format!("\"low\" {} is above \"high\" {}", row.text("low"), row.text("high"))))
+        }
         _ => Ok(quantity),
     }
 }

@@ -6,6 +6,7 @@ use csv::StringRecord;
 
 use super::problems::Problems;
 use super::{File, ProfileError};
+use crate::lookup::closest;
 
 /// Most rows of one table.
 const MOST_ROWS: usize = 10_000;
@@ -58,14 +59,14 @@ fn headers(file: &File, columns: &Columns, reader: &mut csv::Reader<&[u8]>) -> R
     let headers = reader.headers().map_err(|error| broken(file, &error))?.clone();
     let all = || columns.required.iter().chain(columns.optional);
     if let Some(surplus) = headers.iter().find(|header| !all().any(|known| known == header)) {
-        let known: Vec<&str> = all().copied().collect();
-        return Err(file.broken(1, format!("unknown column \"{surplus}\"; the columns are {}", known.join(", "))));
+        let closest = closest(surplus, all().copied()).unwrap_or_default();
+        return Err(file.broken(1, format!("unknown column \"{surplus}\"; the closest is \"{closest}\"")));
     }
     let times = |column: &str| headers.iter().filter(|&header| header == column).count();
-    if let Some(missing) = columns.required.iter().find(|&&column| times(column) != 1) {
-        return Err(file.broken(1, format!("column \"{missing}\" must be there once")));
+    if let Some(missing) = columns.required.iter().find(|&&column| times(column) == 0) {
+        return Err(file.broken(1, format!("column \"{missing}\" is missing")));
     }
-    if let Some(twice) = columns.optional.iter().find(|&&column| times(column) > 1) {
+    if let Some(twice) = all().find(|&&column| times(column) > 1) {
         return Err(file.broken(1, format!("column \"{twice}\" is there twice")));
     }
     Ok(headers)
