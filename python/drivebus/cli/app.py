@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus.cli import backup, doctor, look, move, tools
-from drivebus.cli.names import complete_profile
+from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools
+from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output
 from drivebus.cli.session import Session, exit_code, parse_format
 
@@ -40,15 +40,16 @@ class _Commands(click.Group):
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed. "
     "Each option before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
-    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_JSON. This is not a safety function: an "
-    "emergency stop is a wire.",
+    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is "
+    "not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
     "-p",
     metavar="PORT",
     envvar="DRIVEBUS_PORT",
-    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, sim://gd350.",
+    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, or a simulated drive: "
+    f"sim:// and one of {', '.join(drivebus.profiles())}.",
 )
 @click.option(
     "--baud",
@@ -92,6 +93,22 @@ class _Commands(click.Group):
     shell_complete=complete_profile,
     help="Family or folder; without it, the drive is asked.",
 )
+@click.option(
+    "--unverified",
+    is_flag=True,
+    envvar="DRIVEBUS_UNVERIFIED",
+    help="Use what no document of this very family proves: rows and rules marked unverified or assumed.",
+)
+@click.option(
+    "--variant",
+    "variants",
+    multiple=True,
+    metavar="NAME=CHOICE",
+    envvar="DRIVEBUS_VARIANT",
+    callback=parse_variants,
+    shell_complete=complete_variant,
+    help="What a parameter of the drive makes of its registers, such as speed_unit=Hz.",
+)
 @click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="One JSON object a line.")
 @click.version_option(drivebus.__version__, prog_name="drivebus")
 @click.pass_context
@@ -103,17 +120,20 @@ def cli(
     rs485: str | None,
     unit: int,
     profile: str | None,
+    unverified: bool,
+    variants: dict[str, str],
     as_json: bool,
 ) -> None:
     """Control and watch variable-frequency drives over RS-485.
 
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
-    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485)
+    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485, unverified, variants)
 
 
-for command in (*look.COMMANDS, *doctor.COMMANDS, *move.COMMANDS, *backup.COMMANDS, *tools.COMMANDS):
-    cli.add_command(command)
+for module in (look, explain, doctor, move, backup, frames, profiles, tools):
+    for command in module.COMMANDS:
+        cli.add_command(command)
 
 
 def main() -> None:

@@ -167,7 +167,7 @@ class _Job:
         if self.out.as_json:
             self.out.record({"step": self.step, "title": text})
         else:
-            self.out.console.print(f"\n{self.step}. {text}", style="bold", markup=False)
+            self.out.heading(f"{self.step}. {text}")
 
     def expect(self, holds: bool, what: str, *, quietly: bool = False) -> None:
         if not holds:

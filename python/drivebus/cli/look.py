@@ -13,7 +13,6 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.output import Output
 from drivebus.cli.session import Session, pass_session
-from drivebus.protocols import ProfileProtocol
 
 __all__ = ["COMMANDS"]
 
@@ -124,7 +123,7 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
     out = session.out
     with session.drive() as drive:
         profile = drive.profile
-        known = [_named(profile, text) for text in wanted]
+        known = [names.named(profile, text) for text in wanted]
         taken = 0
         with Live(console=out.console, auto_refresh=False) if out.live else nullcontext() as live:
             try:
@@ -170,54 +169,4 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
         session.out.rows(["name", "value", "unit", "label"], rows)
 
 
-@click.command()
-@click.option("--all", "everything", is_flag=True, help="List every fault the family knows; asks no drive for faults.")
-@pass_session
-def faults(session: Session, everything: bool) -> None:
-    """Explain the present fault, and list the last ones."""
-    if everything:
-        known = session.known_profile().faults()
-        session.out.rows(
-            ["code", "mnemonic", "label", "verified"],
-            [[fault.code, fault.mnemonic, fault.label, fault.verified] for fault in known],
-        )
-        return
-    with session.drive() as drive:
-        present, history = drive.fault(), drive.fault_history()
-    session.out.say("No fault now." if present is None else f"Now: {present}")
-    if present is not None and not session.out.as_json:
-        session.out.facts({"cause": present.cause, "remedy": present.remedy})
-    listed = [("history", fault) for fault in history]
-    if session.out.as_json and present is not None:
-        listed.insert(0, ("now", present))
-    session.out.say("History, the latest first:" if history else "The history is empty.")
-    if listed:
-        session.out.rows(
-            ["when", "code", "mnemonic", "label", "cause", "remedy"],
-            [[when, fault.code, fault.mnemonic, fault.label, fault.cause, fault.remedy] for when, fault in listed],
-        )
-
-
-@click.command()
-@click.argument("name", shell_complete=names.complete_name)
-@pass_session
-def describe(session: Session, name: str) -> None:
-    """Say all that is known of a register or parameter. With --profile, no drive is asked."""
-    profile = session.known_profile()
-    known = profile.describe(_named(profile, name))
-    values = dict(vars(known))
-    values["address"] = f"{known.address:04X}H"
-    if not session.out.as_json:
-        values["choices"] = ", ".join(f"{number} = {label}" for number, label in (known.choices or {}).items())
-        values["bits"] = ", ".join(known.bits or {})
-    session.out.facts(values)
-
-
-def _named(profile: ProfileProtocol, text: str) -> str:
-    place = names.resolve(profile, text)
-    if isinstance(place, int):
-        raise drivebus.NotAllowed(f"{profile.name} has no name for address {place:04X}H; `read` takes it as it is")
-    return place
-
-
-COMMANDS = [ports, scan, info, status, monitor, read, faults, describe]
+COMMANDS = [ports, scan, info, status, monitor, read]

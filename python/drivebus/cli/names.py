@@ -17,14 +17,17 @@ __all__ = [
     "complete_assignment",
     "complete_name",
     "complete_profile",
+    "complete_units",
+    "complete_variant",
+    "named",
     "parse_assignment",
     "parse_hex",
     "parse_units",
+    "parse_variants",
     "resolve",
 ]
 
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
-_PARAMETER = re.compile(r"p\d\d\.\d\d", re.IGNORECASE)
 
 
 class Seconds(click.FloatRange):
@@ -47,7 +50,15 @@ def resolve(profile: ProfileProtocol, text: str) -> str | int:
     if match:
         address = int(match[1] or match[2], 16)
         return profile.name_at(address) or address
-    return text.upper() if _PARAMETER.fullmatch(text) else text
+    return text
+
+
+def named(profile: ProfileProtocol, text: str) -> str:
+    """As `resolve`, for what needs a name: an address without one is refused."""
+    place = resolve(profile, text)
+    if isinstance(place, int):
+        raise drivebus.NotAllowed(f"{profile.name} has no name for address {place:04X}H; `read` takes it as it is")
+    return place
 
 
 def parse_assignment(text: str) -> tuple[str, int | float | str]:
@@ -89,14 +100,35 @@ def parse_units(text: str) -> list[int]:
     return units
 
 
+def parse_variants(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, str]:
+    """Names and choices of texts such as `speed_unit=Hz`."""
+    chosen: dict[str, str] = {}
+    for text in texts:
+        name, equals, choice = (part.strip() for part in text.partition("="))
+        if not equals or not name or not choice:
+            raise click.BadParameter(f"{text!r} is no choice; write NAME=CHOICE, such as speed_unit=Hz")
+        if chosen.setdefault(name, choice) != choice:
+            raise click.BadParameter(f"{name} is given twice, as {chosen[name]} and as {choice}")
+    return chosen
+
+
 def _names(context: click.Context) -> list[str]:
+    """Registers and parameters; a parameter by its code and by the name that it may have."""
+    named = ((name, profile.describe(name).name) for profile in _profiles(context) for name in profile.names())
+    return list(dict.fromkeys(name for both in named for name in both))
+
+
+def _profiles(context: click.Context) -> list[drivebus.Profile]:
+    """The profile that stands on the line already; without one, all that are shipped."""
     asked = context.find_root().params.get("profile")
-    known = [asked] if asked in drivebus.profiles() else drivebus.profiles()
-    return [name for family in known for name in drivebus.Profile.builtin(family).names()]
+    try:
+        return [drivebus.Profile.find(asked)] if asked else [*map(drivebus.Profile.builtin, drivebus.profiles())]
+    except drivebus.NotAllowed:
+        return []
 
 
 def complete_name(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names and codes of the shipped profiles, for the shell."""
+    """Names and codes of the profile that is given, or of all, for the shell."""
     return [CompletionItem(name) for name in _names(context) if name.lower().startswith(incomplete.lower())]
 
 
@@ -106,5 +138,25 @@ def complete_assignment(context: click.Context, parameter: click.Parameter, inco
 
 
 def complete_profile(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of the shipped profiles, for the shell."""
-    return [CompletionItem(name) for name in drivebus.profiles() if name.startswith(incomplete)]
+    """Names of the shipped profiles, and folders, for the shell."""
+    known = [CompletionItem(name) for name in drivebus.profiles() if name.startswith(incomplete)]
+    return known or [CompletionItem(incomplete, type="dir")]
+
+
+def complete_units(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The families behind the last unit of `1=gd350,2=`, for the shell."""
+    before, equals, begun = incomplete.rpartition("=")
+    if not equals or "," in begun:
+        return []
+    return [CompletionItem(f"{before}={name}") for name in drivebus.profiles() if name.startswith(begun)]
+
+
+def complete_variant(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """What the registers of the profile that is given may be, for the shell."""
+    chosen = (
+        f"{name}={choice}"
+        for profile in _profiles(context)
+        for name, variant in profile.variants().items()
+        for choice in variant["choices"]
+    )
+    return [CompletionItem(text) for text in dict.fromkeys(chosen) if text.startswith(incomplete)]

@@ -47,6 +47,11 @@ class Output:
         if not self.as_json:
             self.console.print(text, markup=False)
 
+    def heading(self, text: str) -> None:
+        """A line above a section; nothing in JSON."""
+        if not self.as_json:
+            self.console.print(f"\n{text}", style="bold", markup=False)
+
     def facts(self, values: Mapping[str, Any]) -> None:
         """Names and values: a JSON object, or two columns."""
         if self.as_json:

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, cast
 
 import click
 
 import drivebus
 from drivebus.cli.output import Output
 
-__all__ = ["EXIT_CODES", "Session", "exit_code", "force_option", "parse_format", "pass_session", "yes_option"]
+__all__ = [
+    "EXIT_CODES",
+    "Session",
+    "exit_code",
+    "force_option",
+    "parse_format",
+    "pass_session",
+    "profile_of",
+    "yes_option",
+]
 
 EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
     (drivebus.NotAllowed, 2),
@@ -45,6 +54,8 @@ class Session:
         profile: Name or folder of a profile; None asks the drive.
         out: Where results go.
         rs485: Who switches the direction, as `drivebus.Bus` has it: `"kernel"`, `"rts"`, `"auto"`; None: the adapter.
+        unverified: Whether what no document of the very family proves may be used.
+        variants: What parameters of the drive make of its registers, by name.
     """
 
     port: str | None
@@ -54,6 +65,8 @@ class Session:
     profile: str | None
     out: Output
     rs485: str | None = None
+    unverified: bool = False
+    variants: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def direction(self) -> dict[str, object] | None:
@@ -91,8 +104,10 @@ class Session:
                 drive = self.drive_on(bus)
             except drivebus.DrivebusError:
                 click.echo(
-                    f"Unit {self.unit} was not told to {command}: it did not say what it is. With --profile (or "
-                    "DRIVEBUS_PROFILE) it is not asked, and told at once.",
+                    f"Unit {self.unit} was not told to {command}: the code for that depends on the family, and it did "
+                    f"not say which it is. If you know: drivebus --profile FAMILY … {command}, which asks it nothing "
+                    f"first (or set DRIVEBUS_PROFILE); families: {', '.join(drivebus.profiles())}. "
+                    "If it has to stand now, use the emergency stop.",
                     err=True,
                 )
                 raise
@@ -100,14 +115,15 @@ class Session:
 
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
         """The drive that the options name, on a bus that is open."""
-        return bus.drive(self.unit, self.profile)
+        options: dict[str, Any] = {"unverified": True} if self.unverified else {}
+        return bus.drive(self.unit, self.profile, **options)
 
     def known_profile(self) -> drivebus.Profile:
         """The profile that the options name, from the drive itself only if it has to be asked."""
         if self.profile is not None:
-            return drivebus.Profile.find(self.profile)
+            return drivebus.Profile.find(self.profile).with_variants(self.variants)
         with self.drive() as drive:
-            return drivebus.Profile.find(drive.profile.name)
+            return profile_of(drive)
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
         """As `ask`, but only where the motor turns, or may: what stands still is not moved by *what*."""
@@ -124,6 +140,11 @@ class Session:
             raise _Declined("without a terminal this needs --yes; nothing was written")
         if not click.confirm("Is the machine clear, and shall it be done?", err=True):
             raise _Declined("nothing was written")
+
+
+def profile_of(drive: drivebus.Drive) -> drivebus.Profile:
+    """What a drive of a `drivebus.Bus` was opened with; the drive itself asks for less."""
+    return cast(drivebus.Profile, drive.profile)
 
 
 pass_session = click.make_pass_decorator(Session)

@@ -1,4 +1,4 @@
-"""Commands around the line: frames by hand, a simulated drive, profiles, shell completion, the demonstration."""
+"""Commands around the line: a simulated drive, shell completion, the demonstration."""
 
 from __future__ import annotations
 
@@ -10,69 +10,21 @@ from click.shell_completion import get_completion_class
 
 import drivebus
 from drivebus.cli import demo as demonstration
-from drivebus.cli import names
-from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.names import complete_units
+from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
 
-_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x08})
-"""Function codes that change nothing in a unit."""
-
 
 @click.command()
-@click.argument("data", metavar="HEX...", nargs=-1, required=True)
-@yes_option
-@pass_session
-def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
-    """Send any request and show the answer: unit and PDU in hexadecimal, without the CRC.
-
-    As the serial assistants of the manuals: `drivebus raw 01 03 21 00 00 01`.
-    """
-    body = names.parse_hex(data)
-    if not 2 <= len(body) <= 254:
-        raise click.UsageError(f"{len(body)} bytes is no request; give the unit, then 1..253 bytes of PDU, and no CRC")
-    unit, pdu = body[0], body[1:]
-    if not 1 <= unit <= 247:
-        raise click.UsageError(f"unit {unit:02X} is nobody who answers; the first byte is the unit, 01..F7")
-    with session.bus() as bus:
-        if pdu[0] not in _READS:
-            session.ask(f"Function {pdu[0]:02X}H writes, which can move the motor", yes, unit)
-        _show_frame(session, "sent", _framed(body))
-        try:
-            answer = bus.transact(unit, pdu)
-        except drivebus.Refused as error:
-            _show_frame(session, "answer", error.raw)
-            if session.profile is not None:
-                name, meaning = drivebus.Profile.find(session.profile).exception(error.code)
-                session.out.say(f"{'':<7}{session.profile} means by it: {name}, {meaning}")
-            raise
-        _show_frame(session, "answer", _framed(bytes([unit]) + answer))
-
-
-@click.command()
-@click.argument("data", metavar="HEX...", nargs=-1, required=True)
-@pass_session
-def decode(session: Session, data: tuple[str, ...]) -> None:
-    """Take a whole frame apart, CRC included."""
-    _show_frame(session, "frame", names.parse_hex(data))
-
-
-def _framed(body: bytes) -> bytes:
-    return body + drivebus.crc16(body).to_bytes(2, "little")
-
-
-def _show_frame(session: Session, what: str, frame: bytes) -> None:
-    decoded = drivebus.rtu.decode(frame)
-    if session.out.as_json:
-        fields = {name: value for name, value in vars(decoded).items() if value is not None}
-        session.out.record({"what": what, "hex": frame, **fields})
-    else:
-        session.out.say(f"{what:<7}{frame.hex(' ').upper()}")
-        session.out.say(f"{'':<7}{decoded!r}")
-
-
-@click.command()
-@click.option("--units", default="1=gd350", show_default=True, metavar="LIST", help="Such as 1=gd350,2=gd350.")
+@click.option(
+    "--units",
+    default="1=gd350",
+    show_default=True,
+    metavar="LIST",
+    shell_complete=complete_units,
+    help=f"Such as 1=gd350,2=vfd500. There are {', '.join(drivebus.profiles())}.",
+)
 @click.option("--transport", type=click.Choice(["pty", "tcp"]), default="pty", show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Makes chance repeatable.")
 @click.option(
@@ -150,14 +102,6 @@ def _simulated(text: str) -> dict[int, str]:
 
 
 @click.command()
-@pass_session
-def profiles(session: Session) -> None:
-    """List the families of drives that are known."""
-    known = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
-    session.out.rows(["name", "title", "registers"], [[each.name, each.title, len(each.names())] for each in known])
-
-
-@click.command()
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 @click.pass_context
 def completion(context: click.Context, shell: str) -> None:
@@ -181,4 +125,4 @@ def demo(session: Session) -> None:
     demonstration.run(session.out)
 
 
-COMMANDS = [raw, decode, sim, profiles, completion, demo]
+COMMANDS = [sim, completion, demo]

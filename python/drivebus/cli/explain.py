@@ -1,0 +1,120 @@
+"""Commands that explain: what a name means, what a fault means, and whether the answer can be trusted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+import drivebus
+from drivebus.cli import names
+from drivebus.cli.session import Session, pass_session, profile_of
+
+__all__ = ["COMMANDS"]
+
+_MATCHES = 20
+"""Most rows that a search shows: who has more of them asks for something narrower."""
+
+
+@click.command()
+@click.argument("text", metavar="TEXT...", nargs=-1, required=True, shell_complete=names.complete_name)
+@pass_session
+def describe(session: Session, text: tuple[str, ...]) -> None:
+    """Say all that is known of a register or parameter, or search for one.
+
+    A name, code or address is described. Anything else (`drivebus describe torque`) lists what has it in its name,
+    label, choices or note, best first. With --profile, no drive is asked.
+    """
+    profile = session.known_profile()
+    wanted = " ".join(text)
+    try:
+        known = profile.describe(names.named(profile, wanted))
+    except drivebus.NotAllowed:
+        found = profile.search(wanted, limit=_MATCHES)
+        if not found:
+            raise
+        _show_matches(session, profile, wanted, found)
+        return
+    values = dict(vars(known))
+    values["address"] = None if known.address is None else f"{known.address:04X}H"
+    if not session.out.as_json:
+        values["choices"] = ", ".join(f"{number} = {label}" for number, label in known.choices.items())
+        values["bits"] = ", ".join(known.bits or {})
+        del values["verified"]  # `evidence` says more
+    session.out.facts(values)
+
+
+def _show_matches(session: Session, profile: drivebus.Profile, wanted: str, found: list[str]) -> None:
+    session.out.say(f"{profile.name} has no {wanted!r}; what comes near:")
+    session.out.rows(
+        ["name", "code", "address", "unit", "label", "evidence"], [_match(profile, name) for name in found]
+    )
+    if len(found) == _MATCHES:
+        session.out.say(f"Only the first {_MATCHES} are shown; more words, or a longer one, narrow it.")
+
+
+def _match(profile: drivebus.Profile, name: str) -> list[Any]:
+    known = profile.describe(name)
+    address = None if known.address is None else f"{known.address:04X}H"
+    return [known.name, known.code, address, known.unit, known.label, known.evidence]
+
+
+@click.command()
+@click.option("--all", "everything", is_flag=True, help="List every fault the family knows; asks no drive for faults.")
+@pass_session
+def faults(session: Session, everything: bool) -> None:
+    """Explain the present fault, and list the last ones, with the values the drive kept of the last."""
+    if everything:
+        _show_all(session)
+        return
+    with session.drive() as drive:
+        present, history, values = drive.fault(), drive.fault_history(), _values_of_the_last(drive)
+    out = session.out
+    if out.as_json:
+        listed = [("now", present)] if present is not None else []
+        out.rows(["when", *_COLUMNS], [[when, *_row(fault)] for when, fault in [*listed, *_numbered(history)]])
+        if values:
+            out.record({"when": "values at the last fault", **{name: value for name, value, _, _ in values}})
+        return
+    out.say("No fault now." if present is None else f"Now: {present}")
+    if present is not None:
+        out.facts({"cause": present.cause, "remedy": present.remedy})
+    out.say("History, the latest first:" if history else "The history is empty.")
+    if history:
+        out.rows(["when", *_COLUMNS], [[when, *_row(fault)] for when, fault in _numbered(history)])
+    if values:
+        out.say("What the drive kept of the last fault:")
+        out.rows(["parameter", "value", "unit", "label"], values)
+
+
+_COLUMNS = ["code", "mnemonic", "label", "cause", "remedy", "verified"]
+
+
+def _row(fault: drivebus.Fault) -> list[Any]:
+    return [fault.code, fault.mnemonic, fault.label, fault.cause, fault.remedy, fault.verified]
+
+
+def _numbered(history: list[drivebus.Fault]) -> list[tuple[str, drivebus.Fault]]:
+    return [("last" if number == 0 else f"{number} before", fault) for number, fault in enumerate(history)]
+
+
+def _show_all(session: Session) -> None:
+    known = session.known_profile().faults()
+    if not known and not session.out.as_json:
+        session.out.say("No fault of this family is known by number; the drive's manual has them.")
+    session.out.rows(_COLUMNS, [_row(fault) for fault in known])
+
+
+def _values_of_the_last(drive: drivebus.Drive) -> list[list[Any]]:
+    """What the parameters hold in which the drive keeps the values of its last fault, where it has such."""
+    rows = []
+    for name in profile_of(drive).fault_values:
+        known = drive.describe(name)
+        try:
+            rows.append([known.code or known.name, drive.read(name), known.unit, known.label])
+        except (drivebus.NotAllowed, drivebus.Refused):
+            continue  # not every drive of a family has all of them, and some are not known well enough
+    return rows
+
+
+COMMANDS = [faults, describe]

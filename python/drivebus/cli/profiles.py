@@ -1,0 +1,122 @@
+"""`drivebus profiles`: the families that are known, what is known of each, and help for who writes one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+import drivebus
+from drivebus.cli import rules, skeleton
+from drivebus.cli.names import complete_profile
+from drivebus.cli.session import Session, pass_session
+
+__all__ = ["COMMANDS"]
+
+KINDS = ("registers", "parameters", "faults")
+
+
+@click.group(invoke_without_command=True)
+@pass_session
+@click.pass_context
+def profiles(context: click.Context, session: Session) -> None:
+    """List the families of drives that are known; show one; check or begin one of your own."""
+    if context.invoked_subcommand is not None:
+        return
+    rows = []
+    for name in drivebus.profiles():
+        profile = drivebus.Profile.builtin(name)
+        counts = profile.counts()
+        rows.append([name, profile.title, profile.kind, *(counts[kind]["total"] for kind in KINDS), _printed(counts)])
+    session.out.rows(["name", "title", "kind", *KINDS, "verified"], rows)
+    session.out.say(
+        "verified: rows that a document of this very family prints. `drivebus profiles show NAME` has more."
+    )
+
+
+def _printed(counts: dict[str, dict[str, int]]) -> str:
+    """The share of rows that a document of the family itself prints."""
+    total = sum(counts[kind]["total"] for kind in KINDS)
+    doubtful = sum(counts[kind]["unverified"] + counts[kind]["assumed"] for kind in KINDS)
+    return f"{(total - doubtful) * 100 // total} %" if total else ""
+
+
+@profiles.command()
+@click.argument("family", shell_complete=complete_profile)
+@pass_session
+def show(session: Session, family: str) -> None:
+    """Say all rules of a family (or of a folder) in words, and how well its rows are known."""
+    profile = drivebus.Profile.find(family)
+    counts = profile.counts()
+    if session.out.as_json:
+        session.out.record({**rules.known(profile), "counts": counts})
+        return
+    for title, lines in rules.in_words(profile):
+        session.out.heading(title)
+        for line in lines:
+            session.out.say(f"  {line}")
+    session.out.heading("Rows, and how well they are known")
+    session.out.rows(rules.COUNTED, [rules.counted(kind, counts[kind]) for kind in KINDS])
+
+
+@profiles.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@pass_session
+@click.pass_context
+def check(context: click.Context, session: Session, folder: Path) -> None:
+    """Name everything that is wrong in the profile in FOLDER: file, line, what stands there, what would be right.
+
+    Ends with exit code 2 if anything is. A profile is read, never executed.
+    """
+    problems = drivebus.Profile.check(folder)
+    for problem in problems:
+        if session.out.as_json:
+            session.out.record(problem)
+        else:
+            session.out.say(_placed(problem))
+    if problems:
+        some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+        click.echo(f"Error: {folder} has {some}; nothing of it is used until it has none.", err=True)
+        context.exit(2)
+    counts = drivebus.Profile.load(folder).counts()
+    rows = ", ".join(f"{counts[kind]['total']} {kind}" for kind in KINDS)
+    session.out.say(f"{folder} is sound: {rows}.")
+
+
+def _placed(problem: dict[str, Any]) -> str:
+    where = problem["file"] if problem["line"] is None else f"{problem['file']}, line {problem['line']}"
+    return f"{where}: {problem['reason']}"
+
+
+@profiles.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--like", metavar="FAMILY", shell_complete=complete_profile, help="Take over what is not said anew.")
+@click.option("--overlay", metavar="FAMILY", shell_complete=complete_profile, help="Add to a profile what you know.")
+@pass_session
+def new(session: Session, folder: Path, like: str | None, overlay: str | None) -> None:
+    """Begin a profile: write its files, with comments that say what goes where. Nothing is overwritten."""
+    if like is not None and overlay is not None:
+        raise click.UsageError("--like or --overlay: a profile stands beside another, or over it")
+    base = like or overlay
+    if base is not None:
+        drivebus.Profile.builtin(base)
+    written = skeleton.files(folder.resolve().name, like=like, overlay=overlay)
+    there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
+    if there:
+        raise click.UsageError(f"{folder} has {', '.join(there)} already; nothing was written")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in written.items():
+            with (folder / name).open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+    except OSError as error:
+        raise click.UsageError(f"{error.filename or folder}: {error.strerror or error}") from error
+    if session.out.as_json:
+        session.out.record({"folder": str(folder), "files": list(written)})
+    else:
+        session.out.say(f"{folder}: {', '.join(written)}")
+        session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
+
+
+COMMANDS = [profiles]

@@ -1,0 +1,215 @@
+"""The rules of a family for people to read: what `drivebus profiles show` prints.
+
+Whatever may be used only with `unverified=True` says so, with its reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import drivebus
+
+__all__ = ["COUNTED", "counted", "in_words", "known"]
+
+COUNTED = ["rows", "total", "with a source", "without", "unverified", "assumed"]
+
+
+def counted(kind: str, counts: Mapping[str, int]) -> list[Any]:
+    """A row of the table of `COUNTED`."""
+    return [kind, *(counts[column] for column in ("total", "sourced", "unsourced", "unverified", "assumed"))]
+
+
+def known(profile: drivebus.Profile) -> dict[str, Any]:
+    """The same rules for programs."""
+    return {
+        "name": profile.name,
+        "family": profile.family,
+        "title": profile.title,
+        "kind": profile.kind,
+        "version": profile.version,
+        "functions": profile.functions,
+        "max_words": profile.max_words,
+        "requests": profile.requests(),
+        "source": profile.source,
+        "serial": profile.serial(),
+        "identifications": profile.identifications(),
+        "signature": profile.signature(),
+        "command_register": profile.command_address,
+        "commands": profile.commands(),
+        "command_codes": profile.command_codes(),
+        "commands_not_usable": _reasons(profile),
+        "states": _states(profile),
+        "state_reason": profile.state_reason(),
+        "memory": profile.memory(),
+        "control": profile.control(),
+        "setpoints": {
+            name: {"register": profile.role(f"setpoints.{name}"), "needs": profile.needs(name)}
+            for name in profile.setpoint_names()
+        },
+        "variants": profile.variants(),
+        "watchdog": None if profile.watchdog is None else vars(profile.watchdog),
+        "left_alone": {"serial": profile.serial_parameters(), "motor": profile.motor_parameters()},
+    }
+
+
+def in_words(profile: drivebus.Profile) -> Iterator[tuple[str, list[str]]]:
+    """Title and lines of each section; a section that has nothing to say says that."""
+    over = "" if profile.family == profile.name else f", over {profile.family}"
+    yield (
+        f"{profile.name}: {profile.title}",
+        [
+            f"{profile.kind}, profile version {profile.version}{over}",
+            f"made from: {profile.source}",
+        ],
+    )
+    yield "Line", _line(profile)
+    yield "Identification", _identification(profile)
+    yield "Commands", _commands(profile)
+    yield "States", _state_lines(profile)
+    yield "Memory", _memory(profile.memory())
+    yield "What must be set before it obeys the bus", _needs(profile.control())
+    yield "Setpoints over the bus", _setpoints(profile)
+    if profile.variants():
+        yield "What a parameter decides", list(_variants(profile))
+    yield "If the bus falls silent", _watchdog(profile)
+    yield "Left alone by a restore, unless asked", _left_alone(profile)
+
+
+def _line(profile: drivebus.Profile) -> list[str]:
+    functions = ", ".join(f"{function:02X}H" for function in profile.functions)
+    words = "1 word" if profile.max_words == 1 else f"{profile.max_words} words"
+    requests = profile.requests()
+    lines = [f"functions {functions}; {words} in one request at most{_doubt(requests['verified'], requests['note'])}"]
+    if not requests["across_groups"]:
+        lines.append("no read leaves its group of parameters")
+    serial = profile.serial()
+    if serial is None:
+        return [*lines, "its factory setting is not known"]
+    unit = "" if serial["unit"] is None else f", unit {serial['unit']}"
+    doubt = "" if serial["verified"] else " [unverified]"
+    return [*lines, f"factory setting: {serial['baud_rate']} bit/s {serial['format']}{unit}{doubt}"]
+
+
+def _identification(profile: drivebus.Profile) -> list[str]:
+    lines = []
+    for row in profile.identifications():
+        if row["family"] != profile.family:
+            continue
+        shared = f"; shared with {', '.join(row['shared'])}" if row["shared"] else ""
+        lines.append(f"{row['code']:04X}H is {row['title']}{shared}{_doubt(row['verified'], row['note'])}")
+    register = profile.role("identification")
+    if lines and register is not None:
+        lines.insert(0, f"asked in {_place(profile, register)}")
+    signature = profile.signature()
+    if signature is not None:
+        told = [
+            f"{what} {', '.join(f'{address:04X}H' for address in signature[key])}"
+            for key, what in (("answers", "answers"), ("refuses", "refuses"))
+            if signature[key]
+        ]
+        lines.append(f"told by what it does with reads: {'; '.join(told)}")
+    return lines or ["it does not say what it is; give --profile"]
+
+
+def _commands(profile: drivebus.Profile) -> list[str]:
+    codes = profile.command_codes()
+    if profile.command_address is None or not codes:
+        return ["none known: it cannot be run or stopped over the bus"]
+    reasons = _reasons(profile)
+    by_code = {code: name for name, code in profile.commands().items()}
+    lines = [f"written to {profile.command_address:04X}H"]
+    for code, label in sorted(codes.items()):
+        name = by_code.get(code)
+        reason = reasons.get(name or "")
+        lines.append(f"{code:>3} {label.replace('_', ' ')}{'' if reason is None else f' [not usable: {reason}]'}")
+    return lines
+
+
+def _reasons(profile: drivebus.Profile) -> dict[str, str]:
+    reasons = {name: profile.command_reason(name) for name in profile.commands()}
+    return {name: reason for name, reason in reasons.items() if reason is not None}
+
+
+def _states(profile: drivebus.Profile) -> dict[str, Any]:
+    register = profile.role("state")
+    if register is None:
+        return {}
+    word = profile.describe(register)
+    codes: dict[Any, Any] = dict(word.choices)
+    return codes or {field: dict(values) for field, values in (word.bits or {}).items()}
+
+
+def _state_lines(profile: drivebus.Profile) -> list[str]:
+    register = profile.role("state")
+    if register is None:
+        return ["none known"]
+    lines = [f"read in {_place(profile, register)}"]
+    reason = profile.state_reason()
+    if reason is not None:
+        lines.append(f"not usable without --unverified: {reason}")
+    for what, means in _states(profile).items():
+        if isinstance(means, str):
+            lines.append(f"{what:>3} {means.replace('_', ' ')}")
+        else:
+            lines.append(f"{what}: {', '.join(f'{value} = {label}' for value, label in means.items())}")
+    return lines
+
+
+def _memory(memory: Mapping[str, Any] | None) -> list[str]:
+    if memory is None:
+        return ["no write to RAM alone is known: every write of a parameter may wear EEPROM, and needs --store"]
+    ram = "RAM only, without it EEPROM too" if memory["means"] == "ram" else "EEPROM too, without it RAM only"
+    lines = [f"a parameter written with bit {memory['bit']} of its address set goes to {ram}"]
+    if memory["reason"] is not None:
+        lines.append(f"not usable without --unverified: {memory['reason']}")
+    return lines
+
+
+def _needs(rows: list[dict[str, Any]]) -> list[str]:
+    return [
+        f"{row['code']} = {row['value']}: {row['label']}{_doubt(row['verified'], row['note'])}" for row in rows
+    ] or ["nothing known"]
+
+
+def _setpoints(profile: drivebus.Profile) -> list[str]:
+    lines = []
+    for name in profile.setpoint_names():
+        register = profile.role(f"setpoints.{name}")
+        if register is None:
+            continue
+        lines.append(f"{name.replace('_', ' ')}: {_place(profile, register)}")
+        lines += [f"  needs {line}" for line in _needs(profile.needs(name)) if profile.needs(name)]
+    return lines or ["none known"]
+
+
+def _variants(profile: drivebus.Profile) -> Iterator[str]:
+    for name, variant in profile.variants().items():
+        reason = "" if variant["reason"] is None else f" [{variant['reason']}]"
+        yield f"{name}: {variant['parameter']} is one of {', '.join(variant['choices'])}{reason}"
+        yield f"  to say which: --variant {name}={next(iter(variant['choices']))}"
+
+
+def _watchdog(profile: drivebus.Profile) -> list[str]:
+    watchdog = profile.watchdog
+    if watchdog is None:
+        return ["nothing known"]
+    actions = " or ".join(watchdog.actions)
+    doubt = "" if watchdog.verified else " [unverified]"
+    return [f"after {watchdog.timeout}, {watchdog.action} makes it {actions}{doubt}"]
+
+
+def _left_alone(profile: drivebus.Profile) -> list[str]:
+    kinds = (("line", profile.serial_parameters()), ("motor", profile.motor_parameters()))
+    return [f"{what}: {', '.join(codes)}" for what, codes in kinds if codes] or ["nothing known"]
+
+
+def _place(profile: drivebus.Profile, name: str) -> str:
+    row = profile.describe(name)
+    return f"{name}, whose address is not known" if row.address is None else f"{name} ({row.address:04X}H)"
+
+
+def _doubt(verified: bool, note: str) -> str:
+    if verified:
+        return ""
+    return f" [unverified: {note}]" if note else " [unverified]"

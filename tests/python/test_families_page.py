@@ -1,0 +1,124 @@
+"""docs/families.md keeps the counts that `drivebus profiles show` prints, and both agree with the CSV files.
+
+The oracle reads the files plainly, and applies what docs/profiles.md says of what a sister family takes over. It shares
+no code with the package.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+import drivebus
+from drivebus.cli import cli
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PROFILES = ROOT / "crates/drives/profiles"
+FAMILIES = sorted(path.name for path in PROFILES.iterdir() if path.is_dir())
+KINDS = ("registers", "parameters", "faults")
+BEGIN, END = "<!-- counts: kept by tests/python/test_families_page.py -->\n", "<!-- end of counts -->"
+
+Row = dict[str, str]
+
+
+def names_of(row: Row) -> set[str]:
+    return {row[column] for column in ("name", "code") if row.get(column)}
+
+
+def rows_of(family: str) -> dict[str, list[Row]]:
+    """The rows of each table as a family has them, its sister's among them."""
+    manifest: dict[str, Any] = tomllib.loads((PROFILES / family / "profile.toml").read_text(encoding="utf-8"))
+    own: dict[str, list[Row]] = {}
+    for kind in KINDS:
+        path = PROFILES / family / f"{kind}.csv"
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        own[kind] = list(csv.DictReader(io.StringIO(text)))
+    extends = manifest.get("extends")
+    if extends is None:
+        return own
+    gone, confirmed = set(manifest.get("drop", [])), set(extends.get("confirmed", []))
+    addresses = {address_of(row) for kind in KINDS[:2] for row in own[kind]} - {None}
+    stated = set().union(*(names_of(row) for kind in KINDS[:2] for row in own[kind]))
+    numbers = {row["code"] for row in own["faults"]}
+    for kind, rows in rows_of(extends["profile"]).items():
+        for row in rows:
+            sure = "faults" in confirmed if kind == "faults" else bool(names_of(row) & confirmed)
+            if kind == "faults":
+                replaced = row["code"] in numbers
+            else:
+                replaced = bool(names_of(row) & (gone | stated)) or address_of(row) in addresses
+            if not replaced:
+                doubtful = row["verified"] == "yes" and not sure
+                own[kind].append({**row, "verified": "no" if doubtful else row["verified"]})
+    return own
+
+
+def address_of(row: Row) -> int | None:
+    code = re.fullmatch(r"[Pr](\d+)\.(\d+)", row.get("code", ""))
+    if code:
+        return int(code[1]) << 8 | int(code[2])
+    return int(row["address"].rstrip("Hh"), 16) if row.get("address") else None
+
+
+def counted(rows: list[Row]) -> dict[str, int]:
+    sourced = sum(bool(row["source"].strip()) for row in rows)
+    return {
+        "total": len(rows),
+        "sourced": sourced,
+        "unsourced": len(rows) - sourced,
+        "unverified": sum(row["verified"] == "no" for row in rows),
+        "assumed": sum(row["verified"] == "assumed" for row in rows),
+    }
+
+
+def shown(family: str) -> dict[str, dict[str, int]]:
+    result = CliRunner().invoke(cli, ["--json", "profiles", "show", family])
+    assert result.exit_code == 0, result.output
+    counts: dict[str, dict[str, int]] = json.loads(result.stdout)["counts"]
+    return counts
+
+
+def test_every_folder_is_shipped() -> None:
+    assert sorted(drivebus.profiles()) == FAMILIES
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_counts_are_those_of_the_files(family: str) -> None:
+    oracle = {kind: counted(rows) for kind, rows in rows_of(family).items()}
+    assert shown(family) == oracle
+    # For people, the same numbers.
+    text = CliRunner().invoke(cli, ["profiles", "show", family]).stdout
+    for kind in KINDS:
+        numbers = re.search(rf"^{kind} +(\d+) +(\d+) +(\d+) +(\d+) +(\d+)$", text, re.MULTILINE)
+        assert numbers is not None, text
+        assert [int(number) for number in numbers.groups()] == list(oracle[kind].values())
+
+
+def test_the_page_has_the_counts() -> None:
+    lines = [
+        "| family | rows | total | with a source | without | unverified | assumed |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for family in FAMILIES:
+        for kind, counts in shown(family).items():
+            lines.append(f"| `{family}` | {kind} | {' | '.join(str(number) for number in counts.values())} |")
+    table = "\n".join(lines) + "\n"
+    page = (ROOT / "docs/families.md").read_text(encoding="utf-8")
+    _, begin, rest = page.partition(BEGIN)
+    assert begin, f"docs/families.md lacks {BEGIN!r}"
+    now, end, _ = rest.partition(END)
+    assert end, f"docs/families.md lacks {END!r}"
+    assert now == table, f"docs/families.md must hold, between its markers:\n{table}"
