@@ -1,7 +1,7 @@
 //! The planner against a search through every possible plan.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use drivebus_drives::{Profile, ReadCost, ReadSpan, plan_reads};
+use drivebus_drives::{Access, Entry, Profile, ReadCost, ReadSpan, plan_reads};
 use proptest::prelude::*;
 
 /// The least cost and, at that cost, the fewest reads that cover `wanted`, by trying every read that could cover the
@@ -129,4 +129,32 @@ fn nothing_is_read_for_no_names() {
     let plan = Profile::builtin("gd350").unwrap().compile(&[]).unwrap();
     assert!(plan.reads().is_empty());
     assert_eq!((plan.words(), plan.values(&[1]).count()), (0, 0));
+}
+
+/// VFD500 manual, appendix A.3: a read stays inside one group of parameters; r16.00 takes two words.
+#[test]
+fn no_read_leaves_its_group_and_none_cuts_a_value_in_two() {
+    let profile = Profile::builtin("vfd500").unwrap();
+    let readable: Vec<&Entry> = profile.entries().filter(|entry| entry.access() != Access::Wo).collect();
+    let spans = profile.plan(readable.iter().copied()).unwrap();
+    for span in &spans {
+        assert_eq!(span.address >> 8, (span.address + span.count - 1) >> 8, "{span:?}");
+        assert!(span.count <= 16, "{span:?}");
+    }
+    for entry in &readable {
+        let first = entry.address().unwrap();
+        let whole = |span: &&ReadSpan| {
+            span.address <= first && first + entry.words() <= span.address + span.count
+        };
+        assert_eq!(spans.iter().filter(whole).count(), 1, "{}", entry.name());
+    }
+    // P00.07 and P00.08 stand side by side; r25.00 and r27.00 do not, whatever lies between.
+    let pair = |one: &str, other: &str| {
+        profile.plan([profile.find(one).unwrap(), profile.find(other).unwrap()]).unwrap().len()
+    };
+    assert_eq!((pair("P00.07", "P00.08"), pair("r25.00", "r27.00"), pair("r16.00", "r16.00")), (1, 2, 1));
+
+    let meter = profile.compile(&[profile.find("r16.00").unwrap()]).unwrap();
+    let values: Vec<String> = meter.values(&[0x86A0, 0x0001]).map(|(_, value)| value.unwrap().to_string()).collect();
+    assert_eq!(values, ["100000"], "the low word comes first (manual, p. 137)");
 }
