@@ -159,7 +159,9 @@ def _toml(text: str) -> dict[str, Any]:
     except ValueError as error:
         # The line is the parser's whole document; which line of the file it is, is said elsewhere.
         reason = re.sub(r"at line 1, column", "at column", str(error)).replace("end of document", "end of line")
-        raise Wrong(f"{text if len(text) <= 80 else f'{text[:77]}...'} is no TOML: {reason}") from None
+        # What cannot be printed would do something to the terminal that shows it.
+        shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+        raise Wrong(f"{shown if len(shown) <= 80 else f'{shown[:77]}...'} is no TOML: {reason}") from None
 
 
 def _head(file: _File, key: str, value: object) -> None:
