@@ -143,9 +143,7 @@ fn no_read_leaves_its_group_and_none_cuts_a_value_in_two() {
     }
     for entry in &readable {
         let first = entry.address().unwrap();
-        let whole = |span: &&ReadSpan| {
-            span.address <= first && first + entry.words() <= span.address + span.count
-        };
+        let whole = |span: &&ReadSpan| span.address <= first && first + entry.words() <= span.address + span.count;
         assert_eq!(spans.iter().filter(whole).count(), 1, "{}", entry.name());
     }
     // P00.07 and P00.08 stand side by side; r25.00 and r27.00 do not, whatever lies between.
