@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
+from drivebus.errors import BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.evidence import Evidence
 from drivebus.looking import Seen
 from drivebus.setpoints import Setpoints
 from drivebus.values import ControlSource
@@ -53,11 +54,8 @@ class Commanding(Setpoints):
         reasons = {halt: self._evidence.unusable(halt) for halt in ("stop", "coast")}
         if all(reasons.values()):
             told = "; ".join(f"{halt}: {(reason or '').rstrip('.')}" for halt, reason in reasons.items())
-            raise NotAllowed(
-                f"a motor that unit {self.unit} starts could not be stopped over the bus ({told}); nothing that moves "
-                "it was sent. With unverified=True (`--unverified`) what is assumed of it is used",
-                unit=self.unit,
-            )
+            what = f"a motor that unit {self.unit} starts could not be stopped over the bus"
+            raise self._evidence.missing(what, told, _both_unusable)
 
     async def _command(self, name: str, setpoint: int | None = None) -> None:
         """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
@@ -137,3 +135,8 @@ class Commanding(Setpoints):
             "It was not repeated",
             unit=self.unit,
         )
+
+
+def _both_unusable(evidence: Evidence) -> str | None:
+    """Why a motor could not be stopped; None if it could."""
+    return evidence.unusable("stop") and evidence.unusable("coast")

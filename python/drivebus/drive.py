@@ -121,9 +121,10 @@ class Drive:
     analog_output_1 = _Setpoint("analog_output_1")
     analog_output_2 = _Setpoint("analog_output_2")
 
-    def monitored(self) -> list[str]:
-        """The monitor registers of the family that may be read."""
-        return self._operations.monitored()
+    @documented_by(Operations.readable)
+    def readable(self, *names: str) -> list[str]:
+        """See `Operations.readable`."""
+        return self._operations.readable(*names)
 
     def describe(self, name: str) -> Description:
         """All that is known of a register or parameter. Nothing is sent.

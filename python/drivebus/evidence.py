@@ -7,7 +7,7 @@ cannot be asked for in any case. Profiles know which is which, and why; here the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from drivebus.errors import NotAllowed
 from drivebus.protocols import ProfileProtocol
@@ -82,27 +82,35 @@ class Evidence:
 
     def commands(self, name: str) -> None:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
-        self._profile.command(name)
         reason = self.unusable(name)
+        if name not in self._profile.commands():
+            raise NotAllowed(f"{reason}; nothing was sent to unit {self._unit}", unit=self._unit)
         if reason is not None:
             raise not_verified(f"the command {name} of {self._profile.title}", reason, self._unit)
 
     def unusable(self, command: str) -> str | None:
         """Why *command* may not be given; None if it may."""
-        try:
-            self._profile.command(command)
-        except NotAllowed as error:
-            return str(error)
+        if command not in self._profile.commands():
+            return f"no command {command} of {self._profile.title} is known"
         return None if self._unverified else self._profile.command_reason(command)
 
     def without_state(self) -> str | None:
         """Why the family's states may not be used; None if they may."""
-        if self._profile.role("state") is None:
-            return self._profile.state_reason() or f"no state word of {self._profile.title} is known"
-        reason = self.unreadable(self._profile.role("state") or "")
-        if reason is not None:
-            return reason
-        return None if self._unverified else self._profile.state_reason()
+        word = self._profile.role("state")
+        if word is None:
+            return f"no state word of {self._profile.title} is known"
+        return self.unreadable(word) or (None if self._unverified else self._profile.state_reason())
+
+    def without_fault(self) -> str | None:
+        """Why the present fault may not be read; None if it may."""
+        register = self._profile.role("fault")
+        return f"no fault register of {self._profile.title} is known" if register is None else self.unreadable(register)
+
+    def missing(self, what: str, reason: str, better: Callable[[Evidence], str | None]) -> NotAllowed:
+        """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
+        helps = better(Evidence(self._profile, self._unit, True)) is None
+        hint = "; with unverified=True (`--unverified`) what is assumed of it is used" if helps else ""
+        return NotAllowed(f"{what}: {_sentence(reason)} Nothing was sent to unit {self._unit}{hint}", unit=self._unit)
 
     def rule(self, what: str, reason: str | None) -> None:
         """Raises `NotAllowed` if *what* has a *reason* not to be used, and nobody said that it may be all the same."""

@@ -100,8 +100,8 @@ def _questions(profile: ProfileProtocol) -> tuple[int | None, Sequence[int]]:
     if signature is not None:
         return None, (*signature["answers"], *signature["refuses"])
     # Whether it has the words that are always asked of its family is better than nothing.
-    known = [profile.describe(name).address for role in ("state", "fault") if (name := profile.role(role))]
-    return None, [address for address in known if address is not None]
+    known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
+    return None, [each.address for each in known if each.address is not None and each.evidence != "assumed"]
 
 
 def _named(code: int) -> str:

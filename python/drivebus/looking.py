@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from drivebus.errors import NotAllowed
+from drivebus.evidence import Evidence
 from drivebus.protocols import PlanProtocol, ProfileProtocol
 from drivebus.registers import Registers
 from drivebus.values import ControlSource, Fault, State
@@ -71,11 +72,8 @@ class Looks(Registers):
         """
         seen = await self._glance(urgent=urgent)
         if self._planned_look().plan is None:
-            raise NotAllowed(
-                f"nothing of the state of unit {self.unit} may be read: {seen.missing['state'].rstrip('.')}. Nothing "
-                "was sent; with unverified=True (`--unverified`) what is assumed of it is used",
-                unit=self.unit,
-            )
+            what = f"nothing of the state of unit {self.unit} may be read"
+            raise self._evidence.missing(what, seen.missing["state"], Evidence.without_state)
         return seen
 
     async def _glance(self, *, urgent: bool = False) -> Seen:
@@ -139,15 +137,11 @@ class Looks(Registers):
 
     def _plan_look(self) -> _Look:
         missing: dict[str, str] = {}
-        state = self.profile.role("state")
-        no_state = self._evidence.without_state()
+        state, fault = self.profile.role("state"), self.profile.role("fault")
+        no_state, no_fault = self._evidence.without_state(), self._evidence.without_fault()
+        words = self._evidence.readable(word for word in self.profile.status_words if word != state)
         if no_state is not None:
             state, missing["state"] = None, no_state
-        words = self._evidence.readable(word for word in self.profile.status_words if word != state)
-        fault = self.profile.role("fault")
-        no_fault = f"no fault register of {self.profile.title} is known" if fault is None else None
-        if fault is not None:
-            no_fault = self._evidence.unreadable(fault)
         if no_fault is not None:
             fault, missing["fault"] = None, no_fault
         names = [*([state] if state else []), *words, *([fault] if fault else [])]
@@ -161,12 +155,8 @@ class Looks(Registers):
         name = self.profile.role("state")
         if reason is None and name is not None:
             return name
-        raise NotAllowed(
-            f"{what} of unit {self.unit} needs a state word, and that of {self.profile.title} may not be used: "
-            f"{(reason or '').rstrip('.')}. Nothing was sent; with unverified=True (`--unverified`) what is assumed of "
-            "it is used",
-            unit=self.unit,
-        )
+        needs = f"{what} needs a state word, and that of {self.profile.title} may not be used"
+        raise self._evidence.missing(needs, reason or "", Evidence.without_state)
 
     def _state_of(self, word: int) -> State:
         try:

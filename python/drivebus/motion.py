@@ -120,9 +120,11 @@ class Motion(Commanding):
         """Ends a jog by the jog's own ramp. Errors as for `stop`; without such a command they say what does."""
         drive = self.trusting(unverified)
         if "jog_stop" not in self.profile.commands():
+            jogs = "jog_forward" in self.profile.commands()
+            ends = ": stop() ends it along the ramp, coast() takes the voltage off" if jogs else ", nor one to jog"
             raise NotAllowed(
-                f"{self.profile.title} has no command that ends a jog alone: stop() ends it along the ramp, coast() "
-                f"takes the voltage off; nothing was sent to unit {self.unit}",
+                f"{self.profile.title} has no command that ends a jog alone{ends}; "
+                f"nothing was sent to unit {self.unit}",
                 unit=self.unit,
             )
         await drive._halt("jog_stop", confirm)

@@ -12,6 +12,7 @@ from drivebus import checks
 from drivebus.backup import Keeping
 from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.evidence import Evidence
 from drivebus.looking import Seen
 from drivebus.terminals import Terminals
 from drivebus.values import Fault, Snapshot, State, Status
@@ -37,19 +38,10 @@ class Operations(Keeping, Terminals):
         the reason.
 
         Raises:
-            NotAllowed: Nothing of it may be read. Nothing was sent.
             NoAnswer, BadAnswer, Refused: See each.
         """
         drive = self.trusting(unverified)
-        seen = await drive._glance()
-        status = await drive._status(seen)
-        if drive._planned_look().plan is None and status.frequency is None and status.setpoint is None:
-            raise NotAllowed(
-                f"nothing of the status of unit {self.unit} may be read: {seen.missing['state'].rstrip('.')}. Nothing "
-                "was sent; with unverified=True (`--unverified`) what is assumed of it is used",
-                unit=self.unit,
-            )
-        return status
+        return await drive._status(await drive._glance())
 
     async def _status(self, seen: Seen) -> Status:
         missing = dict(seen.missing)
@@ -97,13 +89,9 @@ class Operations(Keeping, Terminals):
             NotAllowed: The family has no fault register that is known, or verified. Nothing was sent.
         """
         drive = self.trusting(unverified)
-        reason = drive._planned_look().missing.get("fault")
+        reason = drive._evidence.without_fault()
         if reason is not None:
-            raise NotAllowed(
-                f"the present fault of unit {self.unit} may not be read: {reason.rstrip('.')}. Nothing was sent; with "
-                "unverified=True (`--unverified`) what is assumed of it is used",
-                unit=self.unit,
-            )
+            raise drive._evidence.missing("the present fault may not be read", reason, Evidence.without_fault)
         return (await drive._glance()).fault
 
     async def fault_history(self, *, unverified: bool = False) -> list[Fault]:
@@ -133,11 +121,30 @@ class Operations(Keeping, Terminals):
             NoAnswer, BadAnswer, Refused: See each.
         """
         drive = self.trusting(unverified)
-        return await drive.snapshot(*(names or drive.monitored()))
+        return await drive.snapshot(*(names or drive.readable()))
 
-    def monitored(self) -> list[str]:
-        """The monitor registers of the family that may be read."""
-        return self._evidence.readable(self.profile.monitor_names())
+    def readable(self, *names: str) -> list[str]:
+        """*names*, or without any the monitor registers of the family that may be read. Nothing is sent.
+
+        Raises:
+            NotAllowed: An unknown name, one that is not verified, or one whose meaning a parameter of the drive decides
+                (`variants` of `bus.drive` says which).
+        """
+        if not names:
+            return [name for name in self._evidence.readable(self.profile.monitor_names()) if not self._open(name)]
+        self._evidence.reads(names)
+        for name in filter(self._open, names):
+            rules = self.profile.variants()[self.profile.describe(name).variant or ""]
+            raise NotAllowed(
+                f"what {name} means depends on {rules['parameter']} of unit {self.unit}: give variants=… to "
+                f"bus.drive() ({', '.join(map(repr, rules['choices']))})",
+                unit=self.unit,
+            )
+        return list(names)
+
+    def _open(self, name: str) -> bool:
+        """Whether a parameter of the drive decides what *name* means, and nobody said how."""
+        return self.profile.describe(name).variant in self._open_variants
 
     async def wait_for_speed(
         self, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False

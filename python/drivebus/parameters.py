@@ -121,6 +121,12 @@ class Parameters(Looks):
                 unit=self.unit,
             )
         self._evidence.writes(name)
+        if known.kind == "parameter" and not store and self.profile.memory() is None:
+            raise NotAllowed(
+                f"no way to write {name} to RAM alone is known of {self.profile.title}, so every write may wear its "
+                f"EEPROM; nothing was sent to unit {self.unit}. With store=True (`--store`) it is kept there",
+                unit=self.unit,
+            )
         raw = self.profile.encode(name, value)
         address = self.profile.address(name, store=store)
         if known.kind == "parameter" and (address != known.address or not store):

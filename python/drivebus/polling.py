@@ -40,6 +40,9 @@ class PolledDrive(Protocol):
     def profile(self) -> object:
         """What its words mean."""
 
+    def readable(self, *names: str) -> list[str]:
+        """*names*, or those that it reads when it is asked for nothing else, if they may be read."""
+
 
 class Target(NamedTuple):
     """What is asked in each cycle of one drive, or of one unit that no profile is known of."""
@@ -247,7 +250,7 @@ def _target(bus: object, key: Any, names: object) -> Target:
     if not isinstance(profile, Profile):
         raise NotAllowed(f"the profile of unit {unit} is none of this package's; poll it by addresses", unit=unit)
     if names is None:
-        names = profile.monitor_names()
+        names = drive.readable()
     elif isinstance(names, str):
         names = [names]
     elif not isinstance(names, Iterable):
@@ -256,7 +259,8 @@ def _target(bus: object, key: Any, names: object) -> Target:
     unfit = next((name for name in wanted if not isinstance(name, str)), None)
     if unfit is not None:
         raise NotAllowed(f"name {unfit!r} of unit {unit} is no text", unit=unit)
-    plan = profile.compile(list(dict.fromkeys(wanted)))
+    asked = list(dict.fromkeys(wanted))
+    plan = profile.compile(drive.readable(*asked) if asked else asked)
     if not plan.names:
         raise NotAllowed(f"nothing is asked of unit {unit}; give names, or None for its monitor registers", unit=unit)
     return Target(key, unit, drive, profile, plan, plan.names, plan.native)

@@ -120,8 +120,8 @@ class Setpoints(Controls):
         if register is None:
             known = ", ".join(self.profile.setpoint_names())
             raise NotAllowed(
-                f"no {setpoint.replace('_', ' ')} setpoint of {self.profile.title} is known, only {known or 'none'}; "
-                f"nothing was sent to unit {self.unit}",
+                f"no {setpoint.replace('_', ' ')} setpoint of {self.profile.title} is known"
+                f"{f', only {known}' if known else ''}; nothing was sent to unit {self.unit}",
                 unit=self.unit,
             )
         return register

@@ -133,7 +133,7 @@ class Status:
         setpoint: Set frequency in force, in Hz.
         fault: The present fault, or None.
         fields: Every field of the status word in the drive's own words.
-        time: Unix time in seconds at which the status words were asked for.
+        time: Unix time in seconds at which the first of it was asked for; 0.0 where nothing was.
         missing: What is not told here, by attribute, and why.
     """
 
@@ -150,7 +150,7 @@ class Status:
     missing: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        parts = [str(self.state)]
+        parts = ["state not told" if "state" in self.missing else str(self.state)]
         if self.frequency is not None or self.setpoint is not None:
             parts.append(f"{_hertz(self.frequency)} of {_hertz(self.setpoint)} Hz")
         if self.ready is not None:
@@ -277,9 +277,7 @@ class Description:
 class Link:
     """How well one unit could be reached: its last exchanges, ten at most.
 
-    Attributes:
-        good: How many of them brought an answer; a refusal is one.
-        asked: How many there were, 0..10.
+    Attributes: *good*, how many of them brought an answer (a refusal is one), and *asked*, how many there were.
     """
 
     good: int
