@@ -124,7 +124,8 @@ class Looks(Registers):
         if self._evidence.without_state() is None:
             await self.state()
             return
-        named = [self.profile.role("state"), self.profile.role("fault"), *self.profile.monitor_names()]
+        roles = [self.profile.role("state"), self.profile.role("fault")]
+        named = [*roles, *self.profile.monitor_names(), *self.profile.names()]
         for name in self._evidence.readable(name for name in named if name is not None):
             await self.read_words(self.profile.address(name))
             return

@@ -52,13 +52,8 @@ class Settings:
                 f"{drive.profile.title} has no communication time-out that is known; nothing was sent", unit=drive.unit
             )
         if not (settings.verified or drive.unverified):
-            described = map(drive.profile.describe, (settings.timeout, settings.action))
-            reason = next((known.reason or known.note for known in described if known.reason or known.note), None)
-            raise not_verified(
-                f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})",
-                reason,
-                drive.unit,
-            )
+            what = f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})"
+            raise not_verified(what, settings.note, drive.unit)
         high = drive.profile.describe(settings.timeout).high
         self.timeout = checks.number("timeout", timeout, 0.0, math.inf if high is None else high, above=True)
         self.action = checks.one_of("action", action, list(settings.actions))

@@ -1,0 +1,172 @@
+"""What a unit is taken for, and how sure that is. Codes: GD350 manual, chapter 9.4.5 and p. 329; GD300-LIFT, p. 130."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+
+import pytest
+
+import drivebus
+import drivebus.aio
+from drivebus import Bus, Identification, NotAllowed, Simulator
+
+UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
+CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator(UNITS, transport="process", clock="virtual") as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def bus(simulator: Simulator) -> Iterator[Bus]:
+    with Bus(simulator, timeout=0.25) as bus:
+        yield bus
+
+
+def answer(simulator: Simulator, unit: int, *words: int) -> None:
+    """The next answer on the line."""
+    body = bytes([unit, 3, 2 * len(words), *b"".join(word.to_bytes(2, "big") for word in words)])
+    simulator.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "certainty", "family", "candidates", "code"),
+    [
+        (1, "certain", "gd350", ("gd350",), 0x01A0),
+        (2, "shared", None, ("gd300", "Goodrive300L lift drive"), 0x010A),
+        (3, "by answers", "vfd500", ("vfd500",), None),
+        (4, "unknown", None, (), None),
+        (5, "certain", "gd35", ("gd35",), 0x0108),
+    ],
+)
+def test_how_sure_it_is(
+    simulator: Simulator,
+    bus: Bus,
+    unit: int,
+    certainty: str,
+    family: str | None,
+    candidates: tuple[str, ...],
+    code: int | None,
+) -> None:
+    found = bus.identify(unit)
+    assert (found.unit, found.certainty, found.family) == (unit, certainty, family)
+    assert (found.candidates, found.code) == (candidates, code)
+    assert f"unit {unit}: " in str(found)
+    assert found.reason in str(found)
+    assert simulator.drive(unit).writes() == []
+
+
+def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus) -> None:
+    bus.read(1, CODE)  # first contact is over
+    answer(simulator, 1, 0x010D)
+    found = bus.identify(1)
+    assert (found.certainty, found.family, found.candidates) == ("unverified", "gd10", ("gd10",))
+    answer(simulator, 1, 0x010D)
+    with pytest.raises(NotAllowed, match=r"010DH, which is a gd10, a family without a profile"):
+        bus.drive(1, unverified=True)
+
+
+def test_a_code_that_nobody_knows_does_not_fall_to_another_family(simulator: Simulator, bus: Bus) -> None:
+    bus.read(3, FAULT_500)
+    answer(simulator, 3, 0x0199)
+    found = bus.identify(3)  # answers the rest as a VFD500, but those refuse this one
+    assert (found.certainty, found.candidates, found.code) == ("unknown", (), 0x0199)
+
+
+def test_a_drive_is_taken_only_if_that_is_sure(bus: Bus) -> None:
+    assert bus.drive(1).profile.name == "gd350"
+    assert bus.drive(2).profile.name == "gd300"  # the only one of those that report 010AH which has a profile
+    with pytest.raises(NotAllowed, match=r"may be vfd500 \(by answers.*profile=….*unverified=True"):
+        bus.drive(3)
+    assert bus.drive(3, unverified=True).profile.name == "vfd500"
+    for unverified in (False, True):
+        with pytest.raises(NotAllowed, match=r"what it is, is not known.*gd600.*profile=…") as refused:
+            bus.drive(4, unverified=unverified)
+        assert "unverified=True" not in str(refused.value)
+    assert bus.drive(4, "gd600").profile.name == "gd600"
+
+
+def test_who_stays_silent_is_silent(bus: Bus) -> None:
+    for ask in (bus.identify, bus.drive):
+        with pytest.raises(drivebus.NoAnswer):
+            ask(9)
+    with pytest.raises(NotAllowed):
+        bus.identify(0)
+
+
+def test_a_scan_tells_how_sure_it_is(simulator: Simulator, bus: Bus) -> None:
+    found = {each.unit: (each.profile, each.certainty) for each in bus.scan(range(1, 8))}
+    assert found == {
+        1: ("gd350", "certain"),
+        2: ("gd300", "shared"),
+        3: ("vfd500", "by answers"),
+        4: (None, "unknown"),
+        5: ("gd35", "certain"),
+        6: (None, "unknown"),
+    }
+    assert all(simulator.drive(unit).writes() == [] for unit in UNITS)
+
+
+def test_both_faces_ask_and_tell_the_same(simulator: Simulator, bus: Bus) -> None:
+    async def main() -> list[Identification]:
+        with Simulator(UNITS, transport="process", clock="virtual") as other:
+            async with drivebus.aio.Bus(other, timeout=0.25) as awaitable:
+                told = [await awaitable.identify(unit) for unit in UNITS]
+                with pytest.raises(NotAllowed, match="may be vfd500"):
+                    await awaitable.drive(3)
+                assert (await awaitable.drive(3, unverified=True)).unverified
+                return told
+
+    assert asyncio.run(main()) == [bus.identify(unit) for unit in UNITS]
+
+
+class TestAfterThePortWasOpenedAgain:
+    """Another drive may answer there; a family without a code is known by what it answers and refuses."""
+
+    @staticmethod
+    def reopen(simulator: Simulator, bus: Bus) -> None:
+        simulator.line.unplug()
+        with pytest.raises(drivebus.PortError):
+            bus.read(3, FAULT_500)
+        simulator.line.replug()
+
+    def test_the_same_one_is_written_to(self, simulator: Simulator, bus: Bus) -> None:
+        drive = bus.drive(3, "vfd500")
+        drive.torque = 10.0
+        self.reopen(simulator, bus)
+        drive.torque = 20.0
+        assert [value for _, _, value in simulator.drive(3).writes()] == [1000, 2000]
+
+    @pytest.mark.parametrize(("address", "word"), [(CODE, 0x01A0), (CODE, 0)])
+    def test_another_one_is_not(
+        self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, address: int, word: int
+    ) -> None:
+        drive = bus.drive(3, "vfd500")
+        drive.torque = 10.0
+        self.reopen(simulator, bus)
+        read = bus.read
+        monkeypatch.setattr(bus, "read", lambda *what, **how: [word] if what[1] == address else read(*what, **how))
+        with pytest.raises(NotAllowed, match=r"another drive answers as unit 3.*2103H refused.*2103H answered"):
+            drive.torque = 20.0
+        assert [value for _, _, value in simulator.drive(3).writes()] == [1000]
+
+    def test_one_without_a_signature_is_known_by_its_state_word(
+        self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        drive = bus.drive(4, "gd600")
+        drive.write("P01.20", 5.0, store=True)
+        self.reopen(simulator, bus)
+        read = bus.read
+
+        def other(unit: int, address: int, *rest: int, **how: bool) -> list[int]:
+            if address == 0x2100:
+                raise drivebus.Refused("no such address", code=2)
+            return read(unit, address, *rest, **how)
+
+        monkeypatch.setattr(bus, "read", other)
+        with pytest.raises(NotAllowed, match="another drive answers as unit 4"):
+            drive.write("P01.20", 6.0, store=True)
