@@ -111,7 +111,7 @@ def test_a_scan_tells_how_sure_it_is(simulator: Simulator, bus: Bus) -> None:
     assert all(simulator.drive(unit).writes() == [] for unit in UNITS)
 
 
-def test_both_faces_ask_and_tell_the_same(simulator: Simulator, bus: Bus) -> None:
+def test_both_faces_ask_and_tell_the_same(bus: Bus) -> None:
     async def main() -> list[Identification]:
         with Simulator(UNITS, transport="process", clock="virtual") as other:
             async with drivebus.aio.Bus(other, timeout=0.25) as awaitable:
