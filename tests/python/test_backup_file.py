@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import tomli
@@ -225,6 +226,42 @@ def test_any_edit_is_taken_or_refused_in_words(place: int, length: int, edit: by
 def test_any_file_is_refused_in_words(file: Path, data: bytes, said: str) -> None:
     file.write_bytes(data)
     with pytest.raises(NotAllowed, match=said):
+        Backup.load(file)
+
+
+@pytest.mark.parametrize("path", ["", ".", 5, b"drive.toml", None, "a\0b"])
+def test_what_is_no_path_is_refused(virtual: Simulator, virtual_drive: Drive, path: Any) -> None:
+    before = virtual.line.requests
+    with pytest.raises(NotAllowed):
+        virtual_drive.restore(path)
+    with pytest.raises(NotAllowed):
+        virtual_drive.backup(path if path is not None else ".")
+    assert virtual.line.requests - before <= 1  # who it is
+
+
+@pytest.mark.parametrize("word", ["dry_run", "serial", "motor", "force"])
+def test_what_is_neither_true_nor_false_is_refused(virtual_drive: Drive, word: str) -> None:
+    """`restore(kept, ["P00"])` would be a dry run of everything."""
+    kept = virtual_drive.backup()
+    with pytest.raises(NotAllowed, match=f"{word} .* is neither True nor False"):
+        virtual_drive.restore(kept, **{word: ["P00"]})  # type: ignore[arg-type]
+
+
+def test_a_file_of_a_profile_of_somebodys_own_says_so(virtual_bus: Bus, tmp_path: Path) -> None:
+    (tmp_path / "profile.toml").write_text(
+        'name = "mine"\nversion = 3\nsource = "notes"\n[overlay]\nprofile = "gd350"\n'
+    )
+    (tmp_path / "parameters.csv").write_text(
+        "code,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n"
+        "P08.09,Jog ramp,s,10,no,0.0,,3600.0,,,run,,yes,,notes\n"
+    )
+    mine = drivebus.Profile.load(tmp_path)
+    file = tmp_path / "drive.toml"
+    virtual_bus.drive(1, mine).backup(file)
+    assert (Backup.load(file, mine).origin.profile, Backup.load(file, mine).origin.profile_version) == ("mine", 3)
+    file.write_text(file.read_text() + "P08.09 = { value = 1.0, raw = 10 }\n")
+    assert Backup.load(file, mine)["P08.09"] == 1.0
+    with pytest.raises(NotAllowed, match="read with the profile 'mine', and checked against 'gd350'"):
         Backup.load(file)
 
 

@@ -25,8 +25,10 @@ def read(path: Path) -> bytes:
             raise NotAllowed(f"{path} is no file" if path.exists() else f"there is no file {path}")
         with path.open("rb") as file:
             data = file.read(_MOST + 1)
-    except OSError as error:
-        raise NotAllowed(f"{path} cannot be read: {error.strerror or error}") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, NotAllowed):
+            raise
+        raise NotAllowed(f"{path} cannot be read: {_reason(error)}") from None
     if len(data) > _MOST:
         raise NotAllowed(f"{path} is larger than a backup can be ({_MOST >> 20} MiB)")
     return data
@@ -38,11 +40,11 @@ def write(path: Path, text: str) -> None:
     Raises:
         NotAllowed: It cannot be written there; what was there before is still there.
     """
-    # A link goes on leading to the file, and the file is replaced.
-    path = Path(os.path.realpath(path))
-    # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
-    passing = path.with_name(f"{path.name}.tmp")
     try:
+        # A link goes on leading to the file, and the file is replaced.
+        path = Path(os.path.realpath(path))
+        # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
+        passing = path.with_name(f"{path.name}.tmp")
         passing.unlink(missing_ok=True)
         # Never through a link that somebody else put there.
         handle = os.open(passing, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -52,8 +54,12 @@ def write(path: Path, text: str) -> None:
             os.fsync(file.fileno())
         passing.replace(path)
         _settle(path.parent)
-    except OSError as error:
-        raise NotAllowed(f"{path} cannot be written: {error.strerror or error}") from None
+    except (OSError, ValueError) as error:
+        raise NotAllowed(f"{path} cannot be written: {_reason(error)}") from None
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def remove(path: Path) -> None:

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from drivebus import checks
 from drivebus.backup import taking
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.model import Backup
@@ -52,7 +53,8 @@ class Keeping(Parameters):
             Refused: The drive is locked by a password.
             NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
         """
-        place = None if path is None else Path(path)
+        resume, force = checks.flag("resume", resume), checks.flag("force", force)
+        place = None if path is None else _path(path)
         return await taking.take(self.trusting(unverified), place, resume=resume, force=force, progress=progress)
 
     async def restore(
@@ -93,6 +95,8 @@ class Keeping(Parameters):
 
         A refusal of one parameter ends nothing: it stands in the report.
         """
+        dry_run, force = checks.flag("dry_run", dry_run), checks.flag("force", force)
+        serial, motor = checks.flag("serial", serial), checks.flag("motor", motor)
         kept = self._kept(backup, force)
         work = Restore(self.trusting(unverified), kept, dry_run=dry_run, progress=progress)
         return await work.run(groups=groups, serial=serial, motor=motor, force=force)
@@ -112,6 +116,7 @@ class Keeping(Parameters):
             NotAllowed: The file is wrong, or of another family; nothing was sent.
             NoAnswer, BadAnswer, PortError, Refused: See each.
         """
+        everything, force = checks.flag("everything", everything), checks.flag("force", force)
         if backup is None:
             left = factory(self.profile)
         else:
@@ -131,7 +136,7 @@ class Keeping(Parameters):
 
     def _kept(self, backup: Kept, force: bool = False) -> Backup:
         """*backup* in the words of this drive's family."""
-        kept = backup if isinstance(backup, Backup) else Backup.load(backup, self.profile)
+        kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), self.profile)
         if not kept.complete:
             raise NotAllowed(
                 f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
@@ -160,3 +165,10 @@ class Keeping(Parameters):
         if store:
             self._in_ram.difference_update({code, self.profile.describe(code).name})
             self._count_store(code)
+
+
+def _path(path: object) -> Path:
+    """*path*, if it can be that of a file."""
+    if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
+        raise NotAllowed(f"{path!r} is neither a backup nor the path of a file")
+    return Path(path)

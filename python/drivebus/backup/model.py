@@ -28,6 +28,7 @@ class Origin:
 
     Attributes:
         family: The family of the drive, such as `"gd350"`.
+        profile: The profile that it was read with: the family's, or somebody's additions to it.
         title: The family as its maker calls it.
         unit: Its address, 1..247.
         identification: What it said it is; None if it would not tell, or its family has no such code.
@@ -38,6 +39,7 @@ class Origin:
     """
 
     family: str
+    profile: str
     title: str
     unit: int
     identification: int | None

@@ -16,7 +16,7 @@ from typing import Any
 
 from drivebus import checks
 from drivebus.backup.parameter import FIELDS, Wrong, word
-from drivebus.backup.text import FORMAT
+from drivebus.backup.text import FORMAT, printable
 from drivebus.errors import NotAllowed
 from drivebus.protocols import ProfileProtocol
 
@@ -35,6 +35,7 @@ _SHOWN = 100
 _TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
 _DRIVE: dict[str, tuple[type, str]] = {
     "family": (str, "a text"),
+    "profile": (str, "a text"),
     "title": (str, "a text"),
     "unit": (int, "a number"),
     "identification": (int, "a number such as 0x01A0"),
@@ -74,12 +75,16 @@ class _File:
     parameters: list[tuple[int, str, object]] = field(default_factory=list)
     section: str = ""
 
-    def refuse(self) -> NotAllowed:
-        """The error that names each wrong line."""
+    def refuse(self, profile: ProfileProtocol | None = None) -> NotAllowed:
+        """The error that names each wrong line; *profile* is what they were checked against."""
         self.wrong.sort()
-        lines = [f"{self.path}:{line}: {reason}" for line, reason in self.wrong[:_SHOWN]]
+        # What cannot be printed would do something to the terminal that shows it.
+        lines = [f"{self.path}:{line}: {printable(reason)}" for line, reason in self.wrong[:_SHOWN]]
         if len(self.wrong) > _SHOWN:
             lines.append(f"and {len(self.wrong) - _SHOWN} more")
+        read_with = self.drive.get("profile")
+        if profile is not None and read_with not in (None, profile.name):
+            lines.append(f"it was read with the profile {read_with!r}, and checked against {profile.name!r}")
         count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
         return NotAllowed("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
 
@@ -108,8 +113,9 @@ def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], Pr
         profile = profile(file.drive["family"])
     raw = _parameters(file, profile)
     if file.wrong:
-        raise file.refuse()
+        raise file.refuse(profile)
     origin = {
+        "profile": profile.name,
         "title": profile.title,
         "unit": 0,
         "identification": None,
@@ -159,9 +165,7 @@ def _toml(text: str) -> dict[str, Any]:
     except ValueError as error:
         # The line is the parser's whole document; which line of the file it is, is said elsewhere.
         reason = re.sub(r"at line 1, column", "at column", str(error)).replace("end of document", "end of line")
-        # What cannot be printed would do something to the terminal that shows it.
-        shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
-        raise Wrong(f"{shown if len(shown) <= 80 else f'{shown[:77]}...'} is no TOML: {reason}") from None
+        raise Wrong(f"{text if len(text) <= 80 else f'{text[:77]}...'} is no TOML: {reason}") from None
 
 
 def _head(file: _File, key: str, value: object) -> None:

@@ -106,10 +106,13 @@ class Rules:
         for code in self.codes():
             known = self.profile.describe(code)
             if known.low_from is not None:
-                pairs.append((known.low_from, code))
+                pairs.append((self._code(known.low_from), code))
             if known.high_from is not None:
-                pairs.append((code, known.high_from))
+                pairs.append((code, self._code(known.high_from)))
         return list(dict.fromkeys(pairs))
+
+    def _code(self, name: str) -> str:
+        return self.profile.describe(name).code or name
 
 
 def _among(code: str, listed: frozenset[str]) -> bool:

@@ -32,12 +32,12 @@ async def origin_of(drive: Registers) -> Origin:
     profile = drive.profile
     identification = firmware = None
     register = profile.role("identification")
-    if register is not None:
+    if register is not None and _may_be_asked(drive, register):
         try:
             [identification] = await drive.read_words(profile.address(register))
         except Refused:
             identification = None
-    if _FIRMWARE in profile.names():
+    if _FIRMWARE in profile.names() and _may_be_asked(drive, _FIRMWARE):
         try:
             [word] = await drive.read_words(profile.address(_FIRMWARE))
             firmware = str(drive.value(_FIRMWARE, word))
@@ -45,8 +45,21 @@ async def origin_of(drive: Registers) -> Origin:
             firmware = None
     now = datetime.now(timezone.utc).replace(microsecond=0)
     return Origin(
-        profile.family, profile.title, drive.unit, identification, firmware, profile.version, __version__, now
+        profile.family,
+        profile.name,
+        profile.title,
+        drive.unit,
+        identification,
+        firmware,
+        profile.version,
+        __version__,
+        now,
     )
+
+
+def _may_be_asked(drive: Registers, name: str) -> bool:
+    known = drive.profile.describe(name)
+    return known.address is not None and (known.evidence != "assumed" or drive.unverified)
 
 
 async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:

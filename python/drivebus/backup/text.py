@@ -17,7 +17,7 @@ from drivebus.values import Choice, Value
 if TYPE_CHECKING:
     from drivebus.backup.model import Origin
 
-__all__ = ["FORMAT", "number", "text", "worded"]
+__all__ = ["FORMAT", "number", "printable", "text", "worded"]
 
 FORMAT = 1
 
@@ -33,7 +33,17 @@ def text(
     """The whole file."""
     header: dict[str, Any] = {"format": FORMAT, "complete": complete}
     lines = [_HEAD.rstrip("\n"), *(f"{key} = {_toml(value)}" for key, value in header.items()), "", "[drive]"]
-    for key in ("family", "title", "unit", "identification", "firmware", "profile_version", "drivebus", "taken"):
+    for key in (
+        "family",
+        "profile",
+        "title",
+        "unit",
+        "identification",
+        "firmware",
+        "profile_version",
+        "drivebus",
+        "taken",
+    ):
         value = getattr(origin, key)
         if key == "identification" and value is not None:
             lines.append(f"identification = 0x{value:04X}")
@@ -48,7 +58,7 @@ def text(
         if code in raw:
             section.append(_line(profile, code, raw[code]))
         else:
-            section.append(_comment(f"# {code} ({profile.describe(code).label}) is not here: {unread[code]}"))
+            section.append(printable(f"# {code} ({profile.describe(code).label}) is not here: {unread[code]}"))
     lines += ["", "[parameters]", *sections["parameters"]]
     if sections["readings"]:
         lines += [
@@ -69,7 +79,7 @@ def _line(profile: ProfileProtocol, code: str, raw: int) -> str:
         fields["beyond"] = "true"
     comment = f"{known.label}: {value.label}" if isinstance(value, Choice) else known.label
     inside = ", ".join(f"{key} = {shown}" for key, shown in fields.items())
-    return _comment(f"{code} = {{ {inside} }}  # {comment}")
+    return printable(f"{code} = {{ {inside} }}  # {comment}")
 
 
 def _is_beyond(profile: ProfileProtocol, code: str, raw: int) -> bool:
@@ -106,6 +116,6 @@ def _toml(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _comment(line: str) -> str:
-    """*line* as one line: a label is a profile's, and may hold anything."""
-    return "".join(letter if letter.isprintable() else " " for letter in line)
+def printable(line: str) -> str:
+    """*line* as one line: a label, or a file, may hold anything."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)

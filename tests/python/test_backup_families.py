@@ -1,0 +1,90 @@
+"""Every family: backup, back to the factory, restore, and nothing differs."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import drivebus
+from drivebus import Bus, Drive, NotAllowed, Refused, Simulator
+
+
+def parameters(family: str) -> list[str]:
+    profile = drivebus.Profile.builtin(family)
+    return [name for name in profile.names() if profile.describe(name).kind == "parameter"]
+
+
+WITH = [family for family in drivebus.profiles() if parameters(family)]
+WITHOUT = [family for family in drivebus.profiles() if not parameters(family)]
+
+
+def unsettle(drive: Drive) -> dict[str, int]:
+    """Stores another value in all that a restore gives back, where the drive takes one; the words by code."""
+    profile = drive.profile
+    chance = random.Random(profile.name)
+    # Of the settings of the line, the delay changes nothing that would end this.
+    line = {code for code in profile.serial_parameters() if profile.describe(code).name != "response_delay"}
+    left = {*line, *profile.acts(), *profile.fault_history, *profile.fault_values}
+    changed: dict[str, int] = {}
+    for name in parameters(profile.name):
+        known = profile.describe(name)
+        code = known.code or name
+        if code in left or known.access == "ro" or known.words > 1 or known.address is None:
+            continue
+        if known.evidence == "assumed" and not drive.unverified:
+            continue
+        try:
+            [now] = drive.read_words(known.address)
+        except Refused:
+            continue
+        for word in (now + 1, now - 1, now + chance.randint(2, 50)):
+            try:
+                profile.encode(name, profile.decode(name, word))
+                drive.bus.write(drive.unit, profile.address(name, store=True), word)
+            except (NotAllowed, Refused):
+                continue
+            changed[code] = word
+            break
+    return changed
+
+
+@pytest.mark.parametrize("unverified", [False, True])
+@pytest.mark.parametrize("family", WITH)
+def test_there_and_back_again(family: str, unverified: bool, tmp_path: Path) -> None:
+    path = tmp_path / "drive.toml"
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, family, unverified=unverified)
+        changed = unsettle(drive)
+        assert changed
+        kept = drive.backup(path)
+        assert {code: kept.raw[code] for code in changed} == changed
+        machine = simulator.drive(1)
+        machine.factory_reset()
+        assert {each.code for each in drive.diff(path)} == {*changed}
+        machine.take_writes()
+
+        report = drive.restore(path, motor=True, serial=True)
+        assert (report.ok, {item.code for item in report.having("restored")}) == (True, {*changed})
+        times = Counter(address for _, address, _ in machine.take_writes())
+        assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
+        machine.power_cycle()
+        assert not drive.diff(path)
+
+
+def test_some_are_changed() -> None:
+    """The test above is about something: these families have parameters that can be set."""
+    with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        assert len(unsettle(bus.drive(1, "gd350"))) > 25
+
+
+@pytest.mark.parametrize("family", WITHOUT)
+def test_a_family_without_parameters_says_so(family: str) -> None:
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, family)
+        before = simulator.line.requests
+        with pytest.raises(NotAllowed, match="no parameters that are known"):
+            drive.backup()
+        assert simulator.line.requests == before
