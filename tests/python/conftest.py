@@ -7,10 +7,12 @@ tests about time and about what the line carries.
 from __future__ import annotations
 
 import asyncio
+import functools
 import importlib.util
 import os
 import signal
 from collections.abc import Callable, Coroutine, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any
 
 import pytest
@@ -145,3 +147,36 @@ def store() -> Callable[[drivebus.Drive, Mapping[str, object]], None]:
             drive.bus.write(drive.unit, drive.profile.address(code, store=True), drive.profile.encode(code, value))
 
     return put
+
+
+class Killed(BaseException):
+    """Ends everything, as kill -9 does: nothing that is written in Python may hold it up."""
+
+
+@pytest.fixture
+def dies_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, bool], AbstractContextManager[None]]:
+    """A block that ends at its n-th request, if it comes to that: when its answer comes if sent, or before it is."""
+
+    @contextmanager
+    def block(moment: int, sent: bool) -> Iterator[None]:
+        left = [moment]
+
+        def deadly(request: Callable[..., object], *args: object, **how: object) -> object:
+            left[0] -= 1
+            if left[0] == 0 and not sent:
+                raise Killed
+            answer = request(*args, **how)
+            if left[0] == 0:
+                raise Killed
+            return answer
+
+        with monkeypatch.context() as patch, suppress(Killed):
+            for name in ("read", "write"):
+                patch.setattr(drivebus.Bus, name, functools.partialmethod(_bound, deadly, getattr(drivebus.Bus, name)))
+            yield
+
+    return block
+
+
+def _bound(bus: drivebus.Bus, deadly: Callable[..., object], request: object, *args: object, **how: object) -> object:
+    return deadly(request, bus, *args, **how)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import random
 from collections import Counter
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 
 import drivebus
 from drivebus import Bus, Drive, NotAllowed, Refused, Simulator
+
+DiesAt = Callable[[int, bool], AbstractContextManager[None]]
 
 
 def parameters(family: str) -> list[str]:
@@ -72,6 +76,30 @@ def test_there_and_back_again(family: str, unverified: bool, tmp_path: Path) -> 
         assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
         machine.power_cycle()
         assert not drive.diff(path)
+
+
+@pytest.mark.parametrize("family", WITH)
+def test_cut_off_at_any_moment_no_memory_is_written_twice(family: str, dies_at: DiesAt) -> None:
+    chance = random.Random(family)
+    for _ in range(10):
+        with Simulator({1: family}, transport="process", clock="virtual") as simulator:
+            machine = simulator.drive(1)
+            with Bus(simulator) as bus:
+                changed = unsettle(bus.drive(1, family))
+                kept = bus.drive(1, family).backup()
+                machine.factory_reset()
+            machine.take_writes()
+            before = machine.eeprom_writes
+            for _ in range(3):
+                with dies_at(chance.randint(1, 4 * len(changed) + 20), chance.random() < 0.5), Bus(simulator) as bus:
+                    bus.drive(1, family).restore(kept, serial=True, motor=True)
+            with Bus(simulator) as bus:
+                drive = bus.drive(1, family)
+                assert drive.restore(kept, serial=True, motor=True).ok
+                assert not drive.diff(kept)
+            times = Counter(address for _, address, _ in machine.take_writes())
+            assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
+            assert machine.eeprom_writes - before == len(changed)
 
 
 def test_some_are_changed() -> None:

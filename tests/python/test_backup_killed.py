@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import random
 import signal
@@ -10,7 +9,8 @@ import subprocess
 import sys
 import threading
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import pytest
 
 from drivebus import Backup, Bus, Drive, Simulator
 
+DiesAt = Callable[[int, bool], AbstractContextManager[None]]
 RAM = 0x8000
 MOMENTS = 50
 SEED = 5
@@ -36,26 +37,6 @@ SET = {
 """Values that are not those of the factory."""
 BAUD, SILENCE = 921_600, 0.0002
 """A line in real time, and as quick as that may be."""
-
-
-class Killed(BaseException):
-    """Ends everything, as kill -9 does: nothing that is written in Python may hold it up."""
-
-
-class Deadly:
-    """A process that dies at its *moment*th request: before it is sent, or when its answer would come."""
-
-    def __init__(self, moment: int, sent: bool) -> None:
-        self.left, self.sent = moment, sent
-
-    def __call__(self, request: Any, *args: Any, **how: Any) -> Any:
-        self.left -= 1
-        if self.left == 0 and not self.sent:
-            raise Killed
-        answer = request(*args, **how)
-        if self.left == 0:
-            raise Killed
-        return answer
 
 
 def set_back(drive: Drive, factory: Mapping[str, Any]) -> None:
@@ -98,22 +79,17 @@ def requests_of_a_restore() -> int:
         return int(simulator.line.requests - before)
 
 
-def test_cut_off_at_fifty_moments_and_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cut_off_at_fifty_moments_and_more(dies_at: DiesAt) -> None:
     """Each attempt is cut off a second time before the last one is let through."""
     chance = random.Random(SEED)
     requests = requests_of_a_restore()
-    read, write = Bus.read, Bus.write
     for _ in range(MOMENTS):
         with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
             kept, _ = ready(simulator)
             stored(simulator)
             for _ in range(2):
-                deadly = Deadly(chance.randint(1, requests), chance.random() < 0.5)
-                with monkeypatch.context() as patch, Bus(simulator) as bus:
-                    patch.setattr(Bus, "read", lambda *args, _d=deadly, **how: _d(read, *args, **how))
-                    patch.setattr(Bus, "write", lambda *args, _d=deadly, **how: _d(write, *args, **how))
-                    with contextlib.suppress(Killed):
-                        bus.drive(1, "gd350").restore(kept)
+                with dies_at(chance.randint(1, requests), chance.random() < 0.5), Bus(simulator) as bus:
+                    bus.drive(1, "gd350").restore(kept)
             with Bus(simulator) as bus:
                 drive = bus.drive(1, "gd350")
                 assert drive.restore(kept).ok
