@@ -1,0 +1,217 @@
+"""Each profile against the simulated drive of its family, whose behaviour is typed from the manuals a second time.
+
+Where the two disagree, one of them has it wrong. What is sent is what the profile says; what came of it is asked of the
+machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+
+import drivebus
+from drivebus import Bus, NotAllowed, Profile, Refused, Simulator
+
+FAMILIES = drivebus.profiles()
+RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd600", "gd3000", "vfd500"]
+"""Those whose motor the bus moves."""
+
+PASSWORD = "P07.00"
+COMMANDS = {
+    # What becomes of a motor at standstill and of one that turns forward at 10 Hz: its state a second later, and Hz.
+    "run_forward": (("forward", 5.0), ("forward", 10.0)),
+    "run_reverse": (("reverse", -5.0), ("forward", 5.0)),
+    "jog_forward": (("forward", 5.0), ("forward", 10.0)),
+    "jog_reverse": (("reverse", -5.0), ("forward", 10.0)),
+    "stop": (("stopped", 0.0), ("forward", 5.0)),
+    "coast": (("stopped", 0.0), ("stopped", 0.0)),
+    "reset_fault": (("stopped", 0.0), ("forward", 10.0)),
+    "jog_stop": (("stopped", 0.0), ("forward", 10.0)),
+}
+
+
+class Bench:
+    """One drive of a family, and its profile."""
+
+    def __init__(self, family: str) -> None:
+        profile = Profile.builtin(family)
+        # P30.14 is 1 from the factory.
+        self.profile = profile.with_variants({"speed_unit": "Hz"}) if profile.variants() else profile
+        self.simulator = Simulator({1: family}, transport="process", clock="virtual")
+        self.bus = Bus(self.simulator)
+        self.machine = self.simulator.drive(1)
+
+    def close(self) -> None:
+        self.bus.close()
+        self.simulator.close()
+
+    def write(self, address: int, word: int) -> None:
+        self.bus.transact(1, bytes([0x06]) + address.to_bytes(2, "big") + word.to_bytes(2, "big"))
+
+    def read(self, address: int, count: int = 1) -> list[int]:
+        answer = self.bus.transact(1, bytes([0x03]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
+        return [int.from_bytes(answer[place : place + 2], "big") for place in range(2, len(answer), 2)]
+
+    def refusal(self, address: int, word: int) -> int:
+        with pytest.raises(Refused) as caught:
+            self.write(address, word)
+        return caught.value.code
+
+    def show(self, role: str) -> int:
+        """The word that has this role."""
+        name = self.profile.role(role)
+        assert name is not None
+        address = self.profile.describe(name).address
+        assert address is not None
+        return self.read(address)[0]
+
+    def obey(self) -> None:
+        """As the profile says it is made to obey the bus, at 10 Hz."""
+        for setting in self.profile.control():
+            address = self.profile.describe(setting["code"]).address
+            assert address is not None
+            self.write(address, setting["value"])
+        setpoint = self.profile.role("setpoints.frequency")
+        assert setpoint is not None
+        address = self.profile.describe(setpoint).address
+        assert address is not None
+        self.write(address, self.profile.encode(setpoint, 10.0))
+
+    def command(self, name: str, seconds: float) -> None:
+        self.write(*self.profile.command(name))
+        self.simulator.advance(seconds)
+
+
+@pytest.fixture
+def bench(family: str) -> Iterator[Bench]:
+    with closing(Bench(family)) as bench:
+        yield bench
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_row_that_can_be_read_is_answered(bench: Bench) -> None:
+    for name in bench.profile.names():
+        row = bench.profile.describe(name)
+        if row.address is None:
+            continue
+        if row.access == "wo":
+            continue
+        assert len(bench.read(row.address, row.words)) == row.words, name
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_register_has_the_range_that_the_drive_has(bench: Bench) -> None:
+    commands = bench.profile.command_address
+    for name in bench.profile.names():
+        row = bench.profile.describe(name)
+        bound = row.low_from or row.high_from or row.variant or row.low is None or row.high is None
+        if row.kind != "register" or row.address is None or row.access == "ro" or row.address == commands or bound:
+            continue
+        low, high = bench.profile.encode(name, row.low), bench.profile.encode(name, row.high)
+        for word in (low, high):
+            bench.write(row.address, word)
+        below = [(low - 1) & 0xFFFF] if low or row.signed else []
+        for word in (*below, high + 1):
+            assert bench.refusal(row.address, word) == 0x04, f"{name} {word:04X}"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
+    for name in bench.profile.names():
+        row = bench.profile.describe(name)
+        if row.access == "ro" and row.address is not None:
+            assert bench.refusal(row.address, 1) == (0x04 if bench.profile.name == "vfd500" else 0x07), name
+
+
+@pytest.mark.parametrize("family", RUN)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, command: str) -> None:
+    if command not in bench.profile.commands():
+        assert (bench.profile.name, command) == ("vfd500", "jog_stop")
+        return
+    from_standstill, from_ten = COMMANDS[command]
+    bench.obey()
+    bench.command(command, 1.0)
+    assert (bench.machine.state, round(bench.machine.frequency, 1)) == from_standstill
+
+    with closing(Bench(bench.profile.name)) as bench:
+        bench.obey()
+        bench.command("run_forward", 3.0)
+        bench.command(command, 1.0)
+        # An exchange takes its time too: some 15 ms, which are less than 0.1 Hz.
+        assert bench.machine.state == from_ten[0]
+        assert bench.machine.frequency == pytest.approx(from_ten[1], abs=0.1)
+
+
+@pytest.mark.parametrize("family", RUN)
+def test_a_coasting_motor_turns_on_and_a_stopped_one_is_slowed_down(bench: Bench) -> None:
+    bench.obey()
+    bench.command("run_forward", 3.0)
+    bench.command("coast", 0.1)
+    assert bench.machine.frequency == 0.0
+    assert bench.machine.speed > 100.0
+
+
+@pytest.mark.parametrize("family", RUN)
+def test_state_frequency_and_fault_are_where_the_profile_says(bench: Bench) -> None:
+    profile, machine = bench.profile, bench.machine
+    bench.obey()
+    for command, state in [("run_forward", "forward"), ("run_reverse", "reverse"), ("coast", "stopped")]:
+        bench.command(command, 5.0)
+        assert (profile.state(bench.show("state")), machine.state) == (state, state)
+        hertz = profile.decode(profile.role("frequency") or "", bench.show("frequency"))
+        assert hertz == pytest.approx(abs(machine.frequency))
+    setpoint = profile.role("setpoint") or ""
+    assert profile.decode(setpoint, bench.show("setpoint")) == 10.0
+    assert bench.show("fault") == 0
+    machine.trip(11)
+    assert (profile.state(bench.show("state")), bench.show("fault")) == ("fault", 11)
+    bench.command("reset_fault", 0.0)
+    assert (profile.state(bench.show("state")), bench.show("fault")) == ("stopped", 0)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_memory_is_reached_where_the_profile_says(bench: Bench) -> None:
+    profile, machine = bench.profile, bench.machine
+    shown = [profile.describe(name) for name in profile.names()]
+    kept = [row for row in shown if row.code and row.address is not None and row.writable and row.code != PASSWORD]
+    for row in kept:
+        assert row.address is not None
+        [word] = bench.read(row.address)
+        worn = machine.eeprom_writes_of(row.address)
+        bench.write(profile.address(row.name, store=True), word)
+        assert machine.eeprom_writes_of(row.address) == worn + 1, row.name
+        try:
+            address = profile.address(row.name, store=False)
+        except NotAllowed:
+            assert profile.memory() is None, row.name
+        else:
+            bench.write(address, word)
+            assert machine.eeprom_writes_of(row.address) == worn + 1, row.name
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_family_is_known_by_what_its_profile_says(bench: Bench) -> None:
+    profile = bench.profile
+    if profile.identification_address is not None and not profile.name.startswith("ch"):
+        [code] = bench.read(profile.identification_address)
+        assert profile.identifies(code) == profile.name
+    for address in (profile.signature() or {}).get("answers", []):
+        bench.read(address)
+    for address in (profile.signature() or {}).get("refuses", []):
+        with pytest.raises(Refused):
+            bench.read(address)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_functions_of_the_profile_are_there(bench: Bench) -> None:
+    requests = {0x03: "03 2100 0001", 0x06: "06 2100 0001", 0x08: "08 0000 12AB", 0x10: "10 2100 0001 02 0001"}
+    refused = []
+    for function in bench.profile.functions:
+        try:
+            bench.bus.transact(1, bytes.fromhex(requests[function]))
+        except Refused as error:
+            refused.append((function, error.code))
+    assert [function for function, code in refused if code == 0x01] == []
