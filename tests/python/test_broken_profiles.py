@@ -172,16 +172,23 @@ class TestFiles:
         assert problem["reason"]
 
 
-@pytest.mark.parametrize("file", FILES[1:])
-def test_limits_of_a_table(folder: Path, file: str) -> None:
+@pytest.mark.parametrize(
+    ("file", "row"),
+    [
+        ("registers.csv", "0x4000,r,x,,1,no,,,,,,ro,yes,,s"),
+        ("parameters.csv", "P40.00,,x,,1,no,,,,,,,ro,,yes,,s"),
+        ("faults.csv", "{},,x,,,yes,,s"),
+    ],
+)
+def test_limits_of_a_table(folder: Path, file: str, row: str) -> None:
     text = (folder / file).read_text(encoding="utf-8")
     (folder / file).write_text(text.replace("EX-9 manual", "x" * 401, 1), encoding="utf-8")
     [problem] = check(folder)
     assert (Path(problem["file"]).name, problem["line"]) == (file, 2)
     assert '"source"' in problem["reason"]
     assert "400" in problem["reason"]
-    empty = "," * text.partition("\n")[0].count(",")
-    (folder / file).write_text(text + f"{empty}\n" * 10_000, encoding="utf-8")
+    many = "".join(f"{row.format(number)}\n" for number in range(100, 10_100))
+    (folder / file).write_text(text + many, encoding="utf-8")
     assert any("10000 rows" in problem["reason"] for problem in check(folder))
 
 
@@ -213,3 +220,24 @@ def test_a_chain_of_profiles_ends(tmp_path: Path) -> None:
     [problem] = check(two)
     assert Path(problem["file"]).resolve() == one / "profile.toml"
     assert (problem["line"], "itself" in problem["reason"]) == (6, True)
+
+
+@pytest.mark.parametrize(
+    ("file", "find", "line"),
+    [
+        pytest.param("profile.toml", "[serial]", "k{} = 1\n", id="unknown-keys"),
+        pytest.param("profile.toml", '"P07.27"]', '"x{}",\n', id="unknown-names"),
+        pytest.param("registers.csv", "0x2000,", "0x4000,r{},x,,1,no,,,,,,ro,yes,,s\n", id="one-address"),
+    ],
+)
+def test_thousands_of_mistakes_take_no_longer(folder: Path, file: str, find: str, line: str) -> None:
+    """The first hundred are named. Without that limit this takes most of a minute."""
+    change(folder / file, find, "".join(line.format(number) for number in range(9_000)) + find)
+    assert len(check(folder)) == 100
+
+
+def test_nothing_in_a_profile_reaches_the_terminal_as_a_command(folder: Path) -> None:
+    change(folder / "registers.csv", "0x2101,fault_code", "\x1b]0;title\x07,fault_code")
+    result = CliRunner().invoke(cli, ["profiles", "check", str(folder)])
+    assert "\\x1b]0;title\\x07" in result.stdout
+    assert not {"\x1b", "\x07"} & set(result.stdout + result.stderr)

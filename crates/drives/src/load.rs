@@ -187,7 +187,8 @@ impl Profile {
         first(load(folder, &[]))
     }
 
-    /// All that is wrong with the profile in `folder`, each with file, line and reason; nothing if it is sound.
+    /// All that is wrong with the profile in `folder`, each with file, line and reason; nothing if it is sound. Where
+    /// hundreds of lines are wrong, those that were found first.
     pub fn check(folder: &Path) -> Vec<ProfileError> {
         load(folder, &[]).err().unwrap_or_default()
     }

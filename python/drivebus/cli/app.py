@@ -9,7 +9,7 @@ import click
 import drivebus
 from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
-from drivebus.cli.output import Output
+from drivebus.cli.output import Output, printable
 from drivebus.cli.session import Session, exit_code, parse_format
 
 __all__ = ["cli", "main"]
@@ -27,7 +27,7 @@ class _Commands(click.Group):
         try:
             return super().invoke(context)
         except drivebus.DrivebusError as error:
-            click.echo(f"Error: {error}", err=True)
+            click.echo(f"Error: {printable(str(error))}", err=True)
             context.exit(exit_code(error))
 
 

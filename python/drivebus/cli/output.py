@@ -13,7 +13,7 @@ from rich.table import Table
 
 import drivebus
 
-__all__ = ["Output", "plain", "show"]
+__all__ = ["Output", "plain", "printable", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -45,12 +45,12 @@ class Output:
     def say(self, text: str) -> None:
         """A line for people; nothing in JSON."""
         if not self.as_json:
-            self.console.print(text, markup=False)
+            self.console.print(printable(text), markup=False)
 
     def heading(self, text: str) -> None:
         """A line above a section; nothing in JSON."""
         if not self.as_json:
-            self.console.print(f"\n{text}", style="bold", markup=False)
+            self.console.print(f"\n{printable(text)}", style="bold", markup=False)
 
     def facts(self, values: Mapping[str, Any]) -> None:
         """Names and values: a JSON object, or two columns."""
@@ -108,7 +108,12 @@ def show(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, drivebus.Choice):
-        return escape(f"{int(value)} = {value.label}")
+        return escape(printable(f"{int(value)} = {value.label}"))
     if isinstance(value, bytes):
         return value.hex(" ").upper()
-    return escape(str(value))
+    return escape(printable(str(value)))
+
+
+def printable(text: str) -> str:
+    """*text* without what would do something to a terminal; a profile may come from anywhere."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text)

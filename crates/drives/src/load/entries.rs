@@ -62,7 +62,7 @@ impl Entries {
     pub(super) fn check_bounds(&self, file: &File, bounds: &[(u64, String)], problems: &mut Problems) {
         for (line, bound) in bounds {
             let known = parse_code(bound).is_some() && self.list.iter().any(|entry| entry.name == *bound);
-            if !known && !self.incomplete {
+            if !known && !self.incomplete && !problems.is_full() {
                 let closest = closest(bound, self.codes()).unwrap_or("nothing at all");
                 let reason = format!("bound \"{bound}\" is no parameter of this profile; the closest is \"{closest}\"");
                 problems.add(file, *line, reason);
@@ -81,7 +81,7 @@ impl Entries {
     /// The entry that `name`, in `file`, refers to; there is a problem if there is none.
     pub(super) fn get(&self, file: &File, name: &Spanned<String>, problems: &mut Problems) -> Option<&Entry> {
         let found = self.find(name.get_ref());
-        if found.is_none() && !self.incomplete {
+        if found.is_none() && !self.incomplete && !problems.is_full() {
             let wanted = name.get_ref();
             let closest = closest(wanted, self.list.iter().flat_map(names)).unwrap_or("nothing at all");
             let reason = format!("no register or parameter \"{wanted}\"; the closest is \"{closest}\"");

@@ -28,6 +28,9 @@ pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems
 
 fn drop_rows(base: &mut Profile, file: &File, dropped: &[Spanned<String>], problems: &mut Problems) {
     for name in dropped {
+        if problems.is_full() {
+            return;
+        }
         let wanted = name.get_ref();
         let Some(index) = base.entries.iter().position(|entry| names(entry).any(|known| known == wanted)) else {
             let closest = closest(wanted, base.entries.iter().flat_map(names)).unwrap_or_default();
@@ -80,6 +83,9 @@ fn assume(base: &mut Profile, file: &File, extends: &Extends, problems: &mut Pro
         problems.add(file, line(file, first), reason);
     }
     for name in &extends.confirmed {
+        if problems.is_full() {
+            return;
+        }
         let wanted = name.get_ref();
         let known =
             TABLES.contains(&wanted.as_str()) || base.entries.iter().any(|row| names(row).any(|own| own == wanted));

@@ -2,6 +2,9 @@
 
 use super::{File, ProfileError};
 
+/// Most problems that are noted: nobody reads more at once, and to find the closest name takes its time.
+pub(super) const MOST: usize = 100;
+
 /// What was found so far.
 #[derive(Debug, Default)]
 pub(super) struct Problems(Vec<ProfileError>);
@@ -9,12 +12,23 @@ pub(super) struct Problems(Vec<ProfileError>);
 impl Problems {
     /// What `result` holds; its error is noted.
     pub(super) fn keep<T>(&mut self, result: Result<T, ProfileError>) -> Option<T> {
-        result.map_err(|error| self.0.push(error)).ok()
+        result.map_err(|error| self.push(error)).ok()
     }
 
     /// Notes what is wrong with a line of `file`.
     pub(super) fn add(&mut self, file: &File, line: u64, reason: impl Into<String>) {
-        self.0.push(file.broken(line, reason));
+        self.push(file.broken(line, reason));
+    }
+
+    fn push(&mut self, problem: ProfileError) {
+        if !self.is_full() {
+            self.0.push(problem);
+        }
+    }
+
+    /// No more are noted.
+    pub(super) fn is_full(&self) -> bool {
+        self.0.len() >= MOST
     }
 
     pub(super) fn len(&self) -> usize {

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, Deserializer, Error};
 
+use super::problems::MOST;
 use crate::lookup::closest;
 
 /// What is wrong with `text` as a `T`: the place in it, and the reason. Nothing if it is one.
@@ -26,8 +27,8 @@ pub(super) fn problems<T: DeserializeOwned>(text: &str) -> Vec<(usize, String)> 
         gone.extend(reason.split_once("closest is ").map(|(_, quoted)| missing(quoted)));
         found.push((place(&error), reason));
         match cut_out(table.get_mut(), place(&error)) {
-            Some(key) => gone.push(missing(&format!("\"{key}\""))),
-            None => break,
+            Some(key) if found.len() < MOST => gone.push(missing(&format!("\"{key}\""))),
+            _ => break,
         }
     }
     found.retain(|(_, reason)| !gone.contains(reason));
