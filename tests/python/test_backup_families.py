@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 import pytest
@@ -100,6 +100,31 @@ def test_cut_off_at_any_moment_no_memory_is_written_twice(family: str, dies_at: 
             times = Counter(address for _, address, _ in machine.take_writes())
             assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
             assert machine.eeprom_writes - before == len(changed)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("family", ["gd350", "gd600", "vfd500"])
+def test_over_a_bad_line_no_memory_is_written_twice(family: str, seed: int) -> None:
+    """One answer in ten is lost, late, damaged or not the drive's; the restore is said again until it is done."""
+    with Simulator({1: family}, transport="process", clock="virtual", seed=seed) as simulator:
+        machine = simulator.drive(1)
+        with Bus(simulator) as bus:
+            changed = unsettle(bus.drive(1, family))
+            kept = bus.drive(1, family).backup()
+        machine.factory_reset()
+        machine.take_writes()
+        simulator.line.set_faults(all=0.006)
+        for _ in range(50):
+            with Bus(simulator, timeout=0.25) as bus, suppress(drivebus.NoAnswer, drivebus.BadAnswer):
+                if bus.drive(1, family).restore(kept, motor=True).ok:
+                    break
+        simulator.line.clear()
+        with Bus(simulator) as bus:
+            drive = bus.drive(1, family)
+            assert drive.restore(kept, motor=True, serial=True).ok
+            assert not drive.diff(kept)
+        times = Counter(address for _, address, _ in machine.take_writes())
+        assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
 
 
 def test_some_are_changed() -> None:

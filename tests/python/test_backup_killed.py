@@ -1,4 +1,4 @@
-"""A restore that is cut off at any moment goes on where it was, and wears the memory of no parameter twice."""
+"""What is cut off at any moment goes on where it was, and a restore wears the memory of no parameter twice."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import subprocess
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -102,18 +102,18 @@ CHILD = f"""
 import os, sys
 from drivebus import Bus
 
-path = sys.argv[1]
+path, what = sys.argv[1:]
 for port in map(str.strip, sys.stdin):
     child = os.fork()
     if child == 0:
         with Bus(port, baudrate={BAUD}, silence={SILENCE}) as bus:
-            bus.drive(1, "gd350").restore(path)
+            getattr(bus.drive(1, "gd350"), what)(path)
         os._exit(0)
     print(child, flush=True)
     _, status = os.waitpid(child, 0)
     print(status, flush=True)
 """
-"""For each port it is told, a process of its own restores the drive there; forked, for to start one takes long."""
+"""For each port it is told, a process of its own does it; forked, for to start one takes long."""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty, and no kill -9")
@@ -122,31 +122,69 @@ def test_killed_in_earnest(tmp_path: Path) -> None:
     chance = random.Random(SEED)
     requests = requests_of_a_restore()
     path = tmp_path / "drive.toml"
-    pause = threading.Event()
     ends: Counter[int] = Counter()
-    words = [sys.executable, "-c", CHILD, str(path)]
-    with (
-        Simulator({1: "gd350"}, baudrate=BAUD, silence=SILENCE) as simulator,
-        subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent,
-    ):
-        assert parent.stdin is not None
-        assert parent.stdout is not None
+    with Simulator({1: "gd350"}, baudrate=BAUD, silence=SILENCE) as simulator, children(path, "restore") as parent:
         kept, factory = ready(simulator)
         kept.save(path)
         for _ in range(MOMENTS):
             stored(simulator)
-            moment = simulator.line.requests + chance.randint(1, requests - 1)
-            print(simulator.port, file=parent.stdin, flush=True)
-            child = int(parent.stdout.readline())
-            while simulator.line.requests < moment:  # the limit is the test's own
-                pause.wait(0.0005)
-            os.kill(child, signal.SIGKILL)
-            ends[int(parent.stdout.readline())] += 1
+            ends[killed(parent, simulator, chance.randint(1, requests - 1))] += 1
             with Bus(simulator) as bus:
                 drive = bus.drive(1, "gd350")
                 assert drive.restore(path).ok
                 assert not drive.diff(path)
                 assert stored(simulator) == dict.fromkeys(map(drive.profile.address, SET), 1)
                 set_back(drive, factory)
+    assert ends[-signal.SIGKILL] > MOMENTS // 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty, and no kill -9")
+def test_a_backup_that_was_killed_goes_on(tmp_path: Path) -> None:
+    """Nothing of Python's own runs when it is killed: what is kept was kept before."""
+    chance = random.Random(SEED)
+    path = tmp_path / "drive.toml"
+    with Simulator({1: "gd350"}, baudrate=BAUD, silence=SILENCE) as simulator, children(path, "backup") as parent:
+        ready(simulator)
+        with Bus(simulator) as bus:
+            before = simulator.line.requests
+            whole = bus.drive(1, "gd350").backup()
+            requests = simulator.line.requests - before
+        gone_on: list[int] = []
+        for _ in range(10):
+            assert killed(parent, simulator, chance.randint(12, 20)) == -signal.SIGKILL
+            assert not path.exists()
+            with Bus(simulator) as bus:
+                there = len(Backup.load(path.with_name(f"{path.name}.part")))
+                before = simulator.line.requests
+                taken = bus.drive(1, "gd350").backup(path)
+            assert taken.raw == whole.raw
+            assert simulator.line.requests - before < requests
+            gone_on.append(there)
+            path.unlink()
+    assert all(0 < done < len(whole) for done in gone_on)
+
+
+@contextmanager
+def children(path: Path, what: str) -> Iterator[subprocess.Popen[str]]:
+    """What starts a process that does *what* with *path*, again and again."""
+    words = [sys.executable, "-c", CHILD, str(path), what]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
+        yield parent
+        assert parent.stdin is not None
         parent.stdin.close()
-    assert ends[signal.SIGKILL] > MOMENTS // 2
+
+
+def killed(parent: subprocess.Popen[str], simulator: Simulator, requests: int) -> int:
+    """How a process ended that was killed after *requests* on the line."""
+    assert parent.stdin is not None
+    assert parent.stdout is not None
+    pause = threading.Event()
+    moment = simulator.line.requests + requests
+    print(simulator.port, file=parent.stdin, flush=True)
+    child = int(parent.stdout.readline())
+    with suppress(ProcessLookupError):  # it was done before
+        while simulator.line.requests < moment:  # the limit is the test's own
+            os.kill(child, 0)
+            pause.wait(0.0005)
+        os.kill(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(int(parent.stdout.readline()))

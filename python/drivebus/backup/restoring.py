@@ -180,7 +180,7 @@ class Restore:
                 gone = code
                 self._results[code] = (
                     "differs",
-                    "it was written, and the drive is not heard any more as the line is set",
+                    "it was written, and the drive was not heard since: it may obey its new line already",
                 )
 
     async def _write(self, code: str, raw: int, *, store: bool) -> int:
