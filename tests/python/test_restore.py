@@ -318,3 +318,30 @@ def lose(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
         write(bus, unit, first, value, **how)
 
     monkeypatch.setattr(Bus, "write", losing)
+
+
+@pytest.mark.parametrize(("family", "common"), [("gd300", True), ("vfd500", False)])
+def test_another_family_is_given_only_by_force_what_is_the_same_there(
+    virtual: Simulator, drive: Drive, store: Store, family: str, common: bool
+) -> None:
+    """P14.01 is the baud rate of a GD350, and a percentage of a VFD500."""
+    store(drive, {"P00.11": 3.0})
+    kept = drive.backup()
+    with Simulator({1: family}, transport="process", clock="virtual") as others, Bus(others) as bus:
+        other = bus.drive(1, family)
+        before = others.line.requests
+        for use in (other.restore, other.diff):
+            with pytest.raises(NotAllowed, match=f"the backup is of a gd350, and unit 1 is a {family}"):
+                use(kept)
+        assert others.line.requests == before
+        report = other.restore(kept, force=True)
+        restored = {item.code for item in report.having("restored")}
+        assert ("P00.11" in restored, "P14.01" in restored) == (common, False)
+        if not common:
+            assert others.drive(1).words_written == 0
+            missing = {item.code: item.reason for item in report.having("missing")}
+            assert (
+                missing["P14.01"]
+                == "P14.01 is another thing in a Veikong VFD500: A percentage whose name is not printed"
+            )
+    assert virtual.drive(1).take_writes()[-1][2] == 30

@@ -125,7 +125,7 @@ class Keeping(Parameters):
             if others:
                 raise NotAllowed(
                     f"the backup is not of the drive at unit {self.unit}: {'; '.join(others)}. To compare them all the "
-                    "same, say force=True",
+                    "same, say force=True (`--force`)",
                     unit=self.unit,
                 )
             left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
@@ -148,7 +148,7 @@ class Keeping(Parameters):
         if not force:
             raise NotAllowed(
                 f"the backup is of a {kept.origin.family}, and unit {self.unit} is a {self.profile.family}: a code may "
-                "mean another thing there; nothing was sent. If that is right, say force=True",
+                "mean another thing there; nothing was sent. If that is right, say force=True (`--force`)",
                 unit=self.unit,
             )
         return kept.translated(self.profile)

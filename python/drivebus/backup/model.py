@@ -135,11 +135,15 @@ class Backup(Mapping[str, Value]):
         return compare(self.profile, ours, theirs, everything=everything)
 
     def translated(self, profile: ProfileProtocol) -> Backup:
-        """The same values under the same codes of another family; `unread` says why some have none there."""
+        """The same values in the words of another family, where a code is called the same there; else in `unread`."""
         raw: dict[str, int] = {}
         unread: dict[str, str] = {}
         for code, value in self.items():
+            here = self.profile.describe(code)
             try:
+                there = profile.describe(code)
+                if (there.code, there.name, there.unit) != (here.code, here.name, here.unit):
+                    raise NotAllowed(f"{code} is another thing in a {profile.title}: {there.label}")
                 raw[code] = profile.encode(code, value)
             except NotAllowed as error:
                 unread[code] = str(error)

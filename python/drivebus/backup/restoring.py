@@ -80,7 +80,7 @@ class Restore:
         if others and not force:
             raise NotAllowed(
                 f"the backup is not of the drive at unit {self._drive.unit}: {'; '.join(others)}; nothing was written. "
-                "If that is right, say force=True",
+                "If that is right, say force=True (`--force`)",
                 unit=self._drive.unit,
             )
 

@@ -123,12 +123,12 @@ def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> Non
         others = Backup.load(path, drive.profile).origin.other(origin, unit=True)
     except NotAllowed as error:
         raise NotAllowed(
-            f"{path} is there and would be replaced, but: {error}; take another name, or force=True"
+            f"{path} is there and would be replaced, but: {error}; take another name, or force=True (`--force`)"
         ) from None
     if others:
         raise NotAllowed(
             f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or "
-            "force=True",
+            "force=True (`--force`)",
             unit=drive.unit,
         )
 
@@ -143,8 +143,8 @@ def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
         others.append(f"it was read with version {before.origin.profile_version} of the profile")
     if others:
         raise NotAllowed(
-            f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With resume=False it is "
-            "begun anew",
+            f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With "
+            "resume=False (`--fresh`) it is begun anew",
             unit=drive.unit,
         )
     return before

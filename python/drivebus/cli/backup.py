@@ -95,7 +95,7 @@ def restore(
     if not plan.ok:
         failed = sum(item.failed for item in plan)
         what = "parameter was" if failed == 1 else "parameters were"
-        click.echo(f"{failed} {what} not restored: see above.", err=True)
+        click.echo(f"{failed} {what} not restored{', and cannot be' if plan.dry_run else ''}: see above.", err=True)
         raise click.exceptions.Exit(1)
 
 
@@ -171,8 +171,8 @@ def _show_report(session: Session, report: drivebus.Restoration, end: str) -> No
         session.out.rows(["code", "drive", "backup", "unit", "result", "label", "reason"], rows)
     counts = {result: len(report.having(result)) for result in ("same", "skipped")}
     session.out.say(
-        f"{end} {counts['same']} are the same; {counts['skipped']} are left alone (fault history, read-only, and what "
-        "has to be asked for: serial settings, motor data).".strip()
+        f"{end} The same: {counts['same']}. Left alone: {counts['skipped']} (fault history, read-only, and what has to "
+        "be asked for: serial settings, motor data).".strip()
     )
 
 
