@@ -44,7 +44,13 @@ def test_what_is_only_assumed_is_read_where_that_is_asked_for(virtual_bus: Bus, 
     taken = drive.backup()
     assert taken.unread["P02.01"].startswith("that this family has it is only assumed: ")
     assert "P02.01" in drive.backup(unverified=True)
-    assert "P02.01" in virtual_bus.drive(1, "gd350", unverified=True).backup()
+    whole = virtual_bus.drive(1, "gd350", unverified=True).backup()
+    assert "P02.01" in whole
+    for asked in (False, True):
+        found = drive.diff(whole, unverified=asked)
+        report = {item.code: item.result for item in drive.restore(whole, motor=True, unverified=asked)}
+        assert (len(found), "P02.01" in found.uncompared) == (0, not asked)
+        assert report["P02.01"] == ("same" if asked else "skipped")
 
 
 def test_progress_counts_to_the_end(drive: Drive) -> None:

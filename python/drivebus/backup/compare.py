@@ -64,7 +64,7 @@ class Diff(Sequence[Difference]):
         self.left = left
         self.right = right
         self.compared = compared
-        self.uncompared = dict(uncompared)
+        self.uncompared: dict[str, str] = dict(uncompared)
 
     @overload
     def __getitem__(self, index: int) -> Difference: ...

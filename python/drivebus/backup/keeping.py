@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from drivebus import checks
@@ -101,7 +102,9 @@ class Keeping(Parameters):
         work = Restore(self.trusting(unverified), kept, dry_run=dry_run, progress=progress)
         return await work.run(groups=groups, serial=serial, motor=motor, force=force)
 
-    async def diff(self, backup: Kept | None = None, *, everything: bool = False, force: bool = False) -> Diff:
+    async def diff(
+        self, backup: Kept | None = None, *, everything: bool = False, force: bool = False, unverified: bool = False
+    ) -> Diff:
         """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.
 
         Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
@@ -110,7 +113,9 @@ class Keeping(Parameters):
         Args:
             backup: A backup, its file, or None.
             everything: Compare also what changes by itself.
-            force: Compare also with a backup of another identification or firmware.
+            force: Compare also with a backup of another identification or firmware, or of another family: then what is
+                called the same there.
+            unverified: Also what this family is only assumed to have.
 
         Raises:
             NotAllowed: The file is wrong, or of another family; nothing was sent.
@@ -130,9 +135,15 @@ class Keeping(Parameters):
                 )
             left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
         rules = Rules(self.profile)
+        drive = self.trusting(unverified)
+        unasked = {code: reason for code in left.raw if (reason := rules.unread(code, drive.unverified)) is not None}
+        left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
         codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
-        words = await Reader(self, sorted(codes, key=rules.place)).rest()
-        return compare(self.profile, left, Side(f"unit {self.unit}", words.raw, words.unread), everything=everything)
+        words = await Reader(drive, sorted(codes, key=rules.place)).rest()
+        right = Side(f"unit {self.unit}", words.raw, words.unread)
+        found = compare(self.profile, left, right, everything=everything)
+        found.uncompared.update(unasked)
+        return found
 
     def _kept(self, backup: Kept, force: bool = False) -> Backup:
         """*backup* in the words of this drive's family."""
