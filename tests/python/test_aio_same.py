@@ -7,6 +7,7 @@ every byte on the wire must be the same; only the words of echoes are made up af
 from __future__ import annotations
 
 import asyncio
+import functools
 import inspect
 from collections.abc import Callable
 from typing import Any
@@ -31,6 +32,17 @@ def _running(*then: Step) -> list[Step]:
         lambda _, drive: drive.run(10.0),
         *then,
     ]
+
+
+def _line() -> Simulator:
+    return Simulator({1: "gd350", 2: "gd350"}, transport="process", clock="virtual")
+
+
+@functools.cache
+def _backup() -> drivebus.Backup:
+    """What a drive from the factory has."""
+    with _line() as simulator, drivebus.Bus(simulator) as bus:
+        return bus.drive(1).backup()
 
 
 STEPS: dict[str, list[Step]] = {
@@ -68,6 +80,9 @@ STEPS: dict[str, list[Step]] = {
     "coast": _running(lambda _, drive: drive.coast()),
     "turn round": _running(lambda _, drive: drive.run(10.0, reverse=True)),
     "jog": [*_prepared(lambda _, drive: drive.jog(confirm=2.0)), lambda _, drive: drive.jog_stop()],
+    "backup": [lambda _, drive: drive.backup(), lambda _, drive: drive.diff()],
+    "restore": [lambda _, drive: drive.write("P00.11", 3.0, store=True), lambda _, drive: drive.restore(_backup())],
+    "dry run": [lambda _, drive: drive.restore(_backup(), dry_run=True), lambda _, drive: drive.diff(_backup())],
     "no fault": _prepared(lambda _, drive: drive.reset_fault()),
     "never reached": _running(lambda _, drive: drive.wait_for_speed(40.0, timeout=1.0)),
     "too fast": _prepared(lambda _, drive: drive.run(500.0)),
@@ -89,13 +104,9 @@ SPOILT = [
 ]
 
 
-def _line() -> Simulator:
-    return Simulator({1: "gd350", 2: "gd350"}, transport="process", clock="virtual")
-
-
 def _shown(value: object) -> object:
     """What can be compared; times of virtual lines begin when they were opened."""
-    if isinstance(value, (drivebus.Status,)):
+    if isinstance(value, (drivebus.Status, drivebus.Diff, drivebus.Restoration)):
         return str(value)
     if isinstance(value, drivebus.Snapshot):
         return dict(value)
