@@ -210,7 +210,10 @@ pub enum AccessError {
         note: String,
     },
     /// The family has no write to RAM only, or none is known.
-    #[error("{name} ({label}): no write that only RAM keeps is known for this family, so every write may wear EEPROM")]
+    #[error(
+        "{name} ({label}) can only be stored (store=True, `--store`): no write that RAM alone keeps is known for this \
+         family, and every write may wear EEPROM"
+    )]
     NoRam {
         /// What was to be written.
         name: String,

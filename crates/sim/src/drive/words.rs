@@ -80,7 +80,10 @@ impl Drive {
             Bit::Ready(place) => (u16::from(machine.fault().is_none()), place),
             Bit::NotReady(place) | Bit::Fault(place) => (u16::from(machine.fault().is_some()), place),
             Bit::Running(place) => (u16::from(machine.is_running()), place),
-            Bit::Reverse(place) => (u16::from(machine.frequency() < 0.0), place),
+            // At no frequency the command says which way it will turn.
+            Bit::Reverse(place) => {
+                (u16::from(machine.frequency() < 0.0 || machine.state() == RunState::Reverse), place)
+            }
             Bit::ReverseSetpoint(place) => (u16::from(self.settings.setpoint < 0.0), place),
             Bit::Jogging(place) => (u16::from(machine.is_jogging()), place),
             Bit::Ramp(place) => (machine.ramping() as u16, place),

@@ -1,0 +1,120 @@
+"""Every command of every family, given to a simulated drive: what the command register gets is the family's own code.
+
+The codes are those of `tests/vectors/families.toml`. They are looked for in the bytes on the line, so no profile and no
+operation of the library can hide another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from drivebus import Bus, Drive, NotAllowed, Simulator
+
+from .test_families import COMMANDS, FAMILIES, given
+
+STARTS = {"run_forward", "run_reverse", "jog_forward", "jog_reverse"}
+
+DO: dict[str, Callable[[Drive], None]] = {
+    "run_forward": lambda drive: drive.run(),
+    "run_reverse": lambda drive: drive.run(reverse=True),
+    "jog_forward": lambda drive: drive.jog(),
+    "jog_reverse": lambda drive: drive.jog(reverse=True),
+    "stop": lambda drive: drive.stop(),
+    "coast": lambda drive: drive.coast(),
+    "reset_fault": lambda drive: drive.reset_fault(),
+    "jog_stop": lambda drive: drive.jog_stop(),
+}
+BEFORE = {"stop": "run_forward", "coast": "run_forward", "jog_stop": "jog_forward"}
+"""What must go on for a command to have something to end."""
+
+EVERY = [(family, command) for family in FAMILIES for command in COMMANDS]
+KNOWN = [(family, command) for family, command in EVERY if given(family["commands"][command]) is not None]
+
+
+def each(several: list[tuple[dict[str, Any], str]]) -> pytest.MarkDecorator:
+    def name(part: dict[str, Any] | str) -> str:
+        return part if isinstance(part, str) else part["name"]
+
+    return pytest.mark.parametrize(("family", "command"), several, ids=name)
+
+
+@pytest.fixture
+def line(family: dict[str, Any]) -> Iterator[tuple[Simulator, Bus]]:
+    name = family["name"]
+    with Simulator({1: name}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        yield simulator, bus
+
+
+def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
+    """Unit 1; a VFD500 is told what unit its speed has, as its manual does not print the numbers of P30.14."""
+    if family == "vfd500":
+        return bus.drive(1, family, unverified=unverified, variants={"speed_unit": "Hz"})
+    return bus.drive(1, family, unverified=unverified)
+
+
+def prepare(drive: Drive) -> None:
+    """Where no write is known that RAM alone keeps, it is kept in EEPROM."""
+    drive.prepare_control(store=drive.profile.memory() is None)
+
+
+def commanded(simulator: Simulator) -> list[tuple[int, int]]:
+    """Address and word of all that was written where any family takes commands."""
+    found = []
+    for _, sender, frame in simulator.line.trace():
+        if sender != "master" or frame[1] not in (0x06, 0x10):
+            continue
+        address = int.from_bytes(frame[2:4], "big")
+        data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
+        words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
+        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in (0x2000, 0x7000)]
+    return found
+
+
+@each(EVERY)
+def test_the_code_on_the_line_is_the_familys_own(
+    line: tuple[Simulator, Bus], family: dict[str, Any], command: str
+) -> None:
+    simulator, bus = line
+    table = family["commands"]
+    register, code = given(table["register"]), given(table[command])
+    drive = drive_of(bus, family["name"], unverified=True)
+    if register is not None:
+        prepare(drive)
+    if code is None:
+        with pytest.raises(NotAllowed):
+            DO[command](drive)
+        assert commanded(simulator) == []
+        return
+    expected = []
+    if command in BEFORE:
+        DO[BEFORE[command]](drive)
+        expected.append((register, given(table[BEFORE[command]])))
+    elif command == "reset_fault":
+        simulator.drive(1).trip(1)
+    DO[command](drive)
+    assert commanded(simulator) == [*expected, (register, code)]
+
+
+@each(KNOWN)
+def test_what_no_document_prints_is_not_sent_unasked(
+    line: tuple[Simulator, Bus], family: dict[str, Any], command: str
+) -> None:
+    """A motor is not started either where neither of the ways to stop it may be used."""
+    simulator, bus = line
+    table = family["commands"]
+    doubted = set(table["needs_unverified"])
+    prepare(drive_of(bus, family["name"], unverified=True))
+    if command == "reset_fault":
+        simulator.drive(1).trip(1)
+    plain = drive_of(bus, family["name"], unverified=False)
+    refused = command in doubted or (command in STARTS and {"stop", "coast"} <= doubted)
+    if refused:
+        with pytest.raises(NotAllowed, match="unverified=True"):
+            DO[command](plain)
+        assert commanded(simulator) == []
+    else:
+        DO[command](plain)
+        assert commanded(simulator) == [(table["register"], table[command])]
