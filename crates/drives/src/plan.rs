@@ -48,8 +48,13 @@ pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl F
     wanted.dedup();
     let last_of = |span: &ReadSpan| span.address + (span.count - 1);
 
+    // Whether the drive answers for all that lies before a value, from the end of the one before.
+    let joined = |pair: &[ReadSpan]| (last_of(&pair[0]) + 1..pair[1].address).all(&readable);
+    let joins: Vec<bool> = std::iter::once(false).chain(wanted.windows(2).map(joined)).collect();
+
     // best[n] is the cheapest way to read the first n values: its cost, its number of reads, and where the last read
     // begins. The last read can only begin at one of the values before, as long as it is short enough.
+    let most = u64::from(rules.max_words.max(1));
     let mut best = vec![(0_u64, 0_usize, 0_usize)];
     for end in 1..=wanted.len() {
         let last = last_of(&wanted[end - 1]);
@@ -57,10 +62,9 @@ pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl F
         for start in (0..end).rev() {
             let first = wanted[start].address;
             let words = u64::from(last - first) + 1;
-            let hole = start + 1 < end && !(last_of(&wanted[start]) + 1..wanted[start + 1].address).all(&readable);
             let crosses = !rules.across_groups && first >> 8 != last >> 8;
             // One value alone is read, whatever the rules say: the drive is the one to refuse it.
-            if start + 1 < end && (words > u64::from(rules.max_words.max(1)) || hole || crosses) {
+            if start + 1 < end && (words > most || !joins[start + 1] || crosses) {
                 break;
             }
             let (before, reads, _) = best[start];

@@ -68,9 +68,13 @@ impl ReadPlan {
     /// The value of each entry in `words`, which holds those of all reads; none of an entry whose word is missing.
     pub fn values(&self, words: &[u16]) -> impl Iterator<Item = (&Quantity, Option<Value>)> {
         self.fields.iter().map(|field| {
-            let end = field.position + usize::from(field.quantity.words());
-            let value = words.get(field.position..end).and_then(|words| field.quantity.decode_words(words));
-            (&field.quantity, value)
+            let quantity = &field.quantity;
+            let value = if quantity.wide {
+                words.get(field.position..field.position + 2).and_then(|words| quantity.decode_words(words))
+            } else {
+                words.get(field.position).map(|&word| quantity.decode(word))
+            };
+            (quantity, value)
         })
     }
 }
