@@ -1,0 +1,233 @@
+"""Setpoints in engineering units, and words whose bits have names. GD350: chapter 9.4.5. VFD500: p. 135.
+
+P09.00 = 6 and P09.02 = 4 are what sister series print for a PID whose setpoint and feedback come over the bus.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+import drivebus
+import drivebus.aio
+from drivebus import Bus, Drive, NotAllowed, Simulator
+
+PID_SOURCE, FEEDBACK_SOURCE = 0x0900, 0x0902
+VIRTUAL_INPUTS, VIRTUAL_OUTPUTS, SPECIAL = 0x200A, 0x200B, 0x2009
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350", 2: "vfd500"}, transport="process", clock="virtual") as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def bus(simulator: Simulator) -> Iterator[Bus]:
+    with Bus(simulator, timeout=0.25) as bus:
+        yield bus
+
+
+@pytest.fixture
+def drive(bus: Bus, simulator: Simulator) -> Drive:
+    drive = bus.drive(1)
+    drive.prepare_control()
+    simulator.drive(1).take_writes()
+    return drive
+
+
+def taken(simulator: Simulator, unit: int = 1) -> list[tuple[int, int]]:
+    return [word[1:] for word in simulator.drive(unit).take_writes()]
+
+
+VALUES = [
+    # name, value, address and word of a GD350
+    ("torque", -50.0, 0x2004, 0x10000 - 500),
+    ("forward_limit", 45.5, 0x2005, 4550),
+    ("reverse_limit", 12.25, 0x2006, 1225),
+    ("motoring_torque_limit", 150.0, 0x2007, 1500),
+    ("braking_torque_limit", 300.0, 0x2008, 3000),
+    ("vf_voltage", 33.3, 0x200C, 333),
+    ("analog_output_1", 100.0, 0x200D, 1000),
+    ("analog_output_2", -12.5, 0x200E, 0x10000 - 125),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "address", "word"), VALUES)
+def test_what_is_set_goes_out_in_counts_and_is_read_back(
+    simulator: Simulator, drive: Drive, name: str, value: float, address: int, word: int
+) -> None:
+    setattr(drive, name, value)
+    assert taken(simulator) == [(address, word)]
+    assert getattr(drive, name) == value
+    drive.give(name, 0.0)
+    assert (drive.ask(name), taken(simulator)) == (0.0, [(address, 0)])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "address", "word"),
+    [
+        ("torque", -50.0, 0x7002, 0x10000 - 5000),
+        ("motoring_torque_limit", 150.0, 0x7005, 1500),
+        ("braking_torque_limit", 299.9, 0x7006, 2999),
+        ("pid", 50.0, 0x7007, 5000),
+        ("pid_feedback", -0.01, 0x7008, 0xFFFF),
+        ("vf_voltage", 33.3, 0x7009, 333),
+    ],
+)
+def test_another_family_counts_otherwise(
+    simulator: Simulator, bus: Bus, name: str, value: float, address: int, word: int
+) -> None:
+    drive = bus.drive(2, "vfd500")
+    setattr(drive, name, value)
+    assert taken(simulator, 2) == [(address, word)]
+    with pytest.raises(NotAllowed, match="can only be written"):
+        getattr(drive, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("torque", 300.1), ("torque", float("nan")), ("torque", "much"), ("torque", True), ("vf_voltage", -0.1)],
+)
+def test_a_value_that_is_none_is_not_sent(simulator: Simulator, drive: Drive, name: str, value: object) -> None:
+    with pytest.raises(NotAllowed):
+        setattr(drive, name, value)
+    assert taken(simulator) == []
+
+
+def test_a_limit_is_held_against_the_drives_own_maximum(simulator: Simulator, drive: Drive) -> None:
+    with pytest.raises(NotAllowed, match=r"fwd_upper_frequency .*= 60 Hz is above P00\.03 .*is 50 Hz"):
+        drive.forward_limit = 60.0
+    assert taken(simulator) == []
+
+
+def test_what_the_family_does_not_have_is_said(bus: Bus, simulator: Simulator) -> None:
+    drive = bus.drive(2, "vfd500")
+    attempts: list[Callable[[], None]] = [
+        lambda: setattr(drive, "analog_output_1", 5.0),
+        lambda: drive.give("speed", 5.0),
+        lambda: drive.set_virtual_inputs(S1=True),
+    ]
+    for attempt in attempts:
+        with pytest.raises(NotAllowed, match="of Veikong VFD500 is known, only frequency, torque"):
+            attempt()
+    with pytest.raises(NotAllowed, match="setpoint 'speed' is unknown"):
+        drive.check_control("speed")
+    assert taken(simulator, 2) == []
+
+
+class TestWhatTheDriveHeeds:
+    @pytest.mark.parametrize(
+        ("name", "source", "number", "register"),
+        [("pid", "P09.00", 6, 0x2002), ("pid_feedback", "P09.02", 4, 0x2003)],
+    )
+    def test_a_setpoint_that_would_be_ignored_is_not_sent(
+        self, simulator: Simulator, drive: Drive, name: str, source: str, number: int, register: int
+    ) -> None:
+        with pytest.raises(NotAllowed, match=rf"would not heed.*\n{source}.*needs {number}.*\n.*setpoint='{name}'"):
+            setattr(drive, name, 50.0)
+        assert taken(simulator) == []
+        assert not drive.check_control(name)
+        with pytest.raises(NotAllowed, match=rf"{source}.*not verified"):
+            drive.prepare_control(setpoint=name)
+        assert taken(simulator) == []
+        control = drive.prepare_control(setpoint=name, unverified=True)
+        assert [item.code for item in control] == ["P00.01", "P00.02", source]
+        assert taken(simulator) == [(0x8000 | drive.profile.address(source), number)]
+        setattr(drive, name, 50.0)
+        assert taken(simulator) == [(register, 500)]
+
+    def test_by_its_own_name_it_is_written_all_the_same(self, simulator: Simulator, drive: Drive) -> None:
+        drive.write("pid_reference", 50.0)
+        assert taken(simulator) == [(0x2002, 500)]
+
+
+class TestBits:
+    def test_terminals_have_names(self, simulator: Simulator, bus: Bus, drive: Drive) -> None:
+        simulator.drive(1).inputs = 0b100010
+        inputs = drive.inputs()
+        assert inputs == {"S1": False, "S2": True, "S3": False, "S4": False, "HDIA": False, "HDIB": True}
+        assert drive.outputs() == {"Y1": False, "HDO": False, "RO1": False, "RO2": False}
+        assert set(bus.drive(2, "vfd500").inputs()) == {"DI1", "DI2", "DI3", "DI4", "DI5"}
+        with pytest.raises(NotAllowed, match="no output state word"):
+            bus.drive(2, "vfd500").outputs()
+
+    def test_any_word_is_told_in_the_words_of_its_fields(self, drive: Drive) -> None:
+        fields = drive.bits("status_word_2")
+        assert (fields["ready"], fields["control_channel"], fields["motor"]) == ("ready", "communication", "motor 1")
+        assert drive.bits("bus_voltage") == {}
+
+    def test_outputs_keep_what_is_not_named(self, simulator: Simulator, drive: Drive) -> None:
+        drive.set_virtual_outputs(RO1=True, Y1=True)
+        drive.set_virtual_outputs(Y1=False, RO2=True)
+        assert taken(simulator) == [(VIRTUAL_OUTPUTS, 0b0101), (VIRTUAL_OUTPUTS, 0b1100)]
+
+    def test_what_can_only_be_written_is_off_where_it_is_not_named(self, simulator: Simulator, bus: Bus) -> None:
+        drive = bus.drive(2, "vfd500")
+        drive.set_virtual_outputs(DO2=True, VDO1=True)
+        drive.set_virtual_outputs(DO1=True)
+        assert taken(simulator, 2) == [(0x700A, 0x0102), (0x700A, 0x0001)]
+
+    def test_the_special_control_word(self, simulator: Simulator, drive: Drive) -> None:
+        drive.special_control(motor=2, pre_excitation=True)
+        drive.special_control(dc_brake="on", motor="motor 1", pre_excitation=False)
+        assert taken(simulator) == [(SPECIAL, 0b010001), (SPECIAL, 0b100000)]
+
+    @pytest.mark.parametrize(
+        ("given", "message"),
+        [
+            ({"engine": 1}, "'engine' is unknown"),
+            ({"motor": 5}, "motor 5 is nothing that .*3 = motor 4"),
+            ({"motor": True}, "motor True"),
+            ({"dc_brake": "maybe"}, "dc_brake 'maybe'"),
+            ({}, "nothing to set"),
+        ],
+    )
+    def test_a_bit_that_is_none(self, simulator: Simulator, drive: Drive, given: dict[str, Any], message: str) -> None:
+        with pytest.raises(NotAllowed, match=message):
+            drive.special_control(**given)
+        assert taken(simulator) == []
+
+    def test_inputs_can_start_a_motor_so_they_are_checked_as_a_start(self, simulator: Simulator, drive: Drive) -> None:
+        drive.set_virtual_inputs(S1=True, HDIA=True)
+        drive.set_virtual_inputs(S8=True, S1=False)
+        assert taken(simulator) == [(VIRTUAL_INPUTS, 0b0000010001), (VIRTUAL_INPUTS, 0b1000010000)]
+        simulator.drive(1).trip("OL1")
+        with pytest.raises(NotAllowed, match="in fault OL1"):
+            drive.set_virtual_inputs(S1=True)
+        assert taken(simulator) == []
+
+    def test_and_they_are_sent_once(self, simulator: Simulator, drive: Drive) -> None:
+        drive.bus.echo(1)  # type: ignore[attr-defined]
+        for name in ("set_virtual_inputs", "special_control"):
+            simulator.line.script([(3, "silence")])  # a look, the word as it is, and the one that is written
+            field = {"S1": True} if name == "set_virtual_inputs" else {"dc_brake": True}
+            with pytest.raises(drivebus.Unconfirmed, match=r"the motor may turn.*not repeated"):
+                getattr(drive, name)(**field)
+            assert len(taken(simulator)) == 1
+
+
+def test_the_awaitable_face_has_the_same(simulator: Simulator) -> None:
+    async def main() -> None:
+        async with drivebus.aio.Bus(simulator, timeout=0.25) as bus:
+            drive = await bus.drive(1)
+            await drive.prepare_control()
+            simulator.drive(1).take_writes()
+            for name, value, address, word in VALUES:
+                await getattr(drive, f"set_{name}")(value)
+                assert await getattr(drive, name) == value
+                assert taken(simulator) == [(address, word)]
+            with pytest.raises(NotAllowed, match="would not heed"):
+                await drive.set_pid(50.0)
+            await drive.set_virtual_outputs(Y1=True)
+            assert (await drive.inputs())["S1"] is False
+            assert (await drive.bits("virtual_output"))["Y1"] == "on"
+            await drive.special_control(motor=3)
+            await drive.write_words(0x2001, 1000)
+            assert await drive.setpoint == 10.0
+            assert taken(simulator) == [(VIRTUAL_OUTPUTS, 1), (SPECIAL, 2), (0x2001, 1000)]
+
+    asyncio.run(main())
