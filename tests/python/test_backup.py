@@ -35,8 +35,8 @@ def test_every_parameter_is_read_in_the_fewest_reads(virtual: Simulator, drive: 
     every = [name for name in drive.profile.names() if name.startswith("P")]
     assert {*taken, *taken.unread} == {*every}
     readable = [name for name in every if name not in ("P02.01", "P07.00")]
-    # One more asks who it is.
-    assert virtual.line.requests - before == len(drive.profile.compile(readable).reads) + 1
+    # Two more ask who it is, for the file and to know it again.
+    assert virtual.line.requests - before == len(drive.profile.compile(readable).reads) + 2
     assert virtual.drive(1).words_written == 0
 
 
@@ -75,7 +75,7 @@ def test_a_locked_drive_ends_it(drive: Drive, virtual: Simulator, store: Store) 
     before = virtual.line.requests
     with pytest.raises(drivebus.Refused, match="password"):
         drive.backup()
-    assert virtual.line.requests - before <= 2
+    assert virtual.line.requests - before <= 3  # who it is, twice, and the first read
 
 
 @pytest.mark.parametrize("broken_at", [3, 10, 21])
@@ -102,6 +102,26 @@ def test_a_break_costs_nothing_that_was_read(
     assert (seen[0], again.raw) == (half, whole.raw)
     assert (part.exists(), Backup.load(path).complete) == (False, True)
     assert 0 < half < len(whole)
+
+
+@pytest.mark.parametrize("use", ["backup", "diff", "restore"])
+def test_nothing_is_taken_of_another_drive_behind_the_port(
+    virtual_bus: Bus, drive: Drive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, use: str
+) -> None:
+    """Another thread opened the port again, and the cable leads elsewhere now."""
+    path = tmp_path / "drive.toml"
+    drive.backup(path)
+    read, count = Bus.read, [0]
+
+    def elsewhere(bus: Bus, unit: int, first: int, words: int = 1, /, **how: bool) -> list[int]:
+        count[0] += 1
+        found = read(bus, unit, first, words, **how)
+        return [0x01A2] if first == 0x2103 and count[0] > 8 else found
+
+    monkeypatch.setattr(Bus, "read", elsewhere)
+    monkeypatch.setattr(Bus, "reconnects", property(lambda _: int(count[0] > 8)))
+    with pytest.raises(NotAllowed, match="another drive answers as unit 1 since the port was opened again"):
+        getattr(virtual_bus.drive(1, "gd350"), use)(path)
 
 
 def test_a_half_backup_is_neither_restored_nor_compared(drive: Drive, tmp_path: Path) -> None:

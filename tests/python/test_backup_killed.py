@@ -151,7 +151,7 @@ def test_a_backup_that_was_killed_goes_on(tmp_path: Path) -> None:
             requests = simulator.line.requests - before
         gone_on: list[int] = []
         for _ in range(10):
-            assert killed(parent, simulator, chance.randint(12, 20)) == -signal.SIGKILL
+            assert killed(parent, simulator, chance.randint(16, 22)) == -signal.SIGKILL
             assert not path.exists()
             with Bus(simulator) as bus:
                 there = len(Backup.load(path.with_name(f"{path.name}.part")))

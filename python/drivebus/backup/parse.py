@@ -74,6 +74,7 @@ class _File:
     drive: dict[str, Any] = field(default_factory=dict)
     parameters: list[tuple[int, str, object]] = field(default_factory=list)
     section: str = ""
+    tried: set[str] = field(default_factory=set)
 
     def refuse(self, profile: ProfileProtocol | None = None) -> NotAllowed:
         """The error that names each wrong line; *profile* is what they were checked against."""
@@ -170,6 +171,7 @@ def _toml(text: str) -> dict[str, Any]:
 
 def _head(file: _File, key: str, value: object) -> None:
     """One line before the parameters."""
+    file.tried.add(key)
     known, place = (_DRIVE, file.drive) if file.section else (_TOP, file.top)
     where = f"[{file.section}]" if file.section else "the beginning"
     if key not in known:
@@ -189,10 +191,10 @@ def _head(file: _File, key: str, value: object) -> None:
 
 def _check_head(file: _File) -> None:
     given = file.top.get("format")
-    if given != FORMAT and not any("format" in reason for _, reason in file.wrong):
+    if given != FORMAT and (given is not None or "format" not in file.tried):
         what = "no line `format = 1`: it is no backup" if given is None else f"format {given}, which is not known"
         file.wrong.insert(0, (1, f"the file has {what}"))
-    if "family" not in file.drive and not any("family" in reason for _, reason in file.wrong):
+    if "family" not in file.drive and "family" not in file.tried:
         file.wrong.append((1, 'the file does not say whose it is: [drive] lacks a line such as family = "gd350"'))
 
 

@@ -41,6 +41,7 @@ class Reader:
 
         Raises:
             Refused: The drive is locked by a password: it would refuse each.
+            NotAllowed: Another drive answers at this address since the port was opened again.
             NoAnswer, BadAnswer, PortError: See each.
         """
         if not self._planned:
@@ -48,8 +49,12 @@ class Reader:
                 return None
             self._plan(self._waiting.pop())
         address, count, inside = self._planned.pop(0)
+        drive = self._drive
+        # Known before the first answer, so that a port that is opened again meanwhile brings no words of another drive.
+        await drive._identity.check(drive.bus)
         try:
-            words = await self._drive.read_words(address, count)
+            words = await drive.read_words(address, count)
+            await drive._identity.check(drive.bus)
         except Refused as error:
             if error.name == _LOCKED:
                 raise
