@@ -16,7 +16,7 @@ from drivebus.protocols import ProfileProtocol
 __all__ = ["KnownUnits", "check_words"]
 
 _WRITE, _WRITE_MANY = 0x06, 0x10
-_HINT = "nothing was sent; if it is meant, say force=True"
+_HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
 
 
 class KnownUnits:

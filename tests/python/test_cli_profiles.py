@@ -194,3 +194,131 @@ def test_help_names_all_families() -> None:
         text = " ".join(run(*words).stdout.split())
         for family in drivebus.profiles():
             assert family in text
+
+
+def at(port: str, *words: str, **options: Any) -> Result:
+    """A command to a simulated drive, in virtual time."""
+    result = CliRunner().invoke(cli, ["--port", f"sim://{port}?clock=virtual", *words], prog_name="drivebus", **options)
+    assert "Traceback" not in result.output
+    return result
+
+
+def told(port: str, *words: str) -> list[dict[str, Any]]:
+    result = at(port, "--json", *words)
+    assert result.exit_code == 0, result.output
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+class TestSureness:
+    """Each family says what it is as far as its manuals go, and no command falls over what is not known of it."""
+
+    @pytest.mark.parametrize("family", drivebus.profiles())
+    @pytest.mark.parametrize("command", [["info"], ["status"], ["faults"], ["monitor", "--count", "1"], ["scan"]])
+    def test_every_command_that_looks(self, family: str, command: list[str]) -> None:
+        for options in ([], ["--json"], ["--unverified"]):
+            result = at(family, "--profile", family, *options, *command)
+            # Of a rectifier nothing may be known that could be watched.
+            assert result.exit_code in ((0, 2) if command[0] == "monitor" else (0,)), result.output
+            assert bool(result.stderr) == bool(result.exit_code)
+
+    @pytest.mark.parametrize(
+        ("family", "code", "certainty"),
+        [
+            # GD350 manual, section 9.4.5: 01A0H, 0108H, 0109H; 010AH is the GD300L's as well.
+            ("gd350", "0x01a0", "certain"),
+            ("gd35", "0x0108", "certain"),
+            ("gd35-h1", "0x0109", "certain"),
+            ("gd300", "0x010a", "shared"),
+            ("vfd500", None, "by answers"),
+            ("gd600", None, "unknown"),
+        ],
+    )
+    def test_info_says_how_sure_it_is(self, family: str, code: str | None, certainty: str) -> None:
+        first = told(family, "--profile", family, "info")[0]
+        assert (first["profile"], first["identification"], first["certainty"]) == (family, code, certainty)
+        assert first["reason"]
+
+    def test_info_shows_what_it_found_where_that_is_not_enough(self) -> None:
+        result = at("vfd500", "info")
+        assert result.exit_code == 2
+        assert "by answers" in result.stdout
+        assert "vfd500" in result.stderr
+
+    def test_info_of_a_drive_that_is_taken_for_another(self) -> None:
+        result = at("gd35", "--profile", "gd350", "info")
+        assert (result.exit_code, "does not say that it is one" in result.stderr) == (0, True)
+
+    def test_status_says_what_it_cannot_tell_and_why(self) -> None:
+        [status] = told("vfd500", "--profile", "vfd500", "status")
+        assert status["state"] == "unknown"
+        assert "address" in status["missing"]["state"]
+        text = at("vfd500", "--profile", "vfd500", "status").stdout
+        assert "Not told:" in text
+        assert "unknown" not in text.partition("Not told:")[0]
+
+    def test_an_overlay_makes_the_state_usable(self, tmp_path: Path) -> None:
+        """With the very addresses that the profile only assumes, and so the simulated drive has."""
+        run("profiles", "new", tmp_path / "ours", "--overlay", "vfd500")
+        with (tmp_path / "ours/parameters.csv").open("a", encoding="utf-8") as file:
+            file.write("r27.18,status_word_1,What the motor does,,1,no,,,,,,,ro,,yes,,Our manual\n")
+        [status] = told("vfd500", "--profile", str(tmp_path / "ours"), "status")
+        assert status["state"] == "stopped"
+
+    def test_a_stop_to_who_does_not_say_what_it_is(self) -> None:
+        for command in ("stop", "coast"):
+            result = at("gd600", command)
+            assert result.exit_code == 2
+            for said in (f"not told to {command}", "--profile", "gd600", "emergency stop"):
+                assert said in result.stderr
+
+    def test_doubtful_values_are_marked(self) -> None:
+        [row] = told("gd35", "--profile", "gd35", "read", "P00.03")
+        assert row["evidence"] == "unverified"
+        assert "unverified" in at("gd35", "--profile", "gd35", "read", "P00.03").stdout
+        assert "verified" not in at("gd350", "read", "P00.03").stdout
+        [sample] = told("vfd500", "--profile", "vfd500", "--unverified", "monitor", "--count", "1")
+        assert sample["evidence"]["status_word_1"] == "assumed"
+
+    def test_what_may_not_be_read_says_why_and_how(self) -> None:
+        result = at("vfd500", "--profile", "vfd500", "read", "status_word_1")
+        assert (result.exit_code, "--unverified" in result.stderr) == (2, True)
+        [row] = told("vfd500", "--profile", "vfd500", "--unverified", "read", "status_word_1")
+        assert row["evidence"] == "assumed"
+        env = {"DRIVEBUS_UNVERIFIED": "1"}
+        assert at("vfd500", "--profile", "vfd500", "read", "status_word_1", env=env).exit_code == 0
+
+
+class TestForce:
+    """5 stops an INVT drive; a VFD500 coasts by it, and knows no 9."""
+
+    @pytest.mark.parametrize(
+        ("profile", "frame", "allowed"),
+        [
+            ([], "01 06 70 00 00 05", True),
+            ([], "01 06 70 00 00 09", False),
+            ([], "01 10 70 00 00 01 02 00 09", False),
+            (["--profile", "vfd500"], "01 06 70 00 00 06", True),
+            (["--profile", "vfd500"], "01 06 70 00 00 09", False),
+            (["--profile", "vfd500"], "01 06 20 00 00 05", False),
+        ],
+    )
+    def test_raw_sends_no_command_that_there_is_not(self, profile: list[str], frame: str, allowed: bool) -> None:
+        result = at("vfd500", *profile, "raw", frame, "--yes")
+        assert ("--force" in result.stderr) is not allowed
+        assert (result.exit_code == 0) is allowed, result.output
+        assert bool(result.stdout) is allowed
+        assert "sent" in at("vfd500", *profile, "raw", frame, "--yes", "--force").stdout
+
+    def test_write_to_an_address_without_a_name(self) -> None:
+        result = at("gd350", "write", "4000H=5", "--yes")
+        assert (result.exit_code, "--force" in result.stderr) == (2, True)
+        # The drive has nothing there either.
+        result = at("gd350", "write", "4000H=5", "--yes", "--force")
+        assert (result.exit_code, "illegal_address" in result.stderr) == (4, True)
+        assert at("gd350", "write", "4000H=5", "--force").exit_code == 2
+        for value in ("65536", "-1", "0.5", "on"):
+            assert at("gd350", "write", f"4000H={value}", "--yes", "--force").exit_code == 2
+
+    def test_write_does_not_read_what_can_only_be_written(self) -> None:
+        [row] = told("vfd500", "--profile", "vfd500", "write", "torque_setting=10", "--yes")
+        assert (row["name"], row["value"]) == ("torque_setting", 10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -67,24 +68,37 @@ def faults(session: Session, everything: bool) -> None:
     if everything:
         _show_all(session)
         return
-    with session.drive() as drive:
-        present, history, values = drive.fault(), drive.fault_history(), _values_of_the_last(drive)
     out = session.out
+    with session.drive() as drive:
+        history = drive.fault_history()
+        kept = bool(profile_of(drive).fault_history)
+        try:
+            present, reason = drive.fault(), None
+        except drivebus.NotAllowed as error:
+            present, reason = None, str(error)
     if out.as_json:
+        if reason is not None:
+            out.record({"when": "now", "missing": reason})
         listed = [("now", present)] if present is not None else []
-        out.rows(["when", *_COLUMNS], [[when, *_row(fault)] for when, fault in [*listed, *_numbered(history)]])
-        if values:
-            out.record({"when": "values at the last fault", **{name: value for name, value, _, _ in values}})
+        for when, fault in [*listed, *_numbered(history)]:
+            out.record({"when": when, **dict(zip(_COLUMNS, _row(fault), strict=True)), "values": dict(fault.values)})
         return
-    out.say("No fault now." if present is None else f"Now: {present}")
+    if reason is not None:
+        out.say(f"Whether there is a fault now is not told: {reason}")
+    else:
+        out.say("No fault now." if present is None else f"Now: {present}")
     if present is not None:
-        out.facts({"cause": present.cause, "remedy": present.remedy})
-    out.say("History, the latest first:" if history else "The history is empty.")
-    if history:
+        out.facts({"cause": present.cause, "remedy": present.remedy, "note": present.note})
+    if not kept:
+        out.say("Where this family keeps its last faults is not known.")
+    elif not history:
+        out.say("The history is empty, or may not be read.")
+    else:
+        out.say("History, the latest first:")
         out.rows(["when", *_COLUMNS], [[when, *_row(fault)] for when, fault in _numbered(history)])
-    if values:
-        out.say("What the drive kept of the last fault:")
-        out.rows(["parameter", "value", "unit", "label"], values)
+        if history[0].values:
+            out.say("What the drive saw at the last one:")
+            out.rows(["parameter", "value", "unit", "label"], _values(drive, history[0].values))
 
 
 _COLUMNS = ["code", "mnemonic", "label", "cause", "remedy", "verified"]
@@ -105,16 +119,9 @@ def _show_all(session: Session) -> None:
     session.out.rows(_COLUMNS, [_row(fault) for fault in known])
 
 
-def _values_of_the_last(drive: drivebus.Drive) -> list[list[Any]]:
-    """What the parameters hold in which the drive keeps the values of its last fault, where it has such."""
-    rows = []
-    for name in profile_of(drive).fault_values:
-        known = drive.describe(name)
-        try:
-            rows.append([known.code or known.name, drive.read(name), known.unit, known.label])
-        except (drivebus.NotAllowed, drivebus.Refused):
-            continue  # not every drive of a family has all of them, and some are not known well enough
-    return rows
+def _values(drive: drivebus.Drive, values: Mapping[str, Any]) -> list[list[Any]]:
+    known = [(value, drive.describe(name)) for name, value in values.items()]
+    return [[row.code or row.name, value, row.unit, row.label] for value, row in known]
 
 
 COMMANDS = [faults, describe]

@@ -13,15 +13,19 @@ __all__ = ["COMMANDS"]
 _READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x08})
 """Function codes that change nothing in a unit."""
 
+_WRITE, _WRITE_MANY = 0x06, 0x10
+
 
 @click.command()
 @click.argument("data", metavar="HEX...", nargs=-1, required=True)
+@click.option("--force", is_flag=True, help="Also a command that the family does not define.")
 @yes_option
 @pass_session
-def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
+def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None:
     """Send any request and show the answer: unit and PDU in hexadecimal, without the CRC.
 
-    As the serial assistants of the manuals: `drivebus raw 01 03 21 00 00 01`.
+    As the serial assistants of the manuals: `drivebus raw 01 03 21 00 00 01`. What it writes to a command register must
+    be a command of the family (--profile; without it, of any family that has its commands there), or --force.
     """
     body = names.parse_hex(data)
     if not 2 <= len(body) <= 254:
@@ -30,17 +34,27 @@ def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
     if not 1 <= unit <= 247:
         raise click.UsageError(f"unit {unit:02X} is nobody who answers; the first byte is the unit, 01..F7")
     with session.bus() as bus:
+        if session.profile is not None:
+            # From now on the bus knows what the unit is, and refuses what would be no command of its family.
+            bus.drive(unit, session.profile)
+        elif not force:
+            _check_commands(unit, body)
         if pdu[0] not in _READS:
             session.ask(f"Function {pdu[0]:02X}H writes, which can move the motor", yes, unit)
-        _show_frame(session, "sent", _framed(body))
         try:
-            answer = bus.transact(unit, pdu)
-        except drivebus.Refused as error:
+            answer = bus.transact(unit, pdu, force=force)
+        except drivebus.NotAllowed:
+            raise
+        except drivebus.DrivebusError as error:
+            _show_frame(session, "sent", _framed(body))
+            if not isinstance(error, drivebus.Refused):
+                raise
             _show_frame(session, "answer", error.raw)
             if session.profile is not None:
                 name, meaning = drivebus.Profile.find(session.profile).exception(error.code)
                 session.out.say(f"{'':<7}{session.profile} means by it: {name}, {meaning}")
             raise
+        _show_frame(session, "sent", _framed(body))
         _show_frame(session, "answer", _framed(bytes([unit]) + answer))
 
 
@@ -50,6 +64,29 @@ def raw(session: Session, data: tuple[str, ...], yes: bool) -> None:
 def decode(session: Session, data: tuple[str, ...]) -> None:
     """Take a whole frame apart, CRC included."""
     _show_frame(session, "frame", names.parse_hex(data))
+
+
+def _check_commands(unit: int, body: bytes) -> None:
+    """Raises `NotAllowed` where *body* writes to a command register a code that no family with that register defines.
+
+    What the unit is, nobody has said; what it cannot mean is known all the same.
+    """
+    numbers = [int.from_bytes(body[at : at + 2], "big") for at in range(2, len(body) - 1, 2)]
+    if body[1] == _WRITE and len(body) == 6:
+        first, *words = numbers
+    elif body[1] == _WRITE_MANY and len(body) > 7:
+        first, words = numbers[0], [int.from_bytes(body[at : at + 2], "big") for at in range(7, len(body) - 1, 2)]
+    else:
+        return
+    families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
+    for address, word in enumerate(words, first):
+        there = [family for family in families if family.command_address == address]
+        if there and not any(word in family.command_codes() for family in there):
+            raise drivebus.NotAllowed(
+                f"{word} at {address:04X}H is no command of any family whose commands stand there "
+                f"({', '.join(family.name for family in there)}); nothing was sent to unit {unit}. With --profile the "
+                "family is known; with --force it is sent all the same"
+            )
 
 
 def _framed(body: bytes) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from typing import Any
 
@@ -10,9 +11,9 @@ from rich.live import Live
 from rich.progress import Progress
 
 import drivebus
-from drivebus.cli import names
+from drivebus.cli import names, rules
 from drivebus.cli.output import Output
-from drivebus.cli.session import Session, pass_session
+from drivebus.cli.session import Session, pass_session, profile_of
 
 __all__ = ["COMMANDS"]
 
@@ -60,57 +61,98 @@ def _show_found(session: Session, found: drivebus.Found) -> None:
     if session.out.as_json:
         session.out.record(vars(found))
         return
+    family = found.profile or " or ".join(found.candidates) or "unknown family"
     code = "" if found.identification is None else f", identification {found.identification:#06x}"
+    sure = "" if found.certainty in ("certain", "unknown") else f", {found.certainty}"
     problem = f" ({found.problem})" if found.problem else ""
-    session.out.say(
-        f"unit {found.unit}: {found.profile or 'unknown family'}{code}, {found.round_trip * 1000:.1f} ms{problem}"
-    )
+    session.out.say(f"unit {found.unit}: {family}{code}{sure}, {found.round_trip * 1000:.1f} ms{problem}")
 
 
 @click.command()
 @pass_session
 def info(session: Session) -> None:
-    """Say what the drive is, and whether it is set to obey the bus."""
+    """Say what the drive is and how sure that is, what is known of its family, and whether it obeys the bus."""
+    out = session.out
     with session.bus() as bus:
-        drive = session.drive_on(bus)
+        found = bus.identify(session.unit)
+        facts: dict[str, Any] = {
+            "unit": found.unit,
+            "identification": None if found.code is None else f"{found.code:#06x}",
+            "certainty": found.certainty,
+            "reason": found.reason,
+            "may_be": found.candidates if out.as_json else " or ".join(found.candidates),
+            "port": bus.port,
+            "line": f"{session.baud} {''.join(session.line_format)}",
+        }
+        try:
+            drive = session.drive_on(bus)
+        except drivebus.NotAllowed:
+            out.facts(facts)
+            raise
         control = drive.check_control()
-        session.out.facts(
+        profile = profile_of(drive)
+        out.facts(
             {
                 "unit": drive.unit,
-                "profile": drive.profile.name,
-                "title": drive.profile.title,
-                "identification": f"{int(drive.read('identification_code')):#06x}",
-                "port": bus.port,
-                "line": f"{session.baud} {''.join(session.line_format)}",
-                "round_trip_ms": round(bus.echo(drive.unit) * 1000, 3),
+                "profile": profile.name,
+                "family": profile.family,
+                "title": profile.title,
+                "kind": profile.kind,
+                **facts,
+                "memory": "; ".join(rules.memory(profile)),
+                "round_trip_ms": _round_trip(bus, drive.unit),
                 "status": str(drive.status()),
-                "obeys_bus": bool(control),
+                "obeys_bus": bool(control) if len(control) else None,
             }
         )
-        session.out.rows(
-            ["code", "is", "needed", "ok", "verified", "label"],
-            [[item.code, item.actual, item.wanted, item.ok, item.verified, item.label] for item in control],
+        if found.candidates and profile.family not in found.candidates:
+            click.echo(f"It is treated as a {profile.family}, and does not say that it is one.", err=True)
+        if not len(control):
+            out.say("What makes it obey the bus is not known.")
+            return
+        out.rows(
+            ["code", "is", "needed", "ok", "verified", "label", "note"],
+            [[item.code, item.actual, item.wanted, item.ok, item.verified, item.label, item.note] for item in control],
         )
+
+
+def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
+    """Milliseconds there and back; None if the unit takes no echo."""
+    try:
+        return round(bus.echo(unit) * 1000, 3)
+    except drivebus.Refused:
+        return None
 
 
 @click.command()
 @pass_session
 def status(session: Session) -> None:
-    """Say what the drive is doing."""
+    """Say what the drive is doing; and what its family, or what is known of it, does not tell, and why."""
+    out = session.out
     with session.drive() as drive:
         now = drive.status()
-        session.out.facts(
-            {
-                "state": now.state if session.out.as_json else str(now.state),
-                "ready": now.ready,
-                "frequency": now.frequency if session.out.as_json else f"{now.frequency:.2f} Hz",
-                "setpoint": now.setpoint if session.out.as_json else f"{now.setpoint:.2f} Hz",
-                "commands_from": now.source,
-                "motor": now.motor,
-                "overload_alarm": now.overload_alarm,
-                "fault": now.fault,
-            }
-        )
+    values: dict[str, Any] = {
+        "state": now.state,
+        "ready": now.ready,
+        "frequency": now.frequency,
+        "setpoint": now.setpoint,
+        "commands_from": now.source,
+        "motor": now.motor,
+        "overload_alarm": now.overload_alarm,
+        "fault": now.fault,
+    }
+    if out.as_json:
+        out.record({**values, "missing": dict(now.missing)})
+        return
+    if "state" in now.missing:
+        values["state"] = None
+    for name in ("frequency", "setpoint"):
+        if values[name] is not None:
+            values[name] = f"{values[name]:.2f} Hz"
+    out.facts(values)
+    if now.missing:
+        out.say("Not told:")
+        out.facts(now.missing)
 
 
 @click.command()
@@ -124,11 +166,19 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
     with session.drive() as drive:
         profile = drive.profile
         known = [names.named(profile, text) for text in wanted]
+        doubtful = {name: drive.describe(name).evidence for name in known or profile.monitor_names()}
+        doubtful = {name: evidence for name, evidence in doubtful.items() if evidence != "verified"}
         taken = 0
         with Live(console=out.console, auto_refresh=False) if out.live else nullcontext() as live:
             try:
                 while True:
-                    _show_sample(out, live, drive.monitor(*known))
+                    snapshot = drive.monitor(*known)
+                    if not snapshot:
+                        raise drivebus.NotAllowed(
+                            f"nothing that is known of {profile.title} may be watched without --unverified; name what "
+                            "you want to see"
+                        )
+                    _show_sample(out, live, snapshot, doubtful)
                     taken += 1
                     if taken == count:
                         return
@@ -137,14 +187,19 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
                 return
 
 
-def _show_sample(out: Output, live: Live | None, snapshot: drivebus.Snapshot) -> None:
+def _show_sample(out: Output, live: Live | None, snapshot: drivebus.Snapshot, doubtful: Mapping[str, str]) -> None:
+    """One sample; what is not verified (*doubtful*: the name and why not) is marked."""
     if live is not None:
-        rows = [[name, value, snapshot.units[name]] for name, value in snapshot.items()]
-        live.update(out.table(["register", "value", "unit"], rows), refresh=True)
+        rows = [[name, value, snapshot.units[name], doubtful.get(name)] for name, value in snapshot.items()]
+        live.update(out.table(["register", "value", "unit", ""], rows), refresh=True)
     elif out.as_json:
-        out.record({"time": snapshot.time, **snapshot})
+        told = {name: doubtful[name] for name in snapshot if name in doubtful}
+        out.record({"time": snapshot.time, **snapshot, **({"evidence": told} if told else {})})
     else:
-        pairs = (f"{name}={value}{snapshot.units[name]}" for name, value in snapshot.items())
+        pairs = (
+            f"{name}={value}{snapshot.units[name]}{f' [{doubtful[name]}]' if name in doubtful else ''}"
+            for name, value in snapshot.items()
+        )
         out.say(f"{snapshot.time:.3f} {' '.join(pairs)}")
 
 
@@ -161,12 +216,15 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
             place = names.resolve(profile, text)
             if isinstance(place, int):
                 [word] = drive.read_words(place, verify=verify)
-                rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}"])
+                rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}", None])
             else:
                 known = drive.describe(place)
                 value = drive.read(place, verify=verify)
-                rows.append([known.code or known.name, value, known.unit, known.label])
-        session.out.rows(["name", "value", "unit", "label"], rows)
+                rows.append([known.code or known.name, value, known.unit, known.label, known.evidence])
+    columns = ["name", "value", "unit", "label", "evidence"]
+    if not session.out.as_json and all(row[-1] in ("verified", None) for row in rows):
+        columns, rows = columns[:-1], [row[:-1] for row in rows]
+    session.out.rows(columns, rows)
 
 
 COMMANDS = [ports, scan, info, status, monitor, read]

@@ -102,36 +102,60 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
     "assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=names.complete_assignment
 )
 @click.option("--store", is_flag=True, help="Keep parameters in EEPROM, whose write life is limited.")
+@click.option("--force", is_flag=True, help="Also words at addresses of which nothing is known; always asks.")
 @yes_option
 @pass_session
-def write(session: Session, assignments: tuple[str, ...], store: bool, yes: bool) -> None:
+def write(session: Session, assignments: tuple[str, ...], store: bool, force: bool, yes: bool) -> None:
     """Write registers or parameters. Parameters go to RAM: lost when the drive is switched off, unless --store.
 
-    All are checked before the first is sent. Command registers are refused. While the motor turns, it asks first.
+    All are checked before the first is sent. Command registers are refused: `run`, `stop` and the like are for them.
+    While the motor turns, it asks first.
     """
     asked = [names.parse_assignment(text) for text in assignments]
     with session.drive() as drive:
         wanted: dict[str, Any] = {}
+        words: dict[int, int] = {}
         for text, value in asked:
             place = names.resolve(drive.profile, text)
             if isinstance(place, int):
-                raise drivebus.NotAllowed(
-                    f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; "
-                    "`raw` sends what you type"
-                )
-            if place in wanted:
-                raise drivebus.NotAllowed(f"{place} is given twice; nothing was sent")
-            wanted[place] = value
-        session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
+                words[place] = _word(drive, place, value, force)
+                continue
+            known = drive.describe(place)
+            if known.name in wanted:
+                raise drivebus.NotAllowed(f"{known.code or known.name} is given twice; nothing was sent")
+            wanted[known.name] = value
+        if words:
+            session.ask(f"This writes {', '.join(assignments)}, not knowing what that does", yes)
+        else:
+            session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
         parameters = [name for name in wanted if drive.describe(name).kind == "parameter"] if store else []
         before = {name: drive.read(name) for name in parameters}
-        drive.write(wanted, store=store)
+        kept: list[str] = []
+        if wanted:
+            drive.write(wanted, store=store)
         rows = []
-        for name in wanted:
+        for name, value in wanted.items():
             known = drive.describe(name)
-            rows.append([known.code or known.name, drive.read(name), known.unit, known.label])
-        _say_kept([name for name, value, *_ in rows if name in before and before[name] == value])
+            now = value if known.access == "wo" else drive.read(name)
+            rows.append([known.code or known.name, now, known.unit, known.label])
+            if name in before and before[name] == now:
+                kept.append(known.code or known.name)
+        for place, word in words.items():
+            drive.write_words(place, word, force=True)
+            rows.append([f"{place:04X}H", word, "", "unknown register, not read back"])
+        _say_kept(kept)
         session.out.rows(["name", "value", "unit", "label"], rows)
+
+
+def _word(drive: drivebus.Drive, place: int, value: float | str, force: bool) -> int:
+    """The word for an address that the profile does not know, which only *force* writes."""
+    if not force:
+        raise drivebus.NotAllowed(
+            f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; --force writes a word there"
+        )
+    if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
+        raise drivebus.NotAllowed(f"{value!r} is no word of 0 to 65535, as an address takes it; nothing was sent")
+    return value
 
 
 def _say_kept(names: list[str]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import drivebus
 
-__all__ = ["COUNTED", "counted", "in_words", "known"]
+__all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
 
 COUNTED = ["rows", "total", "with a source", "without", "unverified", "assumed"]
 
@@ -67,7 +67,7 @@ def in_words(profile: drivebus.Profile) -> Iterator[tuple[str, list[str]]]:
     yield "Identification", _identification(profile)
     yield "Commands", _commands(profile)
     yield "States", _state_lines(profile)
-    yield "Memory", _memory(profile.memory())
+    yield "Memory", memory(profile)
     yield "What must be set before it obeys the bus", _needs(profile.control())
     yield "Setpoints over the bus", _setpoints(profile)
     if profile.variants():
@@ -156,13 +156,15 @@ def _state_lines(profile: drivebus.Profile) -> list[str]:
     return lines
 
 
-def _memory(memory: Mapping[str, Any] | None) -> list[str]:
-    if memory is None:
+def memory(profile: drivebus.Profile) -> list[str]:
+    """Where a parameter that is written is kept."""
+    rule = profile.memory()
+    if rule is None:
         return ["no write to RAM alone is known: every write of a parameter may wear EEPROM, and needs --store"]
-    ram = "RAM only, without it EEPROM too" if memory["means"] == "ram" else "EEPROM too, without it RAM only"
-    lines = [f"a parameter written with bit {memory['bit']} of its address set goes to {ram}"]
-    if memory["reason"] is not None:
-        lines.append(f"not usable without --unverified: {memory['reason']}")
+    ram = "RAM only, without it EEPROM too" if rule["means"] == "ram" else "EEPROM too, without it RAM only"
+    lines = [f"a parameter written with bit {rule['bit']} of its address set goes to {ram}"]
+    if rule["reason"] is not None:
+        lines.append(f"not usable without --unverified: {rule['reason']}")
     return lines
 
 

@@ -115,8 +115,7 @@ class Session:
 
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
         """The drive that the options name, on a bus that is open."""
-        options: dict[str, Any] = {"unverified": True} if self.unverified else {}
-        return bus.drive(self.unit, self.profile, **options)
+        return bus.drive(self.unit, self.profile, unverified=self.unverified, variants=self.variants)
 
     def known_profile(self) -> drivebus.Profile:
         """The profile that the options name, from the drive itself only if it has to be asked."""
@@ -127,7 +126,11 @@ class Session:
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
         """As `ask`, but only where the motor turns, or may: what stands still is not moved by *what*."""
-        state = drive.state()
+        try:
+            state = drive.state()
+        except drivebus.NotAllowed:
+            self.ask(f"Whether the motor turns is not known; {what}", yes)
+            return
         if state.running or state is drivebus.State.UNKNOWN:
             self.ask(f"The motor turns; {what}", yes)
 
