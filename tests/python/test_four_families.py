@@ -160,6 +160,22 @@ def test_a_jog_is_ended_as_the_family_ends_it() -> None:
             bus.drive(4, "vfd500", unverified=True).jog_stop()
 
 
+def test_a_jog_of_the_awaitable_face_is_ended_so_too() -> None:
+    async def main(simulator: Simulator) -> None:
+        async with drivebus.aio.Bus(simulator) as bus:
+            for name, family in FAMILIES.items():
+                drive = await bus.drive(family.unit, name, unverified=True)
+                await drive.prepare_control(store=True)
+                simulator.drive(family.unit).take_writes()
+                async with drive.jogging():
+                    pass
+
+    with line() as simulator:
+        asyncio.run(main(simulator))
+        taken = {name: [word[2] for word in simulator.drive(each.unit).writes()] for name, each in FAMILIES.items()}
+    assert taken == {"gd350": [3, 8], "gd600": [3, 8], "gd3000": [3, 8], "vfd500": [3, 6]}
+
+
 def test_a_value_goes_to_the_memory_that_the_family_says() -> None:
     """GD350, chapter 9.4.5: 8007H is RAM. VFD500, p. 134: 8007H is kept. GD600: no way to RAM alone is printed."""
     with line() as simulator, drivebus.Bus(simulator) as bus:
