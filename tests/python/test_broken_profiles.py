@@ -210,13 +210,13 @@ def test_a_chain_of_profiles_ends(tmp_path: Path) -> None:
         return tmp_path / name
 
     one = write("one", "gd350")
-    two = write("two", "../one")
-    three = write("three", "../two")
+    two = write("two", "./../one")
+    three = write("three", "./../two")
     assert check(three, exit_code=0) == []
-    [problem] = check(write("four", "../three"))
+    [problem] = check(write("four", "./../three"))
     assert Path(problem["file"]).resolve() == two / "profile.toml"
     assert "3 one over the other" in problem["reason"]
-    write("one", "../two")
+    write("one", "./../two")
     [problem] = check(two)
     assert Path(problem["file"]).resolve() == one / "profile.toml"
     assert (problem["line"], "itself" in problem["reason"]) == (6, True)

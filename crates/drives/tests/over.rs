@@ -101,7 +101,7 @@ fn what_lies_below_must_be_there_and_end_somewhere() {
     let manifest = |table: &str| format!("name = \"mine\"\nsource = \"me\"\n{table}\n");
     for (name, table, reason) in [
         ("unknown", "[overlay]\nprofile = \"gd35o\"", "the closest is \"gd35"),
-        ("itself", "[overlay]\nprofile = \"../over-itself-PID\"", "leads back to this profile"),
+        ("itself", "[overlay]\nprofile = \"./../over-itself-PID\"", "leads back to this profile"),
         ("absolute", "[overlay]\nprofile = \"/etc\"", "relative to this one"),
         ("both", "[overlay]\nprofile = \"gd350\"\n[extends]\nprofile = \"gd350\"\nassumption = \"so\"", "not both"),
         ("silent", "[extends]\nprofile = \"gd350\"\nassumption = \" \"", "\"assumption\" is empty"),
