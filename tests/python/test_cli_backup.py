@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,28 @@ def test_what_is_not_restored_is_exit_1(simulator: drivebus.Simulator, file: Pat
     result = run(simulator, "restore", file, "--group", "P00.04", "--yes")
     assert (result.exit_code, "1 parameter was not restored" in result.stderr) == (1, True)
     assert "it would be beyond P00.03" in result.stdout
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="errors have no notes")
+def test_a_restore_that_is_cut_off_says_what_was_done(
+    simulator: drivebus.Simulator, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(simulator, "backup", file)
+    store(simulator, "P00.11=3.0", "P00.12=4.0")
+    write = drivebus.Bus.write
+
+    def deaf(bus: drivebus.Bus, unit: int, address: int, value: Any, /, **how: Any) -> None:
+        if address == 0x000C:
+            simulator.line.drop_answers(1000)
+        write(bus, unit, address, value, **how)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(drivebus.Bus, "write", deaf)
+        result = run(simulator, "restore", file, "--yes")
+    assert result.exit_code == 3
+    assert "restored before it: P00.11; restored again, the drive is given only what it still lacks" in result.stderr
+    simulator.line.clear()
+    assert run(simulator, "restore", file, "--yes").exit_code == 0
 
 
 def test_taking_commands_from_elsewhere_is_said_first(simulator: drivebus.Simulator, file: Path) -> None:

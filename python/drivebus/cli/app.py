@@ -27,7 +27,9 @@ class _Commands(click.Group):
         try:
             return super().invoke(context)
         except drivebus.DrivebusError as error:
-            click.echo(f"Error: {printable(str(error))}", err=True)
+            # Notes say what was done before; Python 3.10 has none.
+            for line in (f"Error: {error}", *getattr(error, "__notes__", ())):
+                click.echo(printable(line), err=True)
             context.exit(exit_code(error))
 
 
