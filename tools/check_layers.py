@@ -59,7 +59,7 @@ PYTHON: dict[str, set[str]] = {
     "known": {"errors", "profile", "protocols"},
     "registers": {"checks", "errors", "evidence", "identity", "known", "protocols", "values"},
     "looking": {"errors", "evidence", "protocols", "registers", "values"},
-    "parameters": {"errors", "looking", "protocols", "values"},
+    "parameters": {"checks", "errors", "looking", "protocols", "values"},
     "control": {"checks", "errors", "evidence", "parameters", "values"},
     "setpoints": {"checks", "control", "errors", "values"},
     "commanding": {"errors", "evidence", "looking", "setpoints", "values"},

@@ -52,6 +52,7 @@ class Controls(Parameters):
             Refused: The drive kept what it had; parameters are locked while it runs, or by a password.
             Unconfirmed: It took the values, and shows others.
         """
+        store = checks.flag("store", store)
         drive = self.trusting(unverified)
         wanted = drive._wanted(setpoint)
         needed = {}

@@ -43,10 +43,12 @@ class Evidence:
 
     def reads(self, names: Iterable[str]) -> None:
         """Raises `NotAllowed` if one of *names* may not be read."""
-        # Programs read the same few names again and again.
-        if self._readable.issuperset(names):
-            return
         for name in names:
+            if not isinstance(name, str):
+                raise NotAllowed(f"name {name!r} is no text; nothing was sent to unit {self._unit}", unit=self._unit)
+            # Programs read the same few names again and again.
+            if name in self._readable:
+                continue
             missing = self.unreadable(name)
             if missing is not None:
                 known = self._profile.describe(name)

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, overload
 
+from drivebus import checks
 from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
 from drivebus.looking import Looks
 from drivebus.protocols import ProfileProtocol
@@ -22,19 +23,12 @@ __all__ = ["Parameters"]
 _STORES_BEFORE_WARNING = 5
 """EEPROM writes of one parameter by one program that are taken for use; more look like a loop."""
 
-_WRITE_MANY = 0x10
-
 
 class _Planned(NamedTuple):
     known: Description
     name: str
     address: int
     raw: int
-
-    @property
-    def words(self) -> int | list[int]:
-        """As they are sent: the low word first where there are two."""
-        return self.raw if self.known.words == 1 else [self.raw & 0xFFFF, self.raw >> 16]
 
 
 class _Limit(NamedTuple):
@@ -94,6 +88,9 @@ class Parameters(Looks):
 
         Where one of several fails, those before it were written; the error's note names them.
         """
+        if not isinstance(name, (str, Mapping)):
+            raise NotAllowed(f"name {name!r} is no text, nor names with values; nothing was sent", unit=self.unit)
+        store = checks.flag("store", store)
         wanted = name if isinstance(name, Mapping) else {name: value}
         if not isinstance(name, Mapping) and value is None:
             raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
@@ -134,11 +131,6 @@ class Parameters(Looks):
             kept = "EEPROM" if store else "RAM"
             reason = None if memory is None else memory["reason"]
             self._evidence.rule(f"how {self.profile.title} keeps a parameter in {kept}", reason)
-        if known.words > 1 and _WRITE_MANY not in self.profile.functions:
-            raise NotAllowed(
-                f"{name} has {known.words} words, which {self.profile.title} does not take at once; nothing was sent",
-                unit=self.unit,
-            )
         return _Planned(known, name, address, raw)
 
     async def _check_now(self, planned: Sequence[_Planned]) -> None:
@@ -209,15 +201,14 @@ class Parameters(Looks):
             if item.known.kind == "parameter":
                 # Before it is sent: the drive may take it although its answer is lost.
                 self._in_ram.add(key)
-            await self._write(item.address, item.words, read_back=read_back)
+            await self._write(item.address, item.raw, read_back=read_back)
             return
         # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-        low, *high = await self.read_words(self.profile.address(item.name), item.known.words)
-        in_force = low | (high[0] << 16 if high else 0)
+        [in_force] = await self.read_words(self.profile.address(item.name))
         if in_force == item.raw and key not in self._in_ram:
             return
         # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
-        await self._write(item.address, item.words, read_back=None if in_force == item.raw else read_back)
+        await self._write(item.address, item.raw, read_back=None if in_force == item.raw else read_back)
         self._in_ram.discard(key)
         self._count_store(key)
 

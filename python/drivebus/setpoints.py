@@ -116,6 +116,8 @@ class Setpoints(Controls):
         return await self._settled(self._setpoint_register(setpoint))
 
     def _setpoint_register(self, setpoint: str) -> str:
+        if not isinstance(setpoint, str):
+            raise NotAllowed(f"setpoint {setpoint!r} is no text; nothing was sent", unit=self.unit)
         register = self.profile.role(f"setpoints.{setpoint}")
         if register is None:
             known = ", ".join(self.profile.setpoint_names())

@@ -119,6 +119,41 @@ def test_what_the_family_does_not_have_is_said(bus: Bus, simulator: Simulator) -
     assert taken(simulator, 2) == []
 
 
+BAD_NAMES: list[Callable[[Any], object]] = [
+    lambda drive: drive.read([]),
+    lambda drive: drive.read(["output_current", "bus_voltage"]),
+    lambda drive: drive.read("output_current", 5),
+    lambda drive: drive.monitor({}),
+    lambda drive: drive.readable([]),
+    lambda drive: drive.bits([]),
+    lambda drive: drive.write([1], 2),
+    lambda drive: drive.write({None: 1}),
+    lambda drive: drive.write("P00.11", 2.0, store="yes"),
+    lambda drive: drive.give([], 1),
+    lambda drive: drive.ask(None),
+    lambda drive: drive.check_control([]),
+    lambda drive: drive.prepare_control("yes"),
+    lambda drive: drive.prepare_control(setpoint=5),
+    lambda drive: drive.special_control(motor=[1]),
+    lambda drive: drive.set_virtual_inputs(S1=2),
+    lambda drive: drive.set_virtual_inputs(S1=True, force=3),
+    lambda drive: drive.write_words("a", 1),
+    lambda drive: drive.write_words(0x2001, []),
+    lambda drive: drive.bus.drive(1, "gd350", variants="Hz"),
+    lambda drive: drive.bus.drive(2, "vfd500", variants={"speed_unit": 5}),
+    lambda drive: drive.bus.identify("one"),
+]
+
+
+@pytest.mark.parametrize("call", BAD_NAMES)
+def test_what_is_no_name_and_no_value_is_refused_in_words(
+    simulator: Simulator, drive: Drive, call: Callable[[Any], object]
+) -> None:
+    with pytest.raises(NotAllowed):
+        call(drive)
+    assert taken(simulator) == []
+
+
 class TestWhatTheDriveHeeds:
     @pytest.mark.parametrize(
         ("name", "source", "number", "register"),
