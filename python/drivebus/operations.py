@@ -137,7 +137,7 @@ class Operations(Keeping, Terminals):
             rules = self.profile.variants()[self.profile.describe(name).variant or ""]
             raise NotAllowed(
                 f"what {name} means depends on {rules['parameter']} of unit {self.unit}: give variants=… to "
-                f"bus.drive() ({', '.join(map(repr, rules['choices']))})",
+                f"bus.drive() (`--variant`; {', '.join(map(repr, rules['choices']))})",
                 unit=self.unit,
             )
         return list(names)

@@ -99,7 +99,7 @@ class Registers:
         """What the drive's own parameter says of *variant*."""
         rule = self.profile.variants()[variant]
         parameter, choices = rule["parameter"], rule["choices"]
-        given = f"variants={{{variant!r}: …}} for bus.drive() ({', '.join(map(repr, choices))}) says which"
+        given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant`; {', '.join(map(repr, choices))}) says which"
         if rule["reason"] is not None and not self.unverified:
             raise not_verified(
                 f"what {parameter} decides in {self.profile.title}, and so what the word means (its {variant})",

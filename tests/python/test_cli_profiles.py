@@ -287,6 +287,16 @@ class TestSureness:
         env = {"DRIVEBUS_UNVERIFIED": "1"}
         assert at("vfd500", "--profile", "vfd500", "read", "status_word_1", env=env).exit_code == 0
 
+    def test_a_unit_that_a_parameter_decides_has_to_be_said(self) -> None:
+        """P30.14 of a VFD500 makes a speed Hz, percent or rpm; its numbers are not printed."""
+        words = ["--profile", "vfd500", "write", "speed_reference=25", "--yes"]
+        result = at("vfd500", *words)
+        assert (result.exit_code, "--variant" in result.stderr) == (2, True)
+        for env in ({"DRIVEBUS_VARIANT": "speed_unit=Hz"}, {}):
+            result = at("vfd500", *([] if env else ["--variant", "speed_unit=Hz"]), "--json", *words, env=env)
+            assert result.exit_code == 0, result.output
+            assert json.loads(result.stdout)["unit"] == "Hz"
+
 
 class TestForce:
     """5 stops an INVT drive; a VFD500 coasts by it, and knows no 9."""

@@ -120,10 +120,10 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     by_code = {code: name for name, code in profile.commands().items()}
     lines = [f"written to {profile.command_address:04X}H"]
     for code, label in sorted(codes.items()):
-        name = by_code.get(code)
-        reason = reasons.get(name or "")
-        lines.append(f"{code:>3} {label.replace('_', ' ')}{'' if reason is None else f' [not usable: {reason}]'}")
-    return lines
+        doubt = " [unverified]" if by_code.get(code) in reasons else ""
+        lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
+    why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
+    return [*lines, *why]
 
 
 def _reasons(profile: drivebus.Profile) -> dict[str, str]:

@@ -115,12 +115,13 @@ class Session:
 
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
         """The drive that the options name, on a bus that is open."""
-        return bus.drive(self.unit, self.profile, unverified=self.unverified, variants=self.variants)
+        return bus.drive(self.unit, self.profile, unverified=self.unverified, variants=self.variants or None)
 
     def known_profile(self) -> drivebus.Profile:
         """The profile that the options name, from the drive itself only if it has to be asked."""
         if self.profile is not None:
-            return drivebus.Profile.find(self.profile).with_variants(self.variants)
+            profile = drivebus.Profile.find(self.profile)
+            return profile.with_variants(self.variants) if self.variants else profile
         with self.drive() as drive:
             return profile_of(drive)
 
