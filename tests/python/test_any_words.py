@@ -1,4 +1,4 @@
-"""Whatever words a unit answers, and however it fails: a drive of any family gives a value, or an error of this package.
+"""Whatever words a unit answers, and however it fails: a drive of any family gives a value or an error of this package.
 
 The line is a stand-in that answers at random from a seed, so that words come which no simulated drive would say.
 """
