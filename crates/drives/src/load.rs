@@ -4,7 +4,7 @@
 //! `manifest` knows the shape of `profile.toml`, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
 //! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
 //! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
-//! between them.
+//! between them, `sense` what cannot be meant.
 
 mod assemble;
 mod entries;
@@ -14,6 +14,7 @@ mod manifest;
 mod motion;
 mod problems;
 mod rows;
+mod sense;
 mod shape;
 mod succeed;
 mod table;

@@ -10,7 +10,7 @@ use super::facts;
 use super::manifest::{self, Manifest, line};
 use super::motion;
 use super::problems::Problems;
-use super::{File, inherit, rows, succeed};
+use super::{File, inherit, rows, sense, succeed};
 use crate::entry::Entry;
 use crate::lookup::closest;
 use crate::profile::Profile;
@@ -65,6 +65,8 @@ pub(super) fn profile(
     profile.exceptions =
         facts::exceptions(file, &manifest.exceptions, std::mem::take(&mut profile.exceptions), problems);
     profile.faults.extend(files.faults.as_ref().map(|faults| rows::faults(faults, problems)).unwrap_or_default());
+
+    sense::check(file, manifest, &entries, problems);
 
     profile.by_address = entries.by_address;
     profile.entries = entries.list;

@@ -8,7 +8,7 @@ use super::facts::check;
 use super::manifest::{Manifest, States, line};
 use super::problems::Problems;
 use crate::command::{Command, CommandCode};
-use crate::lookup::closest;
+use crate::lookup::{closest, names};
 use crate::profile::Profile;
 use crate::rules::UnitKind;
 use crate::state::{StateRule, StateWord};
@@ -93,7 +93,7 @@ pub(super) fn state(
         let reason = "a state word needs either [state.codes] or [[state.when]]";
         problems.add(file, line(file, spanned), reason);
     }
-    let mut rules = by_bits(file, table, entries, problems);
+    let mut rules = by_bits(file, manifest, table, entries, problems);
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
     if !table.codes.is_empty() {
         register.quantity.choices.clear();
@@ -118,14 +118,26 @@ pub(super) fn state(
     });
 }
 
-fn by_bits(file: &File, table: &States, entries: &Entries, problems: &mut Problems) -> Vec<StateRule> {
+fn by_bits(
+    file: &File,
+    manifest: &Manifest,
+    table: &States,
+    entries: &Entries,
+    problems: &mut Problems,
+) -> Vec<StateRule> {
     let Some(register) = entries.find(table.register.get_ref()) else { return Vec::new() };
+    let of_register = manifest.bits.iter().filter(|(name, _)| names(register).any(|own| own == name.get_ref()));
+    let declared: Vec<_> = of_register.flat_map(|(_, fields)| fields).collect();
     let mut rules = Vec::new();
     for spanned in &table.when {
         let when = spanned.get_ref();
         let mut rule = StateRule { state: when.state, mask: 0, value: 0 };
         for (name, &value) in &when.fields {
             let Some(field) = register.bits.iter().find(|field| field.name == *name) else {
+                // A field that is broken has a problem of its own.
+                if declared.iter().any(|field| field.get_ref().name == *name) {
+                    continue;
+                }
                 let closest = closest(name, register.bits.iter().map(|field| field.name.as_str())).unwrap_or("none");
                 let reason = format!("{} has no bit field \"{name}\"; the closest is \"{closest}\"", register.name);
                 problems.add(file, line(file, spanned), reason);

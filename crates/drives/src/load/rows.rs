@@ -91,10 +91,16 @@ pub(super) fn parameters(file: &File, problems: &mut Problems) -> Vec<Located<En
         let (group, index) =
             parse_code(code).ok_or_else(|| row.broken(format!("code \"{code}\" must be like P05.06")))?;
         let quantity = quantity(row, filled(row.text("low_from")), choices(row)?)?;
-        let default = match row.text("default") {
-            "" => None,
-            text => Some(to_word(count(row, "default", text, &quantity)?)),
-        };
+        let default = bound(row, "default", &quantity)?;
+        if default.is_some_and(|default| !within(&quantity, default)) {
+            let range = format!("{} to {}", row.text("low"), row.text("high"));
+            return Err(row.broken(format!("\"default\" {} is not in the range {range}", row.text("default"))));
+        }
+        if let Some((word, label)) = quantity.choices.iter().find(|(word, _)| !within(&quantity, i64::from(**word))) {
+            let range = format!("{} to {}", row.text("low"), row.text("high"));
+            return Err(row.broken(format!("choice {word} ({label}) is not in the range {range}")));
+        }
+        let default = default.map(to_word);
         let alias = match row.text("name") {
             "" => None,
             name => Some(checked_name(row, name)?),
@@ -240,6 +246,11 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
 /// Digits after the point for so many counts per unit.
 pub(super) fn decimals(scale: u32) -> Option<u8> {
     (0..=4).find(|&decimals| 10_u32.pow(u32::from(decimals)) == scale)
+}
+
+/// Whether the range of `quantity`, as far as it is known, holds `count`.
+fn within(quantity: &Quantity, count: i64) -> bool {
+    quantity.low.is_none_or(|low| low <= count) && quantity.high.is_none_or(|high| count <= high)
 }
 
 fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i64>, ProfileError> {

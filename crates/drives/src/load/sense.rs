@@ -1,0 +1,86 @@
+//! What is right in its form and cannot be meant: a setpoint that can only be read, a state that every word shows.
+
+use toml::Spanned;
+
+use super::File;
+use super::entries::Entries;
+use super::manifest::{Manifest, line};
+use super::problems::Problems;
+use crate::entry::Access;
+
+/// Checks what `manifest` says of `entries`.
+pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
+    itself(file, manifest, problems);
+    motion(file, manifest, entries, problems);
+    let no = |access: Access| {
+        move |name: &&Spanned<String>| entries.find(name.get_ref()).is_some_and(|row| row.access == access)
+    };
+    for name in read(manifest).into_iter().filter(no(Access::Wo)) {
+        let reason = format!("\"{}\" can only be written, and would have to be read here", name.get_ref());
+        problems.add(file, line(file, name), reason);
+    }
+    for name in manifest.setpoints.values().map(|role| &role.register).filter(no(Access::Ro)) {
+        let reason = format!("\"{}\" can only be read, and a setpoint has to be written", name.get_ref());
+        problems.add(file, line(file, name), reason);
+    }
+    for choice in manifest.variants.values().flat_map(|variant| variant.get_ref().choices.values()) {
+        let row = choice.get_ref();
+        if let (Some(low), Some(high)) = (row.low, row.high)
+            && low > high
+        {
+            problems.add(file, line(file, choice), format!("low = {low} is above high = {high}"));
+        }
+    }
+    for field in manifest.bits.values().flatten().filter(|field| field.get_ref().name.trim().is_empty()) {
+        problems.add(file, line(file, field), "\"name\" is empty; say what the bits are");
+    }
+}
+
+/// What a profile says of itself.
+fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
+    let place = line(file, &manifest.name);
+    if manifest.title.as_ref().is_some_and(|title| title.trim().is_empty()) {
+        problems.add(file, place, "\"title\" is empty; say what the maker calls the family");
+    }
+    if manifest.source.trim().is_empty() {
+        problems.add(file, place, "\"source\" is empty; name the documents that the profile was made from");
+    }
+    if let Some(version) = manifest.version.as_ref().filter(|version| *version.get_ref() == 0) {
+        problems.add(file, line(file, version), "version is 0 and must be 1 or more");
+    }
+    if let Some(requests) = manifest.requests.as_ref().filter(|requests| requests.functions.is_empty()) {
+        problems.add(file, line(file, &requests.max_words), "\"functions\" is empty; 0x03 reads, 0x06 writes one word");
+    }
+}
+
+/// What moves a motor, and what tells whether it moves.
+fn motion(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
+    if let Some(commands) = &manifest.commands {
+        let register = entries.find(commands.register.get_ref());
+        let is_it = |name: &Spanned<String>| entries.find(name.get_ref()) == register;
+        if register.is_some() && !commands.moves.iter().any(is_it) {
+            let register = commands.register.get_ref();
+            let reason = format!("\"moves\" must hold \"{register}\": what is written there can start a motor");
+            problems.add(file, line(file, &commands.register), reason);
+        }
+    }
+    for when in manifest.state.iter().flat_map(|state| &state.get_ref().when) {
+        if when.get_ref().fields.is_empty() {
+            let reason = format!("{} has no \"fields\", so every word would show it", when.get_ref().state.name());
+            problems.add(file, line(file, when), reason);
+        }
+    }
+}
+
+/// The registers that have to be read.
+fn read(manifest: &Manifest) -> Vec<&Spanned<String>> {
+    let status = manifest
+        .status
+        .iter()
+        .flat_map(|status| status.words.iter().chain(&status.fault).chain(&status.frequency).chain(&status.setpoint));
+    let identification = manifest.identification.iter().filter_map(|table| table.register.as_ref());
+    let state = manifest.state.iter().map(|state| &state.get_ref().register);
+    let monitor = manifest.monitor.iter().flat_map(|monitor| &monitor.registers);
+    let faults = manifest.faults.iter().flat_map(|faults| faults.history.iter().chain(&faults.values));
+    status.chain(identification).chain(state).chain(monitor).chain(faults).collect()
+}
