@@ -106,7 +106,7 @@ def info(session: Session) -> None:
             }
         )
         if found.candidates and profile.family not in found.candidates:
-            click.echo(f"It is treated as a {profile.family}, and does not say that it is one.", err=True)
+            click.echo(f"It is treated as {profile.family}, and does not say that it is one.", err=True)
         if not len(control):
             out.say("What makes it obey the bus is not known.")
             return

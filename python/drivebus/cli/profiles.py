@@ -80,7 +80,8 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
         click.echo(f"Error: {folder} has {some}; nothing of it is used until it has none.", err=True)
         context.exit(2)
     counts = drivebus.Profile.load(folder).counts()
-    rows = ", ".join(f"{counts[kind]['total']} {kind}" for kind in KINDS)
+    totals = {kind: counts[kind]["total"] for kind in KINDS}
+    rows = ", ".join(f"{total} {kind if total != 1 else kind.removesuffix('s')}" for kind, total in totals.items())
     session.out.say(f"{folder} is sound: {rows}.")
 
 
