@@ -4,11 +4,12 @@
 //! `manifest` knows the shape of `profile.toml`, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
 //! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
 //! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
-//! between them, `sense` what cannot be meant.
+//! between them, `sense` what cannot be meant, `fit` whether what came from below still fits.
 
 mod assemble;
 mod entries;
 mod facts;
+mod fit;
 mod inherit;
 mod manifest;
 mod motion;

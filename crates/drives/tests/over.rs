@@ -233,3 +233,99 @@ fn a_row_keeps_the_roles_of_the_one_in_whose_place_it_stands() {
     assert!(profile.is_command(0x7100) && !profile.is_command(0x7000), "the old place is no command register any more");
     assert!(profile.last_parameters().map(drivebus_drives::Entry::name).eq(["P06.02"]));
 }
+
+/// What a folder over a shipped profile says of registers, parameters and the rest of `profile.toml`.
+fn over(name: &str, below: &str, manifest: &str, registers: &str, parameters: &str) -> Folder {
+    const PARAMETERS: &str =
+        "code,name,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n";
+    let head = format!("name = \"over\"\nsource = \"x\"\n{manifest}\n[overlay]\nprofile = \"{below}\"\n");
+    let words = REGISTERS.replace("signed,", "signed,words,variant,");
+    let rows = [format!("{words}{registers}"), format!("{PARAMETERS}{parameters}")];
+    let files = [("profile.toml", &head), ("registers.csv", &rows[0]), ("parameters.csv", &rows[1])];
+    Folder::new(name, &files.map(|(file, text)| (file, text.as_str())))
+}
+
+#[test]
+fn two_rows_that_changed_places_keep_each_its_own_role() {
+    let rows = "0x2001,control_command,x,,1,no,,,1,8,,rw,yes,,x\n0x2000,set_frequency,x,Hz,100,no,,,,,,rw,yes,,x\n\
+                0x2110,status_word_1,x,,1,no,,,,,,ro,yes,,x\n0x2100,oil,x,,1,no,,,,,,ro,yes,,x\n";
+    let profile = over("places", "gd350", "", rows, "").load().unwrap();
+    assert_eq!(profile.command(Command::Stop), Some((0x2001, 5)));
+    assert!(profile.is_command(0x2001) && !profile.is_command(0x2000));
+    assert_eq!(profile.role("setpoints.frequency").unwrap().address(), Some(0x2000));
+    assert_eq!(profile.role("state").unwrap().address(), Some(0x2110));
+    assert!(profile.find("oil").unwrap().quantity().choices().is_empty(), "it is no state");
+}
+
+/// No page prints that r27.18 is the state of a VFD500: whoever knows that it is something else does not read a state there.
+#[test]
+fn what_stands_where_a_role_was_only_assumed_does_not_get_it() {
+    let rows = "r27.18,output_current,x,A,10,no,,,,,,ro,,yes,,x\n";
+    let profile = over("assumed", "vfd500", "", "", rows).load().unwrap();
+    assert!(profile.role("state").is_none());
+    let current = profile.find("output_current").unwrap();
+    assert!(current.bits().is_empty() && profile.status_words().all(|word| word != current));
+
+    // Its state is elsewhere, and what is there now is something else.
+    let rows = "r27.18,output_current,x,A,10,no,,,,,,ro,,yes,,x\nr27.00,status_word_1,x,,1,no,,,,,,ro,,yes,,x\n";
+    let profile = over("both", "vfd500", "", "", rows).load().unwrap();
+    assert_eq!(profile.role("state").unwrap().address(), Some(0x1B00));
+    assert!(profile.role("frequency").is_none(), "r27.00 was assumed to be that");
+    assert!(profile.find("output_current").unwrap().bits().is_empty());
+}
+
+#[test]
+fn what_is_not_said_of_parameters_stays_as_it_was() {
+    let manifest = "[parameters]\naddress = \"group.index\"\nsource = \"x\"\nmotor = []";
+    let profile = over("parameters", "gd350", manifest, "", "").load().unwrap();
+    assert!(profile.is_closed(0x6300), "P99");
+    assert!(profile.acting().map(drivebus_drives::Entry::name).eq(["P00.15", "P07.00"]));
+    assert!(profile.serial_parameters().count() > 0);
+    assert_eq!(profile.motor_parameters().count(), 0);
+}
+
+#[test]
+fn what_came_from_below_must_fit_what_is_said_above() {
+    let memory = "[parameters]\naddress = \"group.index\"\nsource = \"x\"\n\
+                  memory = { bit = 13, means = \"ram\", verified = true, source = \"x\" }";
+    let variant = "[variants.u]\nparameter = \"P00.01\"\nverified = true\nsource = \"x\"\n\
+                   choices = { Hz = { value = 1, scale = 100 } }";
+    for (name, manifest, registers, reasons) in [
+        ("bit", memory, "", &["control_command is at 2000H, and bit 13"] as &[&str]),
+        (
+            "kind",
+            "kind = \"rectifier\"",
+            "",
+            &["no run_reverse", "no jog_forward", "no jog_reverse", "no jog_stop", "drop \"set_frequency\""],
+        ),
+        ("wide", "", "0x2000,control_command,x,,1,no,2,,,,,ro,yes,,x\n", &["control_command is the command register"]),
+        ("over", "", "0x1FFF,oil,x,,1,no,2,,,,,ro,yes,,x\n", &["another row lies over the command register, 2000H"]),
+        ("fixed", "", "0x2001,set_frequency,x,Hz,100,no,,,,,,ro,yes,,x\n", &["set_frequency is a setpoint"]),
+        ("state", "", "0x2100,status_word_1,x,,1,no,2,,,,,ro,yes,,x\n", &["status_word_1 is the state"]),
+        ("two", variant, "0x4000,oil,x,,,no,2,u,,,,ro,yes,,x\n", &["has one word"]),
+        ("bound", variant, "0x4000,oil,x,,,no,,u,,,P00.03,rw,yes,,x\n", &["leave those cells empty"]),
+    ] {
+        let found = over(&format!("fit-{name}"), "gd350", manifest, registers, "").reasons();
+        assert_eq!(found.len(), reasons.len(), "{name}: {found:?}");
+        assert!(reasons.iter().all(|reason| found.iter().any(|line| line.contains(reason))), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn what_a_parameter_decides_in_one_family_is_not_verified_in_its_sister() {
+    let choices = "\"%\" = { value = 0, scale = 100 }, Hz = { value = 1, scale = 100 }, rpm = { value = 2, scale = 1 }";
+    let variant = format!(
+        "[variants.speed_unit]\nparameter = \"P30.14\"\nverified = true\nsource = \"x\"\nchoices = {{ {choices} }}"
+    );
+    let below = over("proved", "vfd500", &variant, "", "");
+    assert!(below.load().unwrap().variants()["speed_unit"].verified);
+    let own = below.0.file_name().unwrap().to_string_lossy().into_owned();
+    let sister = format!(
+        "name = \"sister\"\nsource = \"x\"\n[extends]\nprofile = \"../../{own}\"\nassumption = \"So it is said.\"\n"
+    );
+    fs::create_dir_all(below.0.join("sister")).unwrap();
+    fs::write(below.0.join("sister/profile.toml"), sister).unwrap();
+    let profile = Profile::load(&below.0.join("sister")).unwrap();
+    let unit = &profile.variants()["speed_unit"];
+    assert!(!unit.verified && unit.note.starts_with("So it is said."), "{}", unit.note);
+}

@@ -7,6 +7,7 @@ use toml::Spanned;
 use super::Files;
 use super::entries::Entries;
 use super::facts;
+use super::fit;
 use super::manifest::{self, Manifest, line};
 use super::motion;
 use super::problems::Problems;
@@ -28,7 +29,9 @@ pub(super) fn profile(
     let file = &files.manifest;
     let mut profile = start(file, manifest, base, problems)?;
     if let Some(parameters) = &manifest.parameters {
-        profile.groups.closed.clone_from(&parameters.closed_groups);
+        if let Some(closed) = &parameters.closed_groups {
+            profile.groups.closed.clone_from(closed);
+        }
         if let Some(memory) = &parameters.memory {
             profile.memory = problems.keep(facts::memory(file, memory));
         }
@@ -37,13 +40,17 @@ pub(super) fn profile(
     bits(file, manifest, &mut entries, problems);
 
     if let Some(parameters) = &manifest.parameters {
-        profile.groups = Groups {
-            closed: parameters.closed_groups.clone(),
-            acts: entries.parameters(file, &parameters.acts, problems),
-            serial: entries.parameters(file, &parameters.serial, problems),
-            motor: entries.parameters(file, &parameters.motor, problems),
-            last: entries.parameters(file, &parameters.last, problems),
-        };
+        let groups = &mut profile.groups;
+        for (own, known) in [
+            (&parameters.acts, &mut groups.acts),
+            (&parameters.serial, &mut groups.serial),
+            (&parameters.motor, &mut groups.motor),
+            (&parameters.last, &mut groups.last),
+        ] {
+            if let Some(own) = own {
+                *known = entries.parameters(file, own, problems);
+            }
+        }
     }
     if let Some(serial) = &manifest.serial {
         profile.serial = problems.keep(facts::serial(file, serial));
@@ -70,6 +77,9 @@ pub(super) fn profile(
 
     profile.by_address = entries.by_address;
     profile.entries = entries.list;
+    if problems.is_empty() {
+        fit::check(file, manifest, &profile, problems);
+    }
     Some(profile)
 }
 
@@ -101,7 +111,8 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
     };
     let (requests, title) = (requests?, title?);
     let base = base.map(|base| inherit::view(base, file, manifest, problems));
-    let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
+    let own_kind = manifest.kind.as_ref().map(|kind| *kind.get_ref());
+    let kind = own_kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
     Some(match base {
         Some(base) => {
             let requests = if manifest.requests.is_some() { requests } else { base.requests.clone() };

@@ -129,7 +129,7 @@ impl Entries {
 }
 
 /// An address that both have.
-fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
+pub(super) fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
     let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
     let (first, second) = (one.address?, other.address?);
     (first.max(second) <= last(first, one).min(last(second, other))).then_some(first.max(second))

@@ -10,8 +10,8 @@ use crate::lookup::{closest, names};
 use crate::profile::Profile;
 
 /// Tables whose rules a sibling can confirm as a whole.
-const TABLES: [&str; 9] =
-    ["commands", "state", "control", "setpoints", "memory", "requests", "serial", "watchdog", "faults"];
+const TABLES: [&str; 10] =
+    ["commands", "state", "control", "setpoints", "variants", "memory", "requests", "serial", "watchdog", "faults"];
 
 /// `base` as the one who writes `manifest` sees it: without what is dropped, and, for a sister family, with the evidence
 /// that the assumption leaves.
@@ -125,6 +125,9 @@ fn assume(base: &mut Profile, file: &File, extends: &Extends, problems: &mut Pro
     if !confirmed("requests") {
         let requests = &mut base.requests;
         (requests.verified, requests.note) = (false, joined(assumption, &requests.note));
+    }
+    for variant in base.variants.values_mut().filter(|_| !confirmed("variants")) {
+        (variant.verified, variant.note) = (false, joined(assumption, &variant.note));
     }
     let control = base.control.iter_mut().filter(|_| !confirmed("control"));
     let needs = base.setpoints.values_mut().filter(|_| !confirmed("setpoints")).flat_map(|role| &mut role.needs);

@@ -17,7 +17,7 @@ use crate::state::State;
 pub(super) struct Manifest {
     pub(super) name: Spanned<String>,
     pub(super) title: Option<String>,
-    pub(super) kind: Option<UnitKind>,
+    pub(super) kind: Option<Spanned<UnitKind>>,
     pub(super) version: Option<Spanned<u32>>,
     pub(super) source: String,
     pub(super) extends: Option<Spanned<Extends>>,
@@ -105,16 +105,11 @@ pub(super) struct Parameters {
     #[serde(rename = "address")]
     _address: AddressRule,
     pub(super) memory: Option<Spanned<Memory>>,
-    #[serde(default)]
-    pub(super) closed_groups: Vec<u8>,
-    #[serde(default)]
-    pub(super) acts: Vec<Spanned<String>>,
-    #[serde(default)]
-    pub(super) serial: Vec<Spanned<String>>,
-    #[serde(default)]
-    pub(super) motor: Vec<Spanned<String>>,
-    #[serde(default)]
-    pub(super) last: Vec<Spanned<String>>,
+    pub(super) closed_groups: Option<Vec<u8>>,
+    pub(super) acts: Option<Vec<Spanned<String>>>,
+    pub(super) serial: Option<Vec<Spanned<String>>>,
+    pub(super) motor: Option<Vec<Spanned<String>>>,
+    pub(super) last: Option<Vec<Spanned<String>>>,
     #[serde(rename = "source")]
     _source: String,
 }

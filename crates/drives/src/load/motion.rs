@@ -72,7 +72,7 @@ pub(super) fn commands(
 }
 
 /// Whether a unit without a motor can have `command`.
-fn for_rectifiers(command: Command) -> bool {
+pub(super) fn for_rectifiers(command: Command) -> bool {
     matches!(command, Command::RunForward | Command::Stop | Command::Coast | Command::ResetFault)
 }
 

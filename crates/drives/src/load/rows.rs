@@ -207,8 +207,14 @@ fn entry(
 /// Unit, scale and range.
 fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, String>) -> Result<Quantity, ProfileError> {
     let variant = filled(row.text("variant"));
-    if variant.is_some() && ["unit", "scale", "low", "high"].iter().any(|column| !row.text(column).is_empty()) {
-        return Err(row.broken("where there is a \"variant\", it says unit, scale and range: leave those cells empty"));
+    if variant.is_some() {
+        if ["unit", "scale", "low", "high", "high_from"].iter().any(|column| !row.text(column).is_empty()) {
+            let reason = "where there is a \"variant\", it says unit, scale and range: leave those cells empty";
+            return Err(row.broken(reason));
+        }
+        if row.text("words") == "2" {
+            return Err(row.broken("what has a \"variant\" has one word"));
+        }
     }
     let decimals = match row.text("scale") {
         "" => None,

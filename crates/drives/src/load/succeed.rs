@@ -1,19 +1,34 @@
 //! What a row takes over from the row of the profile below in whose place it stands: the roles that it had there, its
 //! bits, and what its values are called.
+//!
+//! A name says what a row is, wherever it stands. A place says so only where a document prints it: what is found where
+//! something else was only assumed to be is that other thing no more.
+
+use std::collections::BTreeMap;
 
 use crate::entry::{Entry, Kind};
+use crate::evidence::Evidence;
 use crate::lookup::names;
 use crate::profile::Profile;
 
-/// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses.
+/// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in
+/// whose place something else stands now lose their roles.
 pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut Entry>) {
     let inherited = base.entries.clone();
-    for new in rows {
-        let same_name = |old: &&Entry| names(old).any(|name| names(new).any(|own| own == name));
-        let same_place = |old: &&Entry| old.address.is_some() && old.address == new.address;
-        let Some(old) = inherited.iter().find(same_name).or_else(|| inherited.iter().find(same_place)) else {
-            continue;
-        };
+    let mut rows: Vec<&mut Entry> = rows.collect();
+    let pairs = pairs(&inherited, &rows);
+    let gone = |(index, old): &(usize, &Entry)| {
+        !pairs.contains_key(index) && rows.iter().any(|new| overlaps(old, new) || share_a_name(old, new))
+    };
+    let gone: Vec<String> = inherited.iter().enumerate().filter(gone).map(|(_, old)| old.name.clone()).collect();
+    for name in &gone {
+        leave_roles(base, name);
+    }
+
+    let mut called = BTreeMap::new();
+    let mut places = BTreeMap::new();
+    for (old, new) in pairs.iter().filter_map(|(&old, &new)| Some((inherited.get(old)?, new))) {
+        let Some(new) = rows.get_mut(new) else { continue };
         if new.bits.is_empty() {
             new.bits.clone_from(&old.bits);
         }
@@ -21,17 +36,62 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
         if new.kind == Kind::Register {
             new.quantity.choices.clone_from(&old.quantity.choices);
         }
-        rename(base, &old.name, &new.name);
-        if let Some(place) = old.address {
-            let follow = |address: u16| if address == place { new.address } else { Some(address) };
-            base.moving = base.moving.iter().filter_map(|&address| follow(address)).collect();
-            base.command_address = base.command_address.and_then(follow);
-        }
+        called.insert(old.name.clone(), new.name.clone());
+        places.extend(old.address.map(|place| (place, new.address)));
     }
+    rename(base, &called);
+    let follow = |address: u16| places.get(&address).copied().unwrap_or(Some(address));
+    base.moving = base.moving.iter().filter_map(|&address| follow(address)).collect();
+    base.command_address = base.command_address.and_then(follow);
 }
 
-/// Calls an entry by its new name wherever `base` refers to it.
-fn rename(base: &mut Profile, old: &str, new: &str) {
+/// Which of `inherited` is succeeded by which of `rows`, by index.
+fn pairs(inherited: &[Entry], rows: &[&mut Entry]) -> BTreeMap<usize, usize> {
+    let same_word = |old: &Entry, new: &Entry| own_name(old) == own_name(new);
+    let same_place = |old: &Entry, new: &Entry| {
+        let unnamed = new.kind == Kind::Parameter && new.alias.is_none();
+        let known = old.evidence != Evidence::Assumed || unnamed;
+        known && (share_a_name(old, new) || (old.address.is_some() && old.address == new.address))
+    };
+    let mut pairs = BTreeMap::new();
+    for same in [&same_word as &dyn Fn(&Entry, &Entry) -> bool, &same_place] {
+        for (new_index, new) in rows.iter().enumerate() {
+            let taken = pairs.values().any(|&taken| taken == new_index);
+            let mut free = inherited.iter().enumerate().filter(|(index, _)| !pairs.contains_key(index));
+            if let Some((old, _)) = free.find(|(_, old)| !taken && same(old, new)) {
+                pairs.insert(old, new_index);
+            }
+        }
+    }
+    pairs
+}
+
+/// What people call it: its name, or of a parameter without one its code.
+fn own_name(entry: &Entry) -> &str {
+    entry.alias.as_deref().unwrap_or(&entry.name)
+}
+
+fn share_a_name(old: &Entry, new: &Entry) -> bool {
+    names(old).any(|name| names(new).any(|own| own == name))
+}
+
+fn overlaps(old: &Entry, new: &Entry) -> bool {
+    super::entries::overlap(old, new).is_some()
+}
+
+/// Nothing of `base` relies any more on `name` for what the drive does. What writes to it do stays as it was.
+fn leave_roles(base: &mut Profile, name: &str) {
+    let roles = &mut base.roles;
+    for role in [&mut roles.identification, &mut roles.fault, &mut roles.frequency, &mut roles.setpoint] {
+        role.take_if(|role| role == name);
+    }
+    roles.status_words.retain(|word| word != name);
+    base.state.take_if(|state| state.register == name);
+    base.setpoints.retain(|_, role| role.register != name);
+}
+
+/// Calls entries by their new names wherever `base` refers to them, all at once: two may have changed places.
+fn rename(base: &mut Profile, called: &BTreeMap<String, String>) {
     let (groups, roles) = (&mut base.groups, &mut base.roles);
     let lists = [
         &mut base.monitor,
@@ -59,7 +119,9 @@ fn rename(base: &mut Profile, old: &str, new: &str) {
         .chain(base.variants.values_mut().map(|variant| &mut variant.parameter))
         .chain(base.watchdog.iter_mut().flat_map(|watchdog| [&mut watchdog.timeout, &mut watchdog.action]))
         .chain(base.state.iter_mut().map(|state| &mut state.register));
-    for name in everywhere.filter(|name| **name == old) {
-        new.clone_into(name);
+    for name in everywhere {
+        if let Some(new) = called.get(name) {
+            name.clone_from(new);
+        }
     }
 }

@@ -1,0 +1,82 @@
+//! Whether what a profile takes over from the one below it still fits the rows and rules that it states itself.
+//!
+//! What it states itself was checked where it was read. Here no line is at fault alone, so the one that changed the rule is
+//! named, or else the first.
+
+use super::File;
+use super::manifest::{Manifest, line};
+use super::motion::for_rectifiers;
+use super::problems::Problems;
+use crate::entry::{Access, Entry};
+use crate::memory::Memory;
+use crate::profile::Profile;
+use crate::rules::UnitKind;
+use crate::setpoint::Setpoint;
+
+/// Checks the whole `profile`, which is put together.
+pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    memory(file, manifest, profile, problems);
+    rectifier(file, manifest, profile, problems);
+    words(file, profile, problems);
+}
+
+/// The bit that says where a write is kept is no part of any address.
+fn memory(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    let mask = profile.memory.as_ref().map_or(0, Memory::mask);
+    let own = manifest.parameters.as_ref().and_then(|parameters| parameters.memory.as_ref());
+    let hit = profile.entries.iter().find_map(|entry| Some((entry, entry.address.filter(|at| at & mask != 0)?)));
+    if let Some((entry, address)) = hit {
+        let place = own.map_or(1, |rule| line(file, rule));
+        let reason = format!(
+            "{} is at {address:04X}H, and bit {} of an address is to say where a write is kept",
+            entry.name,
+            mask.trailing_zeros()
+        );
+        problems.add(file, place, reason);
+    }
+}
+
+fn rectifier(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    if profile.kind != UnitKind::Rectifier {
+        return;
+    }
+    let place = manifest.kind.as_ref().map_or(1, |kind| line(file, kind));
+    for command in profile.commands.keys().filter(|&&command| !for_rectifiers(command)) {
+        let reason = format!("a rectifier feeds no motor: it has no {}; give it [commands] of its own", command.name());
+        problems.add(file, place, reason);
+    }
+    if let Some(role) = profile.setpoints.get(&Setpoint::Frequency) {
+        let reason = format!("a rectifier feeds no motor: it has no frequency; drop \"{}\"", role.register);
+        problems.add(file, place, reason);
+    }
+}
+
+/// What is read or written as one word has one, and may be.
+fn words(file: &File, profile: &Profile, problems: &mut Problems) {
+    let mut one_word = |what: &str, entry: Option<&Entry>, not: Access| {
+        let Some(entry) = entry else { return };
+        if entry.words() != 1 || entry.access == not {
+            let must = if not == Access::Ro { "written" } else { "read" };
+            let reason = format!("{} is {what}, so it must have one word that can be {must}", entry.name);
+            problems.add(file, 1, reason);
+        }
+    };
+    if let Some(address) = profile.command_address {
+        one_word("the command register", profile.entry_at(address), Access::Ro);
+    }
+    for setpoint in profile.setpoints.values() {
+        one_word("a setpoint", profile.entry(&setpoint.register), Access::Ro);
+    }
+    for (what, role) in
+        [("the state", "state"), ("the present fault", "fault"), ("the identification", "identification")]
+    {
+        one_word(what, profile.role(role), Access::Wo);
+    }
+    for word in profile.status_words() {
+        one_word("a status word", Some(word), Access::Wo);
+    }
+    let covered = profile.command_address.filter(|&address| profile.entry_at(address).is_none());
+    if let Some(address) = covered {
+        problems.add(file, 1, format!("another row lies over the command register, {address:04X}H"));
+    }
+}
