@@ -102,6 +102,9 @@ class Terminals(Motion):
             (masks[checks.one_of(f"bit of {register}", name, list(masks))], _bits(known, name, value))
             for name, value in given.items()
         ]
+        for name in given:
+            if name in known.unverified_bits:
+                self._evidence.rule(f"where {name} is in {register} of {self.profile.title}", known.note)
         moves = self.profile.is_command(self.profile.address(register))
         if moves:
             self._check_it_can_be_stopped()

@@ -237,6 +237,7 @@ class Description:
         note: What else is worth knowing; says what is missing where it is not verified.
         words: How many words it takes, 1 or 2 of which the first is the low one.
         variant: What decides its unit, scale and range, such as `"speed_unit"`, or None.
+        unverified_bits: Those of *bits* whose place in the word no document of this family prints.
     """
 
     name: str
@@ -261,6 +262,7 @@ class Description:
     evidence: str = "verified"
     words: int = 1
     variant: str | None = None
+    unverified_bits: tuple[str, ...] = ()
 
     @property
     def reason(self) -> str:

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use drivebus_drives::{self as drives, Command, Entry, Input, ProfileError, Setpoint, Store, UnitKind};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat, PyString};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
 use crate::convert::{one_word, shown};
 use crate::errors::{not_allowed, refuse};
@@ -199,6 +199,10 @@ impl Profile {
     #[pyo3(signature = (name, value, /))]
     fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u16> {
         let entry = self.find(name)?;
+        // A switch is on or off. Anything else that is told True was meant for another name.
+        if value.is_instance_of::<PyBool>() && entry.quantity().high().is_none_or(|high| high.to_string() != "1") {
+            return Err(not_allowed(format!("{} = {}: not a number", entry.name(), shown(value))));
+        }
         let word = if let Ok(float) = value.cast::<PyFloat>() {
             entry.encode(float.extract::<f64>()?)
         } else if let Ok(integer) = value.extract::<i64>() {

@@ -1,11 +1,11 @@
 //! What a profile knows, as Python's dictionaries: one function for each kind of table.
 
 use drivebus_drives::{
-    Control, Counts, Entry, Fault, Identification, Kind, Memory, MemoryBit, Profile, Quantity, Requests,
+    BitField, Control, Counts, Entry, Fault, Identification, Kind, Memory, MemoryBit, Profile, Quantity, Requests,
     SerialDefaults, Value, Watchdog,
 };
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat, PyInt};
+use pyo3::types::{PyDict, PyFloat, PyInt, PyTuple};
 
 use crate::errors::refuse;
 
@@ -52,6 +52,8 @@ pub(crate) fn description<'py>(py: Python<'py>, entry: &Entry) -> Table<'py> {
     dict.set_item("access", entry.access().name())?;
     dict.set_item("choices", quantity.choices())?;
     dict.set_item("bits", bits(py, entry)?)?;
+    let unverified = entry.bits().iter().filter(|field| !field.verified());
+    dict.set_item("unverified_bits", PyTuple::new(py, unverified.map(BitField::name).collect::<Vec<_>>())?)?;
     dict.set_item("source", entry.source())?;
     dict.set_item("verified", entry.verified())?;
     dict.set_item("evidence", entry.evidence().name())?;

@@ -41,6 +41,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
     if not session.out.as_json:
         values["choices"] = ", ".join(f"{number} = {label}" for number, label in known.choices.items())
         values["bits"] = ", ".join(known.bits or {})
+        values["unverified_bits"] = ", ".join(known.unverified_bits)
         del values["verified"]  # `evidence` says more
     session.out.facts(values)
 
