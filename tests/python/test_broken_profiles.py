@@ -200,6 +200,21 @@ def test_a_folder_that_is_none(tmp_path: Path) -> None:
     assert check(tmp_path / "file")
 
 
+def test_a_rectifier_takes_over_nothing_that_moves_a_motor(tmp_path: Path) -> None:
+    def problems(drop: str) -> list[dict[str, Any]]:
+        head = f'name = "x"\nkind = "rectifier"\nsource = "x"\ndrop = [{drop}]\n'
+        text = f'{head}[extends]\nprofile = "gd350"\nassumption = "x"\n'
+        (tmp_path / "profile.toml").write_text(text, encoding="utf-8")
+        return drivebus.Profile.check(tmp_path)
+
+    [problem] = problems("")
+    assert problem["line"] == 6
+    for said in ("run_reverse", "jog_forward", "setpoints.frequency", '"gd350"'):
+        assert said in problem["reason"]
+    assert problems('"control_command", "set_frequency"') == []
+    assert drivebus.Profile.load(tmp_path).commands() == {}
+
+
 def test_a_chain_of_profiles_ends(tmp_path: Path) -> None:
     """Three folders one over the other are allowed, four are not, and neither is a circle."""
 

@@ -74,6 +74,7 @@ pub(super) fn profile(
     profile.faults.extend(files.faults.as_ref().map(|faults| rows::faults(faults, problems)).unwrap_or_default());
 
     sense::check(file, manifest, &entries, problems);
+    sense::check_inherited(file, manifest, &profile, problems);
 
     profile.by_address = entries.by_address;
     profile.entries = entries.list;

@@ -5,8 +5,12 @@ use toml::Spanned;
 use super::File;
 use super::entries::Entries;
 use super::manifest::{Manifest, line};
+use super::motion::for_rectifiers;
 use super::problems::Problems;
 use crate::entry::Access;
+use crate::profile::Profile;
+use crate::rules::UnitKind;
+use crate::setpoint::Setpoint;
 
 /// Checks what `manifest` says of `entries`.
 pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
@@ -33,6 +37,30 @@ pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problem
     }
     for field in manifest.bits.values().flatten().filter(|field| field.get_ref().name.trim().is_empty()) {
         problems.add(file, line(file, field), "\"name\" is empty; say what the bits are");
+    }
+}
+
+/// Checks that a unit without a motor takes nothing over from one that has one. What it says itself is checked where it
+/// says that.
+pub(super) fn check_inherited(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    let below = manifest.extends.as_ref().map(|table| &table.get_ref().profile);
+    let below = below.or(manifest.overlay.as_ref().map(|table| &table.get_ref().profile));
+    let Some(below) = below.filter(|_| profile.kind == UnitKind::Rectifier) else { return };
+    let mut wrong: Vec<&str> = Vec::new();
+    if manifest.commands.is_none() {
+        wrong
+            .extend(profile.commands.keys().filter(|command| !for_rectifiers(**command)).map(|command| command.name()));
+    }
+    if profile.setpoints.contains_key(&Setpoint::Frequency) && !manifest.setpoints.contains_key(&Setpoint::Frequency) {
+        wrong.push("setpoints.frequency");
+    }
+    if !wrong.is_empty() {
+        let reason = format!(
+            "a rectifier feeds no motor: it cannot take over {} from \"{}\"; drop the registers, or say [commands] anew",
+            wrong.join(", "),
+            below.get_ref()
+        );
+        problems.add(file, line(file, below), reason);
     }
 }
 
