@@ -198,8 +198,9 @@ class Drive:
     ) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
-        A stop that is not confirmed is sent again, and in the end the drive is told to coast. An error from inside the
-        block is raised as it is; if the drive could not be stopped either, its note says so.
+        A stop that is not confirmed is sent again, and in the end the drive is told to coast. With *unverified* the end
+        is proved as the start was, by states that are not verified. An error from inside the block is raised as it is;
+        if the drive could not be stopped either, its note says so.
 
         The end of the program stops it too: what is still inside such a block when the interpreter ends, and, while the
         main thread is inside one, SIGTERM and SIGHUP (unless the program listens to them itself), which raise
@@ -211,7 +212,7 @@ class Drive:
             Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn.
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
-        with self._moving(run, lambda: self.stop()):
+        with self._moving(run, lambda: self._end(self.stop, unverified), unverified):
             yield self
 
     @contextmanager
@@ -223,7 +224,12 @@ class Drive:
         It is ended by the family's jog stop, or where it has none by a stop.
         """
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-        with self._moving(jog, lambda: self.jog_stop() if self._operations.has_jog_stop() else self.stop()):
+
+        def end() -> None:
+            ends_alone = self._operations.trusting(unverified).has_jog_stop()
+            self._end(self.jog_stop if ends_alone else self.stop, unverified)
+
+        with self._moving(jog, end, unverified):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
@@ -257,8 +263,12 @@ class Drive:
         """
         return Watchdog(self._operations.trusting(unverified), timeout, action)
 
+    def _end(self, halt: Callable[..., None], unverified: bool) -> None:
+        """Halts it; with the trust of its start, where that had any."""
+        halt(unverified=True) if unverified else halt()
+
     @contextmanager
-    def _moving(self, start: Callable[[], None], end: Callable[[], None]) -> Iterator[None]:
+    def _moving(self, start: Callable[[], None], end: Callable[[], None], unverified: bool) -> Iterator[None]:
         """Starts, and ends by all means."""
 
         async def begin() -> None:
@@ -267,7 +277,7 @@ class Drive:
         async def finish(_: Operations) -> None:
             end()
 
-        moving = Moving(self._operations, begin, finish)
+        moving = Moving(self._operations.trusting(unverified), begin, finish)
         try:
             at_once(moving.begin())
             yield

@@ -161,6 +161,34 @@ class TestStates:
         look, start, stop = "04 03 19 00 00 01", "04 10 70 00 00 02 04 00 01 03 e8", "04 06 70 00 00 06"
         assert sent == [look, *identity, start, look, stop]
 
+    @pytest.mark.parametrize("block", ["running", "jogging"])
+    def test_a_block_ends_by_the_states_that_it_began_with(self, bus: Bus, simulator: Simulator, block: str) -> None:
+        """Its keypad takes a VFD500 over: it confirms every frame and goes on turning."""
+        drive = bus.drive(VFD500, "vfd500")
+        drive.prepare_control(unverified=True)
+
+        def end_elsewhere() -> None:
+            with getattr(drive, block)(unverified=True):
+                bus.write(VFD500, 0x0002, 0)
+                simulator.drive(VFD500).take_writes()
+
+        with pytest.raises(drivebus.Unconfirmed, match="its state does not show it"):
+            end_elsewhere()
+        assert [word[1:] for word in simulator.drive(VFD500).writes()] == [(0x7000, 6)] * 3 + [(0x7000, 5)]
+        assert simulator.drive(VFD500).state == "forward"
+
+    @pytest.mark.parametrize("block", ["running", "jogging"])
+    def test_an_awaited_block_as_well(self, simulator: Simulator, block: str) -> None:
+        async def main() -> None:
+            async with drivebus.aio.Bus(simulator, timeout=0.25) as bus:
+                drive = await bus.drive(VFD500, "vfd500")
+                await drive.prepare_control(unverified=True)
+                async with getattr(drive, block)(unverified=True):
+                    await bus.write(VFD500, 0x0002, 0)
+
+        with pytest.raises(drivebus.Unconfirmed, match="its state does not show it"):
+            asyncio.run(main())
+
     def test_a_fault_is_seen_before_and_after(self, bus: Bus, simulator: Simulator) -> None:
         drive = bus.drive(VFD500, "vfd500", variants={"speed_unit": "Hz"})
         simulator.drive(VFD500).trip(18)

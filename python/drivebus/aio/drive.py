@@ -83,7 +83,7 @@ class Drive(Operations):
         `drivebus.Drive.running`.
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
-        moving = Moving(self, run, Operations.stop)
+        moving = Moving(self.trusting(unverified), run, Operations.stop)
         async with _block(moving):
             yield self
 
@@ -93,7 +93,7 @@ class Drive(Operations):
     ) -> AsyncIterator[Drive]:
         """Jogs the motor inside an `async with` block and ends the jog by all means. Otherwise as `running`."""
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-        moving = Moving(self, jog, Operations.end_jog)
+        moving = Moving(self.trusting(unverified), jog, Operations.end_jog)
         async with _block(moving):
             yield self
 
