@@ -32,23 +32,33 @@ class Family(NamedTuple):
     together: bool
     """Whether command and setpoint travel in one frame (10H)."""
     fault: tuple[int, str]
+    certainty: str
+    """How sure it is what the unit is, when it is asked: of GD600 and GD3000 no code is printed."""
 
 
 INVT = {"run": 1, "reset": 7, "coast": 6, "stop": 5}
 FAMILIES = {
-    "gd350": Family(1, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], True, (11, "OL1")),
-    "gd600": Family(2, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], True, (1, "OUT1")),
-    "gd3000": Family(3, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], False, (77, "Unknown fault 77")),
+    "gd350": Family(1, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], True, (11, "OL1"), "certain"),
+    "gd600": Family(2, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], True, (1, "OUT1"), "unknown"),
+    "gd3000": Family(3, 0x2000, 0x2001, INVT, [(0x0001, 2), (0x0006, 8)], False, (77, "Unknown fault 77"), "unknown"),
     "vfd500": Family(
-        4, 0x7000, 0x7001, {"run": 1, "reset": 8, "coast": 5, "stop": 6}, [(0x8002, 2)], True, (18, "Earth fault")
+        4,
+        0x7000,
+        0x7001,
+        {"run": 1, "reset": 8, "coast": 5, "stop": 6},
+        [(0x8002, 2)],
+        True,
+        (18, "Earth fault"),
+        "by answers",
     ),
 }
 HZ, WORD = 10.0, 1000  # hundredths of a hertz, in all four; of the VFD500 while P30.14 says Hz
 
 
-def program(drive: Any, machine: Any, fault: int) -> list[Step]:
-    """Identify is what comes before it: the drive. The rest is the same for whoever it is."""
+def program(bus: Any, drive: Any, machine: Any, fault: int) -> list[Step]:
+    """The same for whoever it is."""
     return [
+        lambda _: bus.identify(drive.unit),
         lambda _: drive.prepare_control(store=True),
         lambda _: drive.run(HZ, confirm=5.0),
         lambda _: drive.wait_for_speed(timeout=100),
@@ -88,7 +98,7 @@ def at_once(name: str, simulator: Simulator) -> list[Any]:
     with drivebus.Bus(simulator, timeout=0.25) as bus:
         drive = bus.drive(family.unit, name, unverified=True)
         machine = Machine(simulator, family.unit)
-        return [step(None) for step in program(drive, machine, family.fault[0])]
+        return [step(None) for step in program(bus, drive, machine, family.fault[0])]
 
 
 def awaited(name: str, simulator: Simulator) -> list[Any]:
@@ -98,7 +108,7 @@ def awaited(name: str, simulator: Simulator) -> list[Any]:
         async with drivebus.aio.Bus(simulator, timeout=0.25) as bus:
             drive = await bus.drive(family.unit, name, unverified=True)
             given = []
-            for step in program(drive, Machine(simulator, family.unit), family.fault[0]):
+            for step in program(bus, drive, Machine(simulator, family.unit), family.fault[0]):
                 result = step(None)
                 given.append(await result if inspect.isawaitable(result) else result)
             return given
@@ -112,10 +122,12 @@ def test_the_same_program(name: str, face: Callable[[str, Simulator], list[Any]]
     family = FAMILIES[name]
     number, says = family.fault
     with line() as simulator:
-        control, _, reached, seen, _, fault, *_, stopped, status = face(name, simulator)
+        found, control, _, reached, seen, _, fault, *_, stopped, status = face(name, simulator)
         taken = [(address, value) for _, address, value in simulator.drive(family.unit).writes()]
         others = [simulator.drive(each.unit).writes() for each in FAMILIES.values() if each is not family]
         frames = [data for _, who, data in simulator.line.trace() if who == "master"]
+    assert found.certainty == family.certainty
+    assert name in found.candidates or family.certainty == "unknown"
     assert control
     assert (reached.state, stopped.state, status.fault) == (State.FORWARD, State.STOPPED, None)
     assert reached.frequency == pytest.approx(HZ, abs=0.11)
