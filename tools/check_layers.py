@@ -55,7 +55,7 @@ PYTHON: dict[str, set[str]] = {
     "read_plan": {"_native", "values"},
     "profile": {"_native", "checks", "errors", "read_plan", "values"},
     "evidence": {"errors", "protocols"},
-    "identity": {"errors", "protocols"},
+    "identity": {"errors", "identify", "protocols"},
     "known": {"errors", "profile", "protocols"},
     "registers": {"checks", "errors", "evidence", "identity", "known", "protocols", "values"},
     "looking": {"errors", "evidence", "protocols", "registers", "values"},

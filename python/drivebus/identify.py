@@ -14,7 +14,7 @@ from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
 from drivebus.profile import Profile, profiles
 
-__all__ = ["identify", "usable"]
+__all__ = ["code_registers", "identify", "usable"]
 
 Read = Callable[[int, int], Awaitable[list[int]]]
 
@@ -28,7 +28,7 @@ async def identify(read: Read, unit: int) -> Identification:
     answered: dict[int, bool] = {}
     told: list[str] = []
     code: int | None = None
-    for address in _code_registers():
+    for address in code_registers():
         try:
             [code] = await read(unit, address)
         except Refused as error:
@@ -100,7 +100,7 @@ def _shows(answered: Mapping[int, bool], signature: Mapping[str, Sequence[int]])
 
 
 @functools.cache
-def _code_registers() -> tuple[int, ...]:
+def code_registers() -> tuple[int, ...]:
     """Where the shipped families say what they are."""
     registers: dict[int, None] = {}
     for profile in map(Profile.builtin, profiles()):

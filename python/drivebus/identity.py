@@ -4,7 +4,8 @@ A port that was lost and opened again may be another one: an adapter plugged in 
 machine, where the same address is another drive. So what the unit says of itself is asked again before anything goes
 out that moves a motor or changes a value. A stop does not wait for it.
 
-Families that have an identification code are known by it, and others by which words they answer and which they refuse.
+Families that have an identification code are known by it, and others by which words they answer and which they refuse:
+also by what they say where other families have such a code, for that is how one of those gives itself away.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused
+from drivebus.identify import code_registers
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
@@ -29,7 +31,7 @@ class Identity:
 
     def __init__(self, bus: AwaitableBus, unit: int, profile: ProfileProtocol, code: int | None = None) -> None:
         self._unit = unit
-        self._code_at, self._probes = _questions(profile)
+        self._words, self._probes = _questions(profile)
         self._known = None if code is None else _named(code)
         self._opened = bus.reconnects
 
@@ -73,35 +75,34 @@ class Identity:
         return opened
 
     async def _ask(self, bus: AwaitableBus) -> str:
-        if self._code_at is not None:
-            told = await self._answer(bus, self._code_at)
-            return told if isinstance(told, str) else _named(told)
         answers = [(address, await self._answer(bus, address)) for address in self._probes]
-        return ", ".join(
-            f"{_named(address)} {told if isinstance(told, str) else 'answered'}" for address, told in answers
-        )
+        answers += [(address, await self._answer(bus, address, word=True)) for address in self._words]
+        if len(answers) == 1:
+            return answers[0][1]
+        return ", ".join(f"{_named(address)} {told}" for address, told in answers)
 
-    async def _answer(self, bus: AwaitableBus, address: int) -> int | str:
-        """The word at *address*, or how the unit refused to tell."""
+    async def _answer(self, bus: AwaitableBus, address: int, *, word: bool = False) -> str:
+        """How the unit answered at *address*: that it did, or which *word* it said, or how it refused to."""
         try:
-            [word] = await bus.read(self._unit, address)
+            [told] = await bus.read(self._unit, address)
         except Refused as error:
             return f"refused with exception {error.code:02X}H"
-        return word
+        return _named(told) if word else "answered"
 
 
-def _questions(profile: ProfileProtocol) -> tuple[int | None, Sequence[int]]:
-    """Where the family says what it is; where it does not, the words that are asked instead."""
+def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
+    """Where a unit says what it is, and words of which it counts whether it answers: either may be none."""
     register = profile.role("identification")
     address = None if register is None else profile.describe(register).address
     if address is not None:
-        return address, ()
+        return (address,), ()
     signature = profile.signature()
     if signature is not None:
-        return None, (*signature["answers"], *signature["refuses"])
+        return (), (*signature["answers"], *signature["refuses"])
     # Whether it has the words that are always asked of its family is better than nothing.
     known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
-    return None, [each.address for each in known if each.address is not None and each.evidence != "assumed"]
+    asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
+    return code_registers(), asked
 
 
 def _named(code: int) -> str:

@@ -47,6 +47,33 @@ def test_another_drive_is_not(
 
 
 @pytest.mark.parametrize(
+    ("family", "code"), [("gd600", "P10.00"), ("gd3000", "P01.21"), ("gd3000-rectifier", "P11.05")]
+)
+def test_another_drive_gives_itself_away_where_its_family_has_a_code(
+    monkeypatch: pytest.MonkeyPatch, family: str, code: str
+) -> None:
+    """P11.05 of a rectifier is its action on a transmission fault; on a GD350, group 11 protects the motor."""
+    with (
+        drivebus.Simulator({1: family}, transport="process", clock="virtual") as simulator,
+        drivebus.Bus(simulator, timeout=0.25) as bus,
+    ):
+        drive = bus.drive(1, family)
+        drive.write(code, 1, store=True)
+        simulator.line.unplug()
+        with pytest.raises(drivebus.PortError):
+            bus.read(1, 0x0001)
+        simulator.line.replug()
+        written = simulator.drive(1).writes()
+        read, other = bus.read, {IDENTIFICATION: [0x01A0]}
+        monkeypatch.setattr(bus, "read", lambda *what, **how: other.get(what[1]) or read(*what, **how))
+        with pytest.raises(drivebus.NotAllowed, match="another drive"):
+            drive.write(code, 0, store=True)
+        assert simulator.drive(1).writes() == written
+        other.clear()
+        drive.write(code, 0, store=True)
+
+
+@pytest.mark.parametrize(
     "write",
     [
         pytest.param(lambda drive: drive.write("P00.11", 2.0), id="drive"),
