@@ -292,12 +292,6 @@ fn what_came_from_below_must_fit_what_is_said_above() {
                    choices = { Hz = { value = 1, scale = 100 } }";
     for (name, manifest, registers, reasons) in [
         ("bit", memory, "", &["control_command is at 2000H, and bit 13"] as &[&str]),
-        (
-            "kind",
-            "kind = \"rectifier\"",
-            "",
-            &["no run_reverse", "no jog_forward", "no jog_reverse", "no jog_stop", "drop \"set_frequency\""],
-        ),
         ("wide", "", "0x2000,control_command,x,,1,no,2,,,,,ro,yes,,x\n", &["control_command is the command register"]),
         ("over", "", "0x1FFF,oil,x,,1,no,2,,,,,ro,yes,,x\n", &["another row lies over the command register, 2000H"]),
         ("fixed", "", "0x2001,set_frequency,x,Hz,100,no,,,,,,ro,yes,,x\n", &["set_frequency is a setpoint"]),

@@ -112,8 +112,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
     };
     let (requests, title) = (requests?, title?);
     let base = base.map(|base| inherit::view(base, file, manifest, problems));
-    let own_kind = manifest.kind.as_ref().map(|kind| *kind.get_ref());
-    let kind = own_kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
+    let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
     Some(match base {
         Some(base) => {
             let requests = if manifest.requests.is_some() { requests } else { base.requests.clone() };

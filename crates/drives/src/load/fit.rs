@@ -5,18 +5,14 @@
 
 use super::File;
 use super::manifest::{Manifest, line};
-use super::motion::for_rectifiers;
 use super::problems::Problems;
 use crate::entry::{Access, Entry};
 use crate::memory::Memory;
 use crate::profile::Profile;
-use crate::rules::UnitKind;
-use crate::setpoint::Setpoint;
 
 /// Checks the whole `profile`, which is put together.
 pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
     memory(file, manifest, profile, problems);
-    rectifier(file, manifest, profile, problems);
     words(file, profile, problems);
 }
 
@@ -32,21 +28,6 @@ fn memory(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Pr
             entry.name,
             mask.trailing_zeros()
         );
-        problems.add(file, place, reason);
-    }
-}
-
-fn rectifier(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
-    if profile.kind != UnitKind::Rectifier {
-        return;
-    }
-    let place = manifest.kind.as_ref().map_or(1, |kind| line(file, kind));
-    for command in profile.commands.keys().filter(|&&command| !for_rectifiers(command)) {
-        let reason = format!("a rectifier feeds no motor: it has no {}; give it [commands] of its own", command.name());
-        problems.add(file, place, reason);
-    }
-    if let Some(role) = profile.setpoints.get(&Setpoint::Frequency) {
-        let reason = format!("a rectifier feeds no motor: it has no frequency; drop \"{}\"", role.register);
         problems.add(file, place, reason);
     }
 }

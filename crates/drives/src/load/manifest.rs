@@ -17,7 +17,7 @@ use crate::state::State;
 pub(super) struct Manifest {
     pub(super) name: Spanned<String>,
     pub(super) title: Option<String>,
-    pub(super) kind: Option<Spanned<UnitKind>>,
+    pub(super) kind: Option<UnitKind>,
     pub(super) version: Option<Spanned<u32>>,
     pub(super) source: String,
     pub(super) extends: Option<Spanned<Extends>>,
