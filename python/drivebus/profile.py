@@ -16,7 +16,7 @@ from drivebus.errors import NotAllowed
 from drivebus.read_plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
-__all__ = ["Profile", "identify", "profiles"]
+__all__ = ["Profile", "profiles"]
 
 _PLANS_KEPT = 256
 """Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
@@ -378,15 +378,6 @@ class Profile:
 def profiles() -> list[str]:
     """The names of the profiles that come with the package."""
     return _native.Profile.builtin_names()
-
-
-def identify(code: int) -> str | None:
-    """The family that identification *code* (register 2103H) names, by all shipped profiles; None if none knows it."""
-    for name in profiles():
-        family = _native.Profile.builtin(name).identify(code)
-        if family is not None:
-            return family
-    return None
 
 
 @functools.cache
