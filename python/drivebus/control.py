@@ -84,6 +84,26 @@ class Controls(Parameters):
                 unit=self.unit,
             )
 
+    async def _check_set(self, wanted: list[dict[str, Any]], what: str) -> None:
+        """Raises `NotAllowed` if one of *wanted* is surely not as it must be: then the unit does *what* is said.
+
+        What no document proves, or may not be read, keeps nobody from starting a motor.
+        """
+        sure = [row for row in wanted if row["verified"] or self.unverified]
+        wrong = Control(item for item in await self._check_items(sure) if item.actual is not None and not item.ok)
+        if len(wrong):
+            raise NotAllowed(
+                f"unit {self.unit} {what}:\n{wrong}\nNothing that moves it was sent. prepare_control() (`drivebus "
+                "prepare`) sets what is needed",
+                unit=self.unit,
+            )
+
+    def _wanted_of_commands(self) -> list[dict[str, Any]]:
+        """What must be set for commands alone, whatever the setpoints."""
+        names = self.profile.setpoint_names()
+        of_setpoints = {row["code"] for name in names for row in self.profile.needs(name)}
+        return [row for row in self.profile.control() if row["code"] not in of_setpoints]
+
     def _wanted(self, setpoint: str | None) -> list[dict[str, Any]]:
         """What must be set for *setpoint*, in the order in which to set it."""
         known = self.profile.setpoint_names()

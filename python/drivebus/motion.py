@@ -55,9 +55,10 @@ class Motion(Commanding):
         Where two or more of the last ten exchanges failed, the link is proved first, by ten looks at the state.
 
         Raises:
-            NotAllowed: The drive is in fault, not under bus control, or *hz* is above its maximum; the link is bad;
-                another drive answers at this address since the port was opened again; or something is not verified for
-                the family: the command, or both ways to stop what it starts. Nothing was sent that moves it.
+            NotAllowed: The drive is in fault, not under bus control, or takes its speed from elsewhere; *hz* is above
+                its maximum; the link is bad; another drive answers at this address since the port was opened again; or
+                something is not verified for the family: the command, or both ways to stop what it starts. Nothing was
+                sent that moves it.
             Refused: The drive did not start.
             NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
             Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
@@ -70,7 +71,10 @@ class Motion(Commanding):
         if hz is not None:
             drive = await drive._with_setpoint("frequency")
         raw = None if hz is None else await drive._setpoint_word(hz)
-        await drive._start(command, raw, reverse, await drive._ready_to_start(), confirm)
+        before = await drive._ready_to_start()
+        if hz is not None:
+            await drive._check_set(drive.profile.needs("frequency"), "would not take its speed from the bus")
+        await drive._start(command, raw, reverse, before, confirm)
 
     async def jog(
         self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
@@ -204,6 +208,8 @@ class Motion(Commanding):
                 "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
                 unit=self.unit,
             )
+        if by_bus and seen.source is None:
+            await self._check_set(self._wanted_of_commands(), "does not take its commands from the bus")
         return seen
 
     async def _start(self, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:

@@ -286,3 +286,23 @@ def test_the_awaitable_face_has_the_same(simulator: Simulator) -> None:
             assert taken(simulator) == [(VIRTUAL_OUTPUTS, 1), (SPECIAL, 2), (0x2001, 1000)]
 
     asyncio.run(main())
+
+
+def test_no_start_at_a_speed_that_comes_from_elsewhere(drive: Drive, simulator: Simulator) -> None:
+    """P00.06 = 0: the keypad's 50 Hz, whatever the bus says. GD350 manual, chapter 9.4.5."""
+    drive.write("P00.06", 0)
+    simulator.drive(1).take_writes()
+    with pytest.raises(NotAllowed, match=r"would not take its speed from the bus:\nP00\.06 .*: 0, needs 8"):
+        drive.run(5.0)
+    assert taken(simulator) == []
+    drive.run()  # the speed it has is what is asked for
+
+
+def test_no_start_by_the_bus_where_only_a_parameter_tells_who_commands() -> None:
+    """GD600: no status word tells, P00.01 does. Manual, p. 131."""
+    with Bus("sim://3=gd600?clock=virtual") as bus:
+        drive = bus.drive(3, "gd600")
+        with pytest.raises(NotAllowed, match=r"does not take its commands from the bus:\nP00\.01 .*: 0, needs 2"):
+            drive.run(5.0)
+        drive.prepare_control(store=True)
+        drive.run(5.0)

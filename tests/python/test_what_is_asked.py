@@ -15,12 +15,15 @@ import drivebus
 from drivebus import Drive, Profile
 
 CONTROL, SETPOINT, STATE, IDENTIFICATION, FREQUENCY = 0x2000, 0x2001, 0x2100, 0x2103, 0x3000
-MAXIMUM, ACCELERATION = 0x0003, 0x000B
+MAXIMUM, FREQUENCY_SOURCE, ACCELERATION = 0x0003, 0x0006, 0x000B
 RAM = 0x8000
 FORWARD, STOPPED = 1, 3
 STOP = 5
 COMMUNICATION = 2 << 5 | 1
 """Status word 2: ready, commands from communication. GD350 manual, chapter 9.4.5."""
+
+MODBUS = 8
+"""P00.06: frequency A comes from Modbus. GD350 manual, chapter 9.4.5."""
 
 
 class StandIn:
@@ -34,7 +37,8 @@ class StandIn:
     """
 
     def __init__(self) -> None:
-        self.words = {STATE: STOPPED, STATE + 1: COMMUNICATION, STATE + 2: 0, IDENTIFICATION: 0x01A0, MAXIMUM: 5000}
+        self.words = {STATE: STOPPED, STATE + 1: COMMUNICATION, STATE + 2: 0, IDENTIFICATION: 0x01A0}
+        self.words |= {MAXIMUM: 5000, FREQUENCY_SOURCE: MODBUS}
         self.asked: list[tuple[str, int, dict[str, Any]]] = []
         self.failures: list[drivebus.DrivebusError | None] = []
         self.reconnects = 0
@@ -221,7 +225,8 @@ class TestWhatIsSaid:
             drive.coast()
 
     def test_what_a_lost_start_may_have_done(self, bus: StandIn, drive: Drive) -> None:
-        bus.failures = [None, None, drivebus.NoAnswer("silent", started=1.0)]  # the maximum, a look, the command
+        # The maximum, a look, where the speed comes from, the command.
+        bus.failures = [None, None, None, drivebus.NoAnswer("silent", started=1.0)]
         with pytest.raises(drivebus.Unconfirmed, match=r"the motor may turn\. State seen afterwards: stopped"):
             drive.run(10.0)
 
@@ -357,7 +362,8 @@ class TestWhoAnswers:
 
     def test_one_that_does_not_tell_again_gets_nothing(self, bus: StandIn, drive: Drive) -> None:
         bus.reconnects += 1
-        bus.failures = [None, None, drivebus.NoAnswer("silent", started=1.0)]  # the maximum, a look, who it is
+        # The maximum, a look, where the speed comes from, who it is.
+        bus.failures = [None, None, None, drivebus.NoAnswer("silent", started=1.0)]
         with pytest.raises(drivebus.NoAnswer, match="nothing was written") as unsent:
             drive.run(5.0)
         assert unsent.value.started is None
