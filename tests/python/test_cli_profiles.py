@@ -152,6 +152,10 @@ class TestDescribe:
             "frequency_source",
         ]
 
+    def test_a_word_without_its_underscore_and_a_unit_are_found(self) -> None:
+        assert [row["name"] for row in rows("--profile", EX9, "describe", "setfrequency")] == ["set_frequency"]
+        assert [row["name"] for row in rows("--profile", "gd350", "describe", "rpm")] == ["rotation_speed"]
+
     def test_nothing_that_comes_near(self) -> None:
         result = run("--profile", EX9, "describe", "out_curent")
         assert (result.exit_code, "output_current" in result.stderr) == (2, True)

@@ -116,11 +116,17 @@ pub(crate) fn parse_address(text: &str) -> Option<u16> {
     if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) { u16::from_str_radix(digits, 16).ok() } else { None }
 }
 
-/// The candidate with the fewest edits away from `name`, upper and lower case alike; the first of several.
+/// The candidate that `name` is most likely a part or a misspelling of, upper and lower case alike; the first of several.
+///
+/// Edits count by the length of the longer text: `current` is nearer to `output_current` than to `P00.01`.
 pub(crate) fn closest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // Nobody misspells a name by this much; longer input only costs time.
     let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
-    candidates.min_by_key(|candidate| distance(&name, &candidate.to_lowercase()))
+    candidates.min_by_key(|candidate| {
+        let candidate = candidate.to_lowercase();
+        let longest = name.len().max(candidate.chars().count()).max(1);
+        distance(&name, &candidate) * 1000 / longest
+    })
 }
 
 /// Levenshtein's distance: how many characters to insert, drop or replace.
@@ -151,6 +157,14 @@ mod tests {
         }
         assert_eq!(closest("OUTPUT_CURENT", ["output_voltage", "output_current"].into_iter()), Some("output_current"));
         assert_eq!(closest("anything", std::iter::empty()), None);
+    }
+
+    #[test]
+    fn a_part_of_a_long_name_is_nearer_than_any_short_one() {
+        let known = || ["P00.01", "control_command", "output_current"].into_iter();
+        assert_eq!(closest("current", known()), Some("output_current"));
+        assert_eq!(closest("contrl", known()), Some("control_command"));
+        assert_eq!(closest("P00.02", known()), Some("P00.01"));
     }
 
     #[test]

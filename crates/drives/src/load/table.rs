@@ -58,6 +58,11 @@ pub(super) fn read<T>(
 fn headers(file: &File, columns: &Columns, reader: &mut csv::Reader<&[u8]>) -> Result<StringRecord, ProfileError> {
     let headers = reader.headers().map_err(|error| broken(file, &error))?.clone();
     let all = || columns.required.iter().chain(columns.optional);
+    let only = if headers.len() == 1 { &headers[0] } else { "" };
+    if let Some(divider) = only.chars().find(|letter| [';', '\t'].contains(letter)) {
+        let by = if divider == ';' { "semicolons" } else { "tabs" };
+        return Err(file.broken(1, format!("the columns are divided by {by}; save the table with commas between them")));
+    }
     if let Some(surplus) = headers.iter().find(|header| !all().any(|known| known == header)) {
         let closest = closest(surplus, all().copied()).unwrap_or_default();
         return Err(file.broken(1, format!("unknown column \"{surplus}\"; the closest is \"{closest}\"")));
