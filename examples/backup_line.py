@@ -13,6 +13,7 @@ from pathlib import Path
 import drivebus
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 port = sys.argv[2] if len(sys.argv) > 2 else "sim://1=gd350,2=gd350?clock=virtual"
 
 with drivebus.Bus(port, timeout=0.2, retries=1) as bus:
@@ -20,7 +21,8 @@ with drivebus.Bus(port, timeout=0.2, retries=1) as bus:
         if not found.profile:
             print(f"unit {found.unit}: no profile, left out")
             continue
-        drive = bus.drive(found.unit)
+        # Some families are known by their answers only: sure enough to read, and a backup only reads.
+        drive = bus.drive(found.unit, found.profile)
         path = folder / f"unit-{drive.unit}.toml"
         if path.exists():
             print(drive.diff(path))

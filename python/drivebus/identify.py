@@ -16,6 +16,11 @@ from drivebus.profile import Profile, profiles
 
 __all__ = ["code_registers", "identify", "usable"]
 
+_LOCKED = 0x09
+"""The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
+
+_PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
+
 Read = Callable[[int, int], Awaitable[list[int]]]
 
 
@@ -33,7 +38,8 @@ async def identify(read: Read, unit: int) -> Identification:
             [code] = await read(unit, address)
         except Refused as error:
             answered[address] = False
-            told.append(f"it refuses {address:04X}H (exception {error.code:02X}H)")
+            why = _PASSWORD if error.code == _LOCKED else ""
+            told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")
             continue
         answered[address] = True
         if code in _codes():

@@ -90,10 +90,14 @@ def _not_sure(found: Identification) -> NotAllowed:
         known = f"it may be {' or '.join(found.candidates)}"
     else:
         known = "what it is, is not known"
-    with_one = ", or unverified=True to take it for that" if len(found.candidates) == len(shipped) == 1 else ""
+    with_one = (
+        ", or unverified=True (`--unverified`) to take it for that"
+        if len(found.candidates) == len(shipped) == 1
+        else ""
+    )
     return NotAllowed(
         f"unit {found.unit} is not surely of one family: {known} ({found.certainty}: {found.reason}). The registers "
         "and command codes of another family may differ; if you know that it behaves like one of "
-        f"{', '.join(shipped or profiles())}, give profile=…{with_one}",
+        f"{', '.join(shipped or profiles())}, give profile=… (`--profile`){with_one}",
         unit=found.unit,
     )

@@ -170,3 +170,10 @@ class TestAfterThePortWasOpenedAgain:
         monkeypatch.setattr(bus, "read", other)
         with pytest.raises(NotAllowed, match="another drive answers as unit 4"):
             drive.write("P01.20", 6.0, store=True)
+
+
+def test_one_that_a_password_locks_says_what_to_do(bus: Bus) -> None:
+    """Exception 09H: GD350 manual, chapter 9.4.7."""
+    bus.drive(1).write("P07.00", 12, store=True)
+    with pytest.raises(NotAllowed, match=r"refuses 2103H \(exception 09H.*user password.*at the keypad"):
+        bus.drive(1)
