@@ -313,6 +313,7 @@ def test_a_file_is_written_whole_or_not_at_all(
         with pytest.raises(NotAllowed, match="cannot be written: No space left on device"):
             virtual_drive.backup(file)
     assert file.read_bytes() == before
+    assert not list(file.parent.glob("*.tmp"))
     virtual_drive.backup(file)
     assert Backup.load(file)["P00.11"] == 3.0
     assert [path.name for path in file.parent.iterdir()] == [file.name]

@@ -184,3 +184,33 @@ def test_who_cannot_ask_for_the_state_is_told_to_look(tmp_path: Path) -> None:
         file.write_text(file.read_text().replace("P07.01 = { value = 0, raw = 0 }", "P07.01 = { value = 1 }"))
         result = run(simulator, "--profile", "vfd500", "restore", file, "--yes")
     assert (result.exit_code, "cannot be asked of this family: look" in result.stderr) == (0, True)
+
+
+def test_what_another_family_lacks_is_named(simulator: drivebus.Simulator, tmp_path: Path) -> None:
+    """P30.02 is a VFD500's; no parameter of a GD350 has that code."""
+    file = tmp_path / "vfd500.toml"
+    with drivebus.Bus("sim://vfd500?clock=virtual") as bus:
+        bus.drive(1, "vfd500").backup(file)
+    result = run(simulator, "restore", file, "--force", "--dry-run")
+    assert result.exit_code == 1
+    assert "P30.02" in result.stdout
+    assert "see above" in result.stderr
+
+
+def test_a_spoilt_beginning_says_how_to_begin_anew(simulator: drivebus.Simulator, file: Path) -> None:
+    part = file.with_name("drive.toml.part")
+    part.write_text("format = 1\n[drive")
+    result = run(simulator, "backup", file)
+    assert (result.exit_code, f"{part}:2: " in result.stderr, "--fresh" in result.stderr) == (2, True, True)
+    assert run(simulator, "backup", file, "--fresh").exit_code == 0
+
+
+def test_when_it_was_begun_is_said(simulator: drivebus.Simulator, file: Path) -> None:
+    run(simulator, "backup", file)
+    begun = file.read_text().replace("complete = true", "complete = false")
+    lines = [line for line in begun.splitlines() if not line.startswith(("P0", "taken"))]
+    lines.insert(lines.index("[parameters]") - 1, "taken = 2025-01-31T12:00:00Z")
+    file.with_name("drive.toml.part").write_text("\n".join(lines))
+    result = run(simulator, "backup", file)
+    assert "begun 2025-01-31 12:00 UTC" in result.stdout
+    assert "`--fresh` reads them again" in result.stderr

@@ -46,13 +46,18 @@ def write(path: Path, text: str) -> None:
         # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
         passing = path.with_name(f"{path.name}.tmp")
         passing.unlink(missing_ok=True)
-        # Never through a link that somebody else put there.
-        handle = os.open(passing, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        passing.replace(path)
+        try:
+            # Never through a link that somebody else put there.
+            handle = os.open(passing, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            passing.replace(path)
+        except OSError:
+            # On a disk that is full, half a file keeps the next one from being written.
+            remove(passing)
+            raise
         _settle(path.parent)
     except (OSError, ValueError) as error:
         raise NotAllowed(f"{path} cannot be written: {_reason(error)}") from None

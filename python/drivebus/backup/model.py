@@ -183,4 +183,4 @@ def _shipped(family: str) -> ProfileProtocol:
     try:
         return Profile.builtin(family)
     except NotAllowed as error:
-        raise NotAllowed(f"{error}; for a profile of your own give profile=…") from None
+        raise NotAllowed(f"{error}; for a profile of your own give profile=… (`--profile`)") from None

@@ -137,7 +137,13 @@ def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
     """What was read before a break, if it was read of this drive."""
     if not part.exists():
         return None
-    before = Backup.load(part, drive.profile)
+    try:
+        before = Backup.load(part, drive.profile)
+    except NotAllowed as error:
+        raise NotAllowed(
+            f"{error}\nThat is what an interrupted backup left; with resume=False (`--fresh`) it is begun anew",
+            unit=drive.unit,
+        ) from None
     others = before.origin.other(origin, unit=True)
     if before.origin.profile_version != origin.profile_version:
         others.append(f"it was read with version {before.origin.profile_version} of the profile")

@@ -41,7 +41,8 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
             {"file": str(file), **origin, "taken": taken, "parameters": len(kept), "unread": kept.unread}
         )
         return
-    session.out.say(f"{file}: {len(kept)} parameters of unit {drive.unit}, {kept.origin.title}.")
+    begun = f"{kept.origin.taken:%Y-%m-%d %H:%M} UTC"
+    session.out.say(f"{file}: {len(kept)} parameters of unit {drive.unit}, {kept.origin.title}, begun {begun}.")
     if kept.unread:
         session.out.say(f"Not read: {len(kept.unread)}.")
         session.out.rows(["code", "reason"], kept.unread.items())
@@ -164,8 +165,7 @@ def _show_report(session: Session, report: drivebus.Restoration, end: str) -> No
         for item in report:
             session.out.record(vars(item))
         return
-    told = [item for item in report if item.result != "same" and item.before != item.wanted]
-    told = [item for item in told if item.result != "skipped" or item.before is not None]
+    told = [item for item in report if _is_told(item)]
     if told:
         rows = [[item.code, item.before, item.wanted, item.unit, item.result, item.label, item.reason] for item in told]
         session.out.rows(["code", "drive", "backup", "unit", "result", "label", "reason"], rows)
@@ -174,6 +174,14 @@ def _show_report(session: Session, report: drivebus.Restoration, end: str) -> No
         f"{end} The same: {counts['same']}. Left alone: {counts['skipped']} (fault history, read-only, and what has to "
         "be asked for: serial settings, motor data).".strip()
     )
+
+
+def _is_told(item: drivebus.Restored) -> bool:
+    """Whether there is something to say of *item*: what failed always, what was left alone where it differs."""
+    if item.failed:
+        return True
+    differs = item.result != "same" and item.before != item.wanted
+    return differs and (item.result != "skipped" or item.before is not None)
 
 
 @contextmanager
@@ -187,7 +195,10 @@ def _progress(session: Session, what: str) -> Iterator[Callable[[int, int], None
         def progress(done: int, total: int) -> None:
             nonlocal first
             if first and done and what == "reading":
-                click.echo(f"Going on where it was: {show(done)} of {show(total)} are there.", err=True)
+                click.echo(
+                    f"Going on where it was: {show(done)} of {show(total)} are there. `--fresh` reads them again.",
+                    err=True,
+                )
             first = False
             bar.update(task, completed=done, total=total)
 
