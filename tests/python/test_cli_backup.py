@@ -214,3 +214,29 @@ def test_when_it_was_begun_is_said(simulator: drivebus.Simulator, file: Path) ->
     result = run(simulator, "backup", file)
     assert "begun 2025-01-31 12:00 UTC" in result.stdout
     assert "`--fresh` reads them again" in result.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such files there")
+def test_what_is_no_file_is_never_replaced(simulator: drivebus.Simulator, tmp_path: Path) -> None:
+    """`/dev/null`, for who has the right to replace it."""
+    place = tmp_path / "queue"
+    os.mkfifo(place)
+    for words in (["backup", place], ["backup", place, "--force"]):
+        result = run(simulator, *words)
+        assert (result.exit_code, "is no file" in result.stderr) == (2, True)
+    assert place.is_fifo()
+    assert list(tmp_path.iterdir()) == [place]
+
+
+def test_a_long_text_that_is_no_backup_is_not_told_line_by_line(simulator: drivebus.Simulator, file: Path) -> None:
+    file.write_text("Dear diary\n" * 50)
+    result = run(simulator, "backup", file)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) < 10
+    assert "--force" in result.stderr
+
+
+def test_a_shell_completes_files() -> None:
+    for command in ("diff", "restore", "backup"):
+        words = {"COMP_WORDS": f"drivebus {command} pump", "COMP_CWORD": "2", "_DRIVEBUS_COMPLETE": "bash_complete"}
+        assert CliRunner().invoke(cli, [], prog_name="drivebus", env=words).stdout.strip() == "file,pump"

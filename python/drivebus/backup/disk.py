@@ -43,6 +43,8 @@ def write(path: Path, text: str) -> None:
     try:
         # A link goes on leading to the file, and the file is replaced.
         path = Path(os.path.realpath(path))
+        if path.exists() and not path.is_file():
+            raise NotAllowed(f"{path} is no file, and a backup cannot take its place")
         # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
         passing = path.with_name(f"{path.name}.tmp")
         passing.unlink(missing_ok=True)
@@ -60,6 +62,8 @@ def write(path: Path, text: str) -> None:
             raise
         _settle(path.parent)
     except (OSError, ValueError) as error:
+        if isinstance(error, NotAllowed):
+            raise
         raise NotAllowed(f"{path} cannot be written: {_reason(error)}") from None
 
 

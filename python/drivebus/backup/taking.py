@@ -23,6 +23,9 @@ Progress = Callable[[int, int], object]
 _REQUESTS_A_STEP = 8
 """Requests after which the file is written anew: what a power cut costs, against the wear of the disk."""
 
+_LINES = 5
+"""Lines that are told of a file which is no backup: it may be anything."""
+
 _FIRMWARE = "firmware_version"
 """The parameter or register of this name tells the firmware, where a profile has one."""
 
@@ -117,13 +120,17 @@ async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool
 
 def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
+    if path.exists() and not path.is_file():
+        raise NotAllowed(f"{path} is no file, and a backup cannot take its place; nothing was read")
     if force or not path.exists():
         return
     try:
         others = Backup.load(path, drive.profile).origin.other(origin, unit=True)
     except NotAllowed as error:
+        told = str(error).splitlines()
+        why = "\n".join(told[:_LINES] + ["…"] * (len(told) > _LINES))
         raise NotAllowed(
-            f"{path} is there and would be replaced, but: {error}; take another name, or force=True (`--force`)"
+            f"{path} is there and would be replaced, but: {why}\nTake another name, or force=True (`--force`)"
         ) from None
     if others:
         raise NotAllowed(

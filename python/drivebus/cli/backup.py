@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import drivebus
@@ -100,9 +101,15 @@ def restore(
         raise click.exceptions.Exit(1)
 
 
+def _complete_side(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Files, and what stands for none, for the shell."""
+    known = [CompletionItem(_FACTORY)] if incomplete and _FACTORY.startswith(incomplete) else []
+    return known or [CompletionItem(incomplete, type="file")]
+
+
 @click.command()
-@click.argument("a", metavar="A")
-@click.argument("b", metavar="[B]", required=False)
+@click.argument("a", metavar="A", shell_complete=_complete_side)
+@click.argument("b", metavar="[B]", required=False, shell_complete=_complete_side)
 @click.option("--all", "everything", is_flag=True, help="Also what changes by itself, such as the fault history.")
 @click.option("--force", is_flag=True, help="Also with a drive of another identification or firmware.")
 @pass_session
