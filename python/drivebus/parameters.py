@@ -94,6 +94,7 @@ class Parameters(Looks):
         wanted = name if isinstance(name, Mapping) else {name: value}
         if not isinstance(name, Mapping) and value is None:
             raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
+        self._check_deciding(wanted)
         drive = await self.trusting(unverified)._settled(*wanted)
         planned = [drive._plan_write(key, asked, store) for key, asked in wanted.items()]
         await drive._check_now(planned)
@@ -106,6 +107,28 @@ class Parameters(Looks):
                     error.add_note(f"written before it: {', '.join(done)}")
                 raise
             done.append(item.name)
+
+    def _check_deciding(self, wanted: Mapping[str, object]) -> None:
+        """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
+        for variant, rule in self._variants.items():
+            parameter = _key(self.profile.describe(rule["parameter"]))
+            name = next((name for name in wanted if _key(self.profile.describe(name)) == parameter), None)
+            if name is None:
+                continue
+            depends = next((other for other in wanted if self.profile.describe(other).variant == variant), None)
+            if depends is not None:
+                raise NotAllowed(
+                    f"{name} decides what {depends} means; nothing was sent to unit {self.unit}. Write {name} by "
+                    "itself, and first",
+                    unit=self.unit,
+                )
+            chosen = self.profile.variants_chosen.get(variant)
+            if chosen is not None and self.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
+                raise NotAllowed(
+                    f"{name} = {wanted[name]!r} would change the {variant} of unit {self.unit}, which was said to be "
+                    f"{chosen}; nothing was sent. Write it by a drive without variants=…",
+                    unit=self.unit,
+                )
 
     def _plan_write(self, name: str, value: object, store: bool) -> _Planned:
         known = self.profile.describe(name)

@@ -66,7 +66,8 @@ class Registers:
         self.profile = profile
         self.unverified = unverified
         self._evidence = Evidence(profile, self.unit, unverified)
-        self._open_variants = set(profile.variants()) - set(profile.variants_chosen)
+        self._variants = profile.variants()
+        self._open_variants = set(self._variants) - set(profile.variants_chosen)
 
     def over(self, bus: AwaitableBus) -> Self:
         """The same unit over another face of the same line; what is known of it is shared."""
@@ -97,7 +98,7 @@ class Registers:
 
     async def _variant(self, variant: str) -> str:
         """What the drive's own parameter says of *variant*."""
-        rule = self.profile.variants()[variant]
+        rule = self._variants[variant]
         parameter, choices = rule["parameter"], rule["choices"]
         given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant`; {', '.join(map(repr, choices))}) says which"
         if rule["reason"] is not None and not self.unverified:

@@ -302,6 +302,22 @@ class TestRules:
             asked.write("speed_reference", value)
             assert [taken[1:] for taken in simulator.drive(VFD500).take_writes()] == [(0x7001, word)]
 
+    def test_what_decides_a_unit_does_not_change_under_a_value(
+        self, bus: Bus, refuses: Callable[..., None], simulator: Simulator
+    ) -> None:
+        """P30.14 of a VFD500: 10.0 would go out as 10.00 Hz and be taken for 1000 rpm."""
+        drive = bus.drive(VFD500, "vfd500", unverified=True)
+        together = "decides what speed_reference means"
+        refuses(lambda: drive.write({"P30.14": 2, "speed_reference": 10.0}), together)
+        refuses(lambda: drive.write({"speed_reference": 10.0, "bus_speed_unit": 2}), together)
+        hertz = bus.drive(VFD500, "vfd500", variants={"speed_unit": "Hz"})
+        refuses(lambda: hertz.write("P30.14", 2), "P30.14 = 2 would change the speed_unit of unit 4.*said to be Hz")
+        hertz.write("P30.14", 1)
+        drive.write("P30.14", 2)
+        simulator.drive(VFD500).take_writes()
+        drive.write("speed_reference", 10)
+        assert [word[1:] for word in simulator.drive(VFD500).writes()] == [(0x7001, 10)]
+
     def test_a_locked_drive_says_what_to_do(self, bus: Bus, simulator: Simulator) -> None:
         """INVT's 09H is the user password, P07.00. A VFD500's 05H is a word that cannot be read (p. 134)."""
         invt, other = bus.drive(GD350), bus.drive(VFD500, "vfd500")
