@@ -14,6 +14,7 @@ from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import NotAllowed, Unconfirmed
 from drivebus.evidence import Evidence
 from drivebus.looking import Seen
+from drivebus.protocols import ProfileProtocol
 from drivebus.terminals import Terminals
 from drivebus.values import Fault, Snapshot, State, Status
 
@@ -30,6 +31,10 @@ class Operations(Keeping, Terminals):
     and, for errors, its last state. Safe from any thread; a command and its confirmation are several requests, between
     which others may come.
     """
+
+    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+        super()._know(profile, unverified)
+        self._monitored: list[str] | None = None
 
     async def status(self, *, unverified: bool = False) -> Status:
         """State, readiness, control source, frequency and fault, in two reads where the family has them together.
@@ -131,7 +136,11 @@ class Operations(Keeping, Terminals):
                 (`variants` of `bus.drive` says which).
         """
         if not names:
-            return [name for name in self._evidence.readable(self.profile.monitor_names()) if not self._open(name)]
+            # The same each time, and looked up for every sample of a monitor.
+            if self._monitored is None:
+                known = self._evidence.readable(self.profile.monitor_names())
+                self._monitored = [name for name in known if not self._open(name)]
+            return list(self._monitored)
         self._evidence.reads(names)
         for name in filter(self._open, names):
             rules = self.profile.variants()[self.profile.describe(name).variant or ""]
