@@ -29,6 +29,9 @@ __all__ = ["Registers"]
 _LOCKED = ("password_error", "password_protected")
 """What INVT's families call the exceptions that have to do with the user password."""
 
+_UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
+"""What an exception is called that no profile names, and one that the specification does not name either."""
+
 
 class Registers:
     """The registers and parameters of one unit.
@@ -212,6 +215,9 @@ class Registers:
             yield
         except Refused as error:
             name, meaning = self.profile.exception(error.code)
+            if name == _UNKNOWN and error.name != _NOWHERE:
+                name = error.name
+                meaning = f"so in the Modbus specification; what a {self.profile.title} means by it is not known"
             raise Refused(
                 f"unit {self.unit} refused {_asked(error.request)}: exception {error.code:02X}H, {name}: {meaning}"
                 f"{self._about_password(name)}",

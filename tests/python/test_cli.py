@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +17,9 @@ from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus.cli import cli
+
+FULL = Path("/dev/full")
+"""A disk that is full."""
 
 SIM = "sim://gd350?clock=virtual"
 
@@ -378,3 +382,11 @@ def test_the_demonstration_holds() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert "OL1" in done.stdout
     assert "drivebus --port /dev/ttyUSB0 scan" in done.stdout
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="only Linux has it")
+def test_a_full_disk_behind_standard_output_is_said() -> None:
+    with FULL.open("w") as full:
+        words = [sys.executable, "-m", "drivebus", "profiles"]
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (1, "Error: what was done cannot be shown: No space left on device\n")

@@ -49,3 +49,14 @@ def test_a_refusal_carries_its_code() -> None:
     )
     same = pickle.loads(pickle.dumps(error))
     assert (same.code, same.name, same.meaning, same.raw) == (2, "illegal_address", "no such address", error.raw)
+
+
+def test_a_refusal_that_no_profile_names_is_that_of_the_specification() -> None:
+    """No document at hand has the exceptions of a CHF100A. 02H: Modbus Application Protocol V1.1b3, section 7."""
+    with drivebus.Bus("sim://1=chf100a?clock=virtual") as bus:
+        drive = bus.drive(1, "chf100a")
+        with pytest.raises(
+            drivebus.Refused, match=r"02H, illegal_data_address: so in the Modbus specification"
+        ) as error:
+            drive.read_words(0x2100)
+    assert (error.value.code, error.value.name) == (2, "illegal_data_address")

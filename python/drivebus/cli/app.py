@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from typing import Any
 
 import click
@@ -31,6 +32,12 @@ class _Commands(click.Group):
             for line in (f"Error: {error}", *getattr(error, "__notes__", ())):
                 click.echo(printable(line), err=True)
             context.exit(exit_code(error))
+        except OSError as error:
+            # A reader that has gone ends the command in silence: click sees to that.
+            if error.errno == errno.EPIPE:
+                raise
+            click.echo(printable(f"Error: what was done cannot be shown: {error.strerror or error}"), err=True)
+            context.exit(1)
 
 
 @click.group(
