@@ -161,7 +161,7 @@ class Profile:
 
     def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address* (0..0xFFFF), or None."""
-        return next((name for name in self._names if self._native.address(name) == address), None)
+        return next((name for name in self._names if self.describe(name).address == address), None)
 
     def describe(self, name: str, /) -> Description:
         """All that is known of one register or parameter. NotAllowed names the closest for a misspelt one."""

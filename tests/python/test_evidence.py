@@ -94,6 +94,9 @@ class TestRows:
             drive = bus.drive(GD350, folder, unverified=unverified)
             refuses(lambda drive=drive: drive.read("analog_input_4"), "address of analog_input_4.*not known.*overlay")
             assert len(drive.monitor()) == 22
+            # What stands at an address is told all the same.
+            assert drive.profile.name_at(0x3010) == "hdi_frequency_1"
+            refuses(lambda: bus.write(GD350, 0x7000, 1), "7000H is the command register of Veikong VFD500")
 
     def test_a_drive_may_be_trusted_for_good(self, bus: Bus, simulator: Simulator) -> None:
         drive = bus.drive(GD350, unverified=True)

@@ -295,6 +295,12 @@ fn what_came_from_below_must_fit_what_is_said_above() {
         ("wide", "", "0x2000,control_command,x,,1,no,2,,,,,ro,yes,,x\n", &["control_command is the command register"]),
         ("over", "", "0x1FFF,oil,x,,1,no,2,,,,,ro,yes,,x\n", &["another row lies over the command register, 2000H"]),
         ("fixed", "", "0x2001,set_frequency,x,Hz,100,no,,,,,,ro,yes,,x\n", &["set_frequency is a setpoint"]),
+        (
+            "start",
+            "",
+            "0x2000,set_frequency,x,Hz,100,no,,,,,,rw,yes,,x\n",
+            &["set_frequency is at 2000H, where a word"],
+        ),
         ("state", "", "0x2100,status_word_1,x,,1,no,2,,,,,ro,yes,,x\n", &["status_word_1 is the state"]),
         ("two", variant, "0x4000,oil,x,,,no,2,u,,,,ro,yes,,x\n", &["has one word"]),
         ("bound", variant, "0x4000,oil,x,,,no,,u,,,P00.03,rw,yes,,x\n", &["leave those cells empty"]),

@@ -9,11 +9,13 @@ use super::problems::Problems;
 use crate::entry::{Access, Entry};
 use crate::memory::Memory;
 use crate::profile::Profile;
+use crate::setpoint::Setpoint;
 
 /// Checks the whole `profile`, which is put together.
 pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
     memory(file, manifest, profile, problems);
     words(file, profile, problems);
+    setpoints(file, profile, problems);
 }
 
 /// The bit that says where a write is kept is no part of any address.
@@ -59,5 +61,18 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
     let covered = profile.command_address.filter(|&address| profile.entry_at(address).is_none());
     if let Some(address) = covered {
         problems.add(file, 1, format!("another row lies over the command register, {address:04X}H"));
+    }
+}
+
+/// What only changes a speed is written where nothing starts a motor.
+fn setpoints(file: &File, profile: &Profile, problems: &mut Problems) {
+    for (setpoint, role) in &profile.setpoints {
+        let moves = matches!(setpoint, Setpoint::VirtualInputs | Setpoint::VirtualOutputs | Setpoint::SpecialControl);
+        let address = profile.entry(&role.register).and_then(|entry| entry.address);
+        let taken = |address: u16| profile.command_address == Some(address) || (!moves && profile.is_command(address));
+        if let Some(address) = address.filter(|&address| taken(address)) {
+            let reason = format!("{} is at {address:04X}H, where a word can start a motor", role.register);
+            problems.add(file, 1, format!("{reason}: no setpoint can be there"));
+        }
     }
 }
