@@ -143,10 +143,11 @@ class Operations(Keeping, Terminals):
             return list(self._monitored)
         self._evidence.reads(names)
         for name in filter(self._open, names):
-            rules = self.profile.variants()[self.profile.describe(name).variant or ""]
+            variant = self.profile.describe(name).variant or ""
+            rules = self.profile.variants()[variant]
             raise NotAllowed(
                 f"what {name} means depends on {rules['parameter']} of unit {self.unit}: give variants=… to "
-                f"bus.drive() (`--variant`; {', '.join(map(repr, rules['choices']))})",
+                f"bus.drive() (`--variant {variant}=…`; {', '.join(map(repr, rules['choices']))})",
                 unit=self.unit,
             )
         return list(names)

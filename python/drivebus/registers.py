@@ -103,7 +103,8 @@ class Registers:
         """What the drive's own parameter says of *variant*."""
         rule = self._variants[variant]
         parameter, choices = rule["parameter"], rule["choices"]
-        given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant`; {', '.join(map(repr, choices))}) says which"
+        which = ", ".join(map(repr, choices))
+        given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant {variant}=…`; {which}) says which"
         if rule["reason"] is not None and not self.unverified:
             raise not_verified(
                 f"what {parameter} decides in {self.profile.title}, and so what the word means (its {variant})",

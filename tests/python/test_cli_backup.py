@@ -240,3 +240,11 @@ def test_a_shell_completes_files() -> None:
     for command in ("diff", "restore", "backup"):
         words = {"COMP_WORDS": f"drivebus {command} pump", "COMP_CWORD": "2", "_DRIVEBUS_COMPLETE": "bash_complete"}
         assert CliRunner().invoke(cli, [], prog_name="drivebus", env=words).stdout.strip() == "file,pump"
+
+
+def test_another_version_of_the_profile_is_said(simulator: drivebus.Simulator, file: Path) -> None:
+    run(simulator, "backup", file)
+    assert "version" not in run(simulator, "diff", file).stderr
+    file.write_text(file.read_text().replace("profile_version = 1", "profile_version = 99"))
+    result = run(simulator, "restore", file)
+    assert (result.exit_code, "version 99 of the profile gd350, and this is version 1" in result.stderr) == (0, True)

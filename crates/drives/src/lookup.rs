@@ -116,17 +116,24 @@ pub(crate) fn parse_address(text: &str) -> Option<u16> {
     if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) { u16::from_str_radix(digits, 16).ok() } else { None }
 }
 
-/// The candidate that `name` is most likely a part or a misspelling of, upper and lower case alike; the first of several.
+/// The candidate with the fewest edits away from `name`, upper and lower case alike; the first of several.
 ///
-/// Edits count by the length of the longer text: `current` is nearer to `output_current` than to `P00.01`.
+/// One that `name` is only a part of, as `current` of `output_current`, is nearer than one that shares next to nothing.
 pub(crate) fn closest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // Nobody misspells a name by this much; longer input only costs time.
     let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
     candidates.min_by_key(|candidate| {
         let candidate = candidate.to_lowercase();
-        let longest = name.len().max(candidate.chars().count()).max(1);
-        distance(&name, &candidate) * 1000 / longest
+        let edits = distance(&name, &candidate);
+        let apart = edits * 2 > name.len().max(candidate.chars().count()) && !is_part(&name, &candidate);
+        (apart, edits)
     })
+}
+
+/// Whether the letters of `part` stand in `whole` in their order; two of them say nothing.
+fn is_part(part: &[char], whole: &str) -> bool {
+    let mut rest = whole.chars();
+    part.len() > 2 && part.iter().all(|&wanted| rest.any(|letter| letter == wanted))
 }
 
 /// Levenshtein's distance: how many characters to insert, drop or replace.
@@ -165,6 +172,7 @@ mod tests {
         assert_eq!(closest("current", known()), Some("output_current"));
         assert_eq!(closest("contrl", known()), Some("control_command"));
         assert_eq!(closest("P00.02", known()), Some("P00.01"));
+        assert_eq!(closest("nope", ["gd350", "gd600-rectifier"].into_iter()), Some("gd350"));
     }
 
     #[test]

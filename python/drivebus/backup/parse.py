@@ -85,7 +85,10 @@ class _File:
             lines.append(f"and {len(self.wrong) - _SHOWN} more")
         read_with = self.drive.get("profile")
         if profile is not None and read_with not in (None, profile.name):
-            lines.append(f"it was read with the profile {read_with!r}, and checked against {profile.name!r}")
+            lines.append(
+                f"it was read with the profile {read_with!r}, and checked against {profile.name!r}; to use it "
+                "as it is, give the profile that it was read with (`--profile`)"
+            )
         count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
         return NotAllowed("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
 

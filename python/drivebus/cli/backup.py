@@ -151,7 +151,15 @@ def _diff(session: Session, a: str, b: str | None, everything: bool, force: bool
 def _load(session: Session, file: Path) -> drivebus.Backup:
     """The backup in *file*; a wrong one is told before any port is opened."""
     profile = None if session.profile is None else drivebus.Profile.find(session.profile)
-    return drivebus.Backup.load(file, profile)
+    kept = drivebus.Backup.load(file, profile)
+    version, now = kept.origin.profile_version, kept.profile.version
+    if kept.origin.profile == kept.profile.name and version not in (0, now):
+        click.echo(
+            f"{file} was read with version {version} of the profile {kept.profile.name}, and this is version {now}: "
+            "its values are taken as this one means them.",
+            err=True,
+        )
+    return kept
 
 
 def _question(drive: drivebus.Drive, codes: list[str]) -> str:
