@@ -346,3 +346,14 @@ def test_arguments_are_checked_before_anything_is_opened() -> None:
         with pytest.raises(NotAllowed):
             examine("/dev/null", **arguments)
     assert drivebus.doctor.examine is examine
+
+
+def test_who_may_not_obey_is_told_a_command_that_works() -> None:
+    """P00.02 of a VFD500 is on no page at hand, and it says nowhere what it is."""
+    with Simulator({1: "gd350", 2: "vfd500"}, transport="process", clock="virtual") as simulator:
+        findings = [finding for finding in examine(simulator) if finding.name == "control"]
+    assert [(finding.unit, "may not obey" in finding.text) for finding in findings] == [(1, False), (2, True)]
+    assert [finding.advice.split("`")[1] for finding in findings] == [
+        "drivebus prepare",
+        "drivebus --profile vfd500 --unverified prepare",
+    ]

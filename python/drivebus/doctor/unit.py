@@ -264,11 +264,15 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
             for item in control
             if not item.ok
         )
+        surely = any(item.actual is not None and not item.ok for item in control)
+        # Only a unit that says what it is needs no --profile, and prepare writes only what is verified without a word.
+        profile = f" --profile {drive.profile.name}" if drive.profile.role("identification") is None else ""
+        doubtful = any(not item.ok and not item.verified for item in control)
         yield Finding(
             "unit",
             "control",
             Severity.NOTE,
-            f"unit {unit} answers, and does not obey the bus yet: {wrong}",
-            "`drivebus prepare` sets it, if that is wanted",
+            f"unit {unit} answers, and {'does not obey the bus yet' if surely else 'may not obey the bus'}: {wrong}",
+            f"`drivebus{profile}{' --unverified' if doubtful else ''} prepare` sets it, if that is wanted",
             unit=unit,
         )
