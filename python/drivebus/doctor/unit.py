@@ -266,13 +266,13 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
         )
         surely = any(item.actual is not None and not item.ok for item in control)
         # Only a unit that says what it is needs no --profile, and prepare writes only what is verified without a word.
-        profile = f" --profile {drive.profile.name}" if drive.profile.role("identification") is None else ""
+        given = f" --profile {drive.profile.name}" if drive.profile.role("identification") is None else ""
         doubtful = any(not item.ok and not item.verified for item in control)
         yield Finding(
             "unit",
             "control",
             Severity.NOTE,
             f"unit {unit} answers, and {'does not obey the bus yet' if surely else 'may not obey the bus'}: {wrong}",
-            f"`drivebus{profile}{' --unverified' if doubtful else ''} prepare` sets it, if that is wanted",
+            f"`drivebus{given}{' --unverified' if doubtful else ''} prepare` sets it, if that is wanted",
             unit=unit,
         )
