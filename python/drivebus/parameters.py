@@ -208,13 +208,14 @@ class Parameters(Looks):
         """For each parameter the others whose range it narrows, as limits of its own."""
         if self._limits_of_others is None:
             found: dict[str, list[_Limit]] = {}
-            self._limits_of_others = found
             for other in map(self.profile.describe, self.profile.names()):
                 if other.kind == "parameter":
                     for bound, low in ((other.low_from, False), (other.high_from, True)):
                         if bound is not None:
                             key = _key(self.profile.describe(bound))
                             found.setdefault(key, []).append(_Limit(_key(other), low))
+            # Only when it is whole: another thread may look meanwhile.
+            self._limits_of_others = found
         return self._limits_of_others
 
     async def _write_one(self, item: _Planned, store: bool) -> None:

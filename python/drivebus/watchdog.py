@@ -51,6 +51,12 @@ class Settings:
             raise NotAllowed(
                 f"{drive.profile.title} has no communication time-out that is known; nothing was sent", unit=drive.unit
             )
+        if drive.profile.memory() is None:
+            raise NotAllowed(
+                f"no way to write {settings.timeout} of {drive.profile.title} to RAM alone is known, and a watchdog "
+                "that wears EEPROM each time is none; nothing was sent. Set the time-out in the drive, for good",
+                unit=drive.unit,
+            )
         if not (settings.verified or drive.unverified):
             what = f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})"
             raise not_verified(what, settings.note, drive.unit)

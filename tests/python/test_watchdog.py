@@ -197,3 +197,11 @@ def test_the_thread_ends_with_its_bus() -> None:
         assert isinstance(watchdog.error, drivebus.PortError)
         watchdog.close()
         assert watchdog.armed
+
+
+def test_none_is_set_where_it_would_wear_eeprom_each_time() -> None:
+    """GD3000 manual, p. 214: the rectifier has its time-out at P11.04. No address for RAM alone is printed."""
+    with Simulator({1: "gd3000-rectifier"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        with pytest.raises(drivebus.NotAllowed, match=r"P11\.04 .* to RAM alone .* for good"):
+            bus.drive(1, "gd3000-rectifier").watchdog(1.0)
+        assert simulator.drive(1).writes() == []
