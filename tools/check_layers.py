@@ -56,7 +56,7 @@ PYTHON: dict[str, set[str]] = {
     "profile": {"_native", "checks", "errors", "read_plan", "values"},
     "evidence": {"errors", "protocols"},
     "identity": {"errors", "identify", "protocols"},
-    "known": {"errors", "profile", "protocols"},
+    "known": {"errors", "profile", "protocols", "rtu"},
     "registers": {"checks", "errors", "evidence", "identity", "known", "protocols", "values"},
     "looking": {"errors", "evidence", "protocols", "registers", "values"},
     "parameters": {"checks", "errors", "looking", "protocols", "values"},

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
-from drivebus.errors import BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.evidence import Evidence
 from drivebus.looking import Seen
 from drivebus.setpoints import Setpoints
@@ -18,8 +18,6 @@ __all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Commanding"]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
-
-_LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
 
 _WRITE_MANY = 0x10
 
@@ -77,7 +75,7 @@ class Commanding(Setpoints):
                 await self._send(address, words, urgent=True)
             else:
                 await self._write(address, words)
-        except _LINE_ERRORS as error:
+        except LINE_ERRORS as error:
             if error.started is None:
                 if not urgent:
                     raise
@@ -100,7 +98,7 @@ class Commanding(Setpoints):
     async def _state_afterwards(self, urgent: bool) -> str:
         try:
             return f"State seen afterwards: {await self._glance(urgent=urgent)}"
-        except (*_LINE_ERRORS, Refused) as error:
+        except (*LINE_ERRORS, Refused) as error:
             return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
 
     async def _confirm(self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float) -> None:

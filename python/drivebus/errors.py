@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 __all__ = [
+    "LINE_ERRORS",
     "BadAnswer",
     "CrcError",
     "DrivebusError",
@@ -126,6 +127,10 @@ class NotAllowed(DrivebusError, ValueError):
 
     Did the drive take it? No: what was asked was not sent.
     """
+
+
+LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
+"""What a line can do to any request: of one that left, nothing is known."""
 
 
 class DrivebusWarning(UserWarning):

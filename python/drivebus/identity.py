@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError, Refused
+from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
 from drivebus.identify import code_registers
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
@@ -52,7 +52,7 @@ class Identity:
             return opened
         try:
             told = await self._ask(bus)
-        except (NoAnswer, BadAnswer, PortError) as error:
+        except LINE_ERRORS as error:
             if self._known is None:
                 return opened
             # `started` stays None: of what was to follow, nothing left.

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import ProfileProtocol
+from drivebus.rtu import written
 
 __all__ = ["KnownUnits", "check_words"]
 
-_WRITE, _WRITE_MANY = 0x06, 0x10
 _HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
 
 
@@ -40,12 +40,10 @@ class KnownUnits:
 
     def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
         """As `check`, for what a request to write carries; any other is let pass."""
-        if pdu[0] == _WRITE and len(pdu) == 5:
-            address, word = _words_of(pdu[1:5])
-            self.check(unit, address, word, force)
-        elif pdu[0] == _WRITE_MANY and len(pdu) > 7:
-            [address] = _words_of(pdu[1:3])
-            self.check(unit, address, _words_of(pdu[6 : len(pdu) & ~1]), force)
+        write = written(pdu)
+        if write is not None:
+            address, words = write
+            self.check(unit, address, words, force)
 
 
 def check_words(families: Iterable[ProfileProtocol], unit: int, address: int, words: int | Sequence[int]) -> None:
@@ -100,7 +98,3 @@ def _command_registers() -> dict[int, str]:
         if profile.command_address is not None:
             found.setdefault(profile.command_address, []).append(profile.title)
     return {address: ", ".join(titles) for address, titles in found.items()}
-
-
-def _words_of(data: bytes) -> list[int]:
-    return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]

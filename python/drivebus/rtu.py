@@ -11,7 +11,7 @@ from typing import Any
 from drivebus import _native
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
 
-__all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write"]
+__all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write", "written"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,3 +78,19 @@ def decode(frame: bytes | bytearray | memoryview) -> Frame:
         BadAnswer: It is too short, too long, or no frame.
     """
     return Frame(**_native.decode(frame))
+
+
+def written(pdu: bytes) -> tuple[int, list[int]] | None:
+    """The first address that the request *pdu* writes to, and the words; None if it writes none.
+
+    Also of a 10H request whose counts are wrong, in which `decode` sees none: a drive may not look at them.
+    """
+    if pdu[:1] == b"\x06" and len(pdu) == 5:
+        return _words(pdu[1:3])[0], _words(pdu[3:5])
+    if pdu[:1] == b"\x10" and len(pdu) > 7:
+        return _words(pdu[1:3])[0], _words(pdu[6:])
+    return None
+
+
+def _words(data: bytes) -> list[int]:
+    return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data) - 1, 2)]

@@ -15,7 +15,29 @@ pub(crate) struct Roles {
     pub(crate) status_words: Vec<String>,
 }
 
+impl Roles {
+    /// The roles that one register each has.
+    pub(crate) fn single_mut(&mut self) -> [&mut Option<String>; 4] {
+        [&mut self.identification, &mut self.fault, &mut self.frequency, &mut self.setpoint]
+    }
+}
+
 impl Profile {
+    /// The lists that name entries.
+    pub(crate) fn lists_mut(&mut self) -> [&mut Vec<String>; 8] {
+        let (groups, roles) = (&mut self.groups, &mut self.roles);
+        [
+            &mut self.monitor,
+            &mut self.fault_history,
+            &mut self.fault_values,
+            &mut roles.status_words,
+            &mut groups.acts,
+            &mut groups.serial,
+            &mut groups.motor,
+            &mut groups.last,
+        ]
+    }
+
     /// The entry that has a role: `"state"`, `"fault"` (the present one), `"frequency"` (at the output), `"setpoint"`
     /// (the frequency in force), `"identification"`, or a [setpoint](Setpoint), `"setpoints.torque"`. `None` where the
     /// family has none, or none is known, or nothing has such a role.

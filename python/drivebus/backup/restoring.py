@@ -17,8 +17,8 @@ from drivebus.backup.report import Restoration, Restored
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
-from drivebus.backup.writing import LINE_ERRORS, place, write
-from drivebus.errors import DrivebusError, NotAllowed, Refused
+from drivebus.backup.writing import place, write
+from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, Refused
 
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
+from drivebus.errors import LINE_ERRORS, NotAllowed
 
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping
 
-__all__ = ["LINE_ERRORS", "place", "write"]
-
-LINE_ERRORS = (NoAnswer, BadAnswer, PortError)
+__all__ = ["place", "write"]
 
 _ATTEMPTS = 3
 """How often a write is sent that the drive shows not to have heard."""

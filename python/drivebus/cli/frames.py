@@ -13,8 +13,6 @@ __all__ = ["COMMANDS"]
 _READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x08})
 """Function codes that change nothing in a unit."""
 
-_WRITE, _WRITE_MANY = 0x06, 0x10
-
 
 @click.command()
 @click.argument("data", metavar="HEX...", nargs=-1, required=True)
@@ -71,13 +69,10 @@ def _check_commands(unit: int, body: bytes) -> None:
 
     What the unit is, nobody has said; what it cannot mean is known all the same.
     """
-    numbers = [int.from_bytes(body[at : at + 2], "big") for at in range(2, len(body) - 1, 2)]
-    if body[1] == _WRITE and len(body) == 6:
-        first, *words = numbers
-    elif body[1] == _WRITE_MANY and len(body) > 7:
-        first, words = numbers[0], [int.from_bytes(body[at : at + 2], "big") for at in range(7, len(body) - 1, 2)]
-    else:
+    write = drivebus.rtu.written(body[1:])
+    if write is None:
         return
+    first, words = write
     families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
     for address, word in enumerate(words, first):
         there = [family for family in families if family.command_address == address]

@@ -93,6 +93,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
             format!("\"{what}\" is missing; only a profile that extends another, or an overlay, can do without"),
         )
     };
+    let base = base.map(|base| inherit::view(base, file, manifest, problems));
     let requests = match &manifest.requests {
         Some(requests) => problems.keep(read_requests(file, requests)),
         None => problems.keep(base.as_ref().map(|base| base.requests.clone()).ok_or_else(|| missing("requests"))),
@@ -111,13 +112,9 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
         _ => name.clone(),
     };
     let (requests, title) = (requests?, title?);
-    let base = base.map(|base| inherit::view(base, file, manifest, problems));
     let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
     Some(match base {
-        Some(base) => {
-            let requests = if manifest.requests.is_some() { requests } else { base.requests.clone() };
-            Profile { name, family, title, kind, version, requests, source: manifest.source.clone(), ..base }
-        }
+        Some(base) => Profile { name, family, title, kind, version, requests, source: manifest.source.clone(), ..base },
         None => Profile {
             name,
             family,

@@ -40,15 +40,8 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Spanned<String>], probl
         };
         let gone = base.entries.remove(index);
         let stays = |name: &String| *name != gone.name;
-        for list in [&mut base.monitor, &mut base.fault_history, &mut base.fault_values, &mut base.roles.status_words] {
-            list.retain(stays);
-        }
-        let groups = &mut base.groups;
-        for list in [&mut groups.acts, &mut groups.serial, &mut groups.motor, &mut groups.last] {
-            list.retain(stays);
-        }
-        let roles = &mut base.roles;
-        for role in [&mut roles.identification, &mut roles.fault, &mut roles.frequency, &mut roles.setpoint] {
+        base.lists_mut().into_iter().for_each(|list| list.retain(stays));
+        for role in base.roles.single_mut() {
             role.take_if(|name| !stays(name));
         }
         base.control.retain(|item| stays(&item.code));

@@ -81,47 +81,34 @@ fn overlaps(old: &Entry, new: &Entry) -> bool {
 
 /// Nothing of `base` relies any more on `name` for what the drive does. What writes to it do stays as it was.
 fn leave_roles(base: &mut Profile, name: &str) {
-    let roles = &mut base.roles;
-    for role in [&mut roles.identification, &mut roles.fault, &mut roles.frequency, &mut roles.setpoint] {
+    for role in base.roles.single_mut() {
         role.take_if(|role| role == name);
     }
-    roles.status_words.retain(|word| word != name);
+    base.roles.status_words.retain(|word| word != name);
     base.state.take_if(|state| state.register == name);
     base.setpoints.retain(|_, role| role.register != name);
 }
 
 /// Calls entries by their new names wherever `base` refers to them, all at once: two may have changed places.
 fn rename(base: &mut Profile, called: &BTreeMap<String, String>) {
-    let (groups, roles) = (&mut base.groups, &mut base.roles);
-    let lists = [
-        &mut base.monitor,
-        &mut base.fault_history,
-        &mut base.fault_values,
-        &mut roles.status_words,
-        &mut groups.acts,
-        &mut groups.serial,
-        &mut groups.motor,
-        &mut groups.last,
-    ];
-    let roles = [&mut roles.identification, &mut roles.fault, &mut roles.frequency, &mut roles.setpoint];
+    let follow = |name: &mut String| {
+        if let Some(new) = called.get(name) {
+            name.clone_from(new);
+        }
+    };
+    base.lists_mut().into_iter().flatten().for_each(follow);
+    base.roles.single_mut().into_iter().flatten().for_each(follow);
     let bounds = base.entries.iter_mut().flat_map(|row| [&mut row.quantity.low_from, &mut row.quantity.high_from]);
     let setpoints = base
         .setpoints
         .values_mut()
         .flat_map(|role| std::iter::once(&mut role.register).chain(role.needs.iter_mut().map(|item| &mut item.code)));
-    let everywhere = lists
-        .into_iter()
+    bounds
         .flatten()
-        .chain(roles.into_iter().flatten())
-        .chain(bounds.flatten())
         .chain(base.control.iter_mut().map(|item| &mut item.code))
         .chain(setpoints)
         .chain(base.variants.values_mut().map(|variant| &mut variant.parameter))
         .chain(base.watchdog.iter_mut().flat_map(|watchdog| [&mut watchdog.timeout, &mut watchdog.action]))
-        .chain(base.state.iter_mut().map(|state| &mut state.register));
-    for name in everywhere {
-        if let Some(new) = called.get(name) {
-            name.clone_from(new);
-        }
-    }
+        .chain(base.state.iter_mut().map(|state| &mut state.register))
+        .for_each(follow);
 }
