@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.shell_completion import ShellComplete
 from click.testing import CliRunner, Result
 
 import drivebus
@@ -240,6 +241,24 @@ def test_a_shell_completes_files() -> None:
     for command in ("diff", "restore", "backup"):
         words = {"COMP_WORDS": f"drivebus {command} pump", "COMP_CWORD": "2", "_DRIVEBUS_COMPLETE": "bash_complete"}
         assert CliRunner().invoke(cli, [], prog_name="drivebus", env=words).stdout.strip() == "file,pump"
+
+
+def test_a_shell_completes_groups() -> None:
+    def complete(*words: str) -> list[str]:
+        *before, begun = words
+        return [item.value for item in ShellComplete(cli, {}, "drivebus", "").get_completions(before, begun)]
+
+    # VFD500: group 27 is its states, r25 its faults.
+    assert {"P00", "r25", "r27"} <= {*complete("--profile", "vfd500", "restore", "x.toml", "--group", "")}
+    assert complete("--profile", "gd350", "restore", "x.toml", "--group", "p00.1")[:2] == ["P00.10", "P00.11"]
+    assert "P14" in complete("restore", "--group", "P1")
+
+
+def test_the_factory_is_not_held_against_itself(file: Path) -> None:
+    result = run(None, "diff", "factory", "factory")
+    assert (result.exit_code, "does not differ from itself: give a FILE" in result.stderr) == (2, True)
+    result = run(None, "diff", file, "factory")
+    assert (result.exit_code, f"drivebus diff factory {file}" in " ".join(result.stderr.split())) == (2, True)
 
 
 def test_another_version_of_the_profile_is_said(simulator: drivebus.Simulator, file: Path) -> None:

@@ -12,6 +12,7 @@ from click.shell_completion import CompletionItem
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import drivebus
+from drivebus.cli.names import complete_group
 from drivebus.cli.output import show
 from drivebus.cli.session import Session, pass_session, yes_option
 
@@ -52,7 +53,12 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
 @click.command()
 @click.argument("file", type=_file)
 @click.option(
-    "--group", "groups", multiple=True, metavar="GROUP", help="Only this group (P00) or code; may be repeated."
+    "--group",
+    "groups",
+    multiple=True,
+    metavar="GROUP",
+    shell_complete=complete_group,
+    help="Only this group (P00) or code; may be repeated.",
 )
 @click.option("--serial", is_flag=True, help="Also the serial settings. The drive may not be heard afterwards.")
 @click.option("--motor", is_flag=True, help="Also the data of the motor.")
@@ -138,12 +144,14 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
 
 
 def _diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> drivebus.Diff:
+    if a == b == _FACTORY:
+        raise click.UsageError(f"{_FACTORY} does not differ from itself: give a FILE, or nothing for the drive, as B")
+    if b == _FACTORY:
+        raise click.UsageError(f"{_FACTORY} comes first: drivebus diff {_FACTORY} {a}")
     first = None if a == _FACTORY else _load(session, Path(a))
     if b is None:
         with session.drive() as drive:
             return drive.diff(first, everything=everything, force=force)
-    if b == _FACTORY:
-        raise click.UsageError(f"{_FACTORY} comes first: drivebus diff {_FACTORY} {a}")
     second = _load(session, Path(b))
     return second.diff(None, everything=everything) if first is None else first.diff(second, everything=everything)
 

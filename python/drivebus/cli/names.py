@@ -15,6 +15,7 @@ from drivebus.protocols import ProfileProtocol
 __all__ = [
     "Seconds",
     "complete_assignment",
+    "complete_group",
     "complete_name",
     "complete_profile",
     "complete_units",
@@ -135,6 +136,14 @@ def complete_name(context: click.Context, _parameter: click.Parameter, incomplet
 def complete_assignment(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """As `complete_name`, up to the equals sign."""
     return [CompletionItem(f"{item.value}=") for item in complete_name(context, parameter, incomplete)]
+
+
+def complete_group(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Groups of the profile that is given, or of all; behind the dot codes."""
+    known = (profile.describe(name).code for profile in _profiles(context) for name in profile.names())
+    codes = [code for code in known if code is not None]
+    texts = codes if "." in incomplete else [code.partition(".")[0] for code in codes]
+    return [CompletionItem(text) for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower())]
 
 
 def complete_profile(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
