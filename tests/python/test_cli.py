@@ -84,6 +84,42 @@ class TestLooking:
             asked.append(pty.line.requests - before)
         assert asked[1] - asked[0] == 2
 
+    def test_what_the_drive_refuses_keeps_the_others_from_nobody(self) -> None:
+        # A GD350 has nothing at 6300H, and says so with exception 02H.
+        result = run("read", "P00.03", "6300H", "bus_voltage")
+        assert result.exit_code == 4
+        assert [line.split()[0] for line in result.stdout.splitlines()] == ["name", "P00.03", "bus_voltage"]
+        [said] = result.stderr.splitlines()
+        assert said.startswith("Error: 6300H: unit 1 refused to read 1 word at 6300H: exception 02H, illegal_address")
+
+    def test_what_the_drive_refuses_has_its_place_in_json(self) -> None:
+        result = run("--json", "read", "P00.03", "6300H", "bus_voltage")
+        first, refused, last = map(json.loads, result.stdout.splitlines())
+        assert (result.exit_code, first["value"], last["name"]) == (4, 50.0, "bus_voltage")
+        assert (refused["name"], refused["value"], refused["exit_code"]) == ("6300H", None, 4)
+        assert "exception 02H" in refused["error"]
+        assert "error" not in first
+        assert "error" not in last
+
+    def test_where_nothing_comes_no_empty_table_does(self) -> None:
+        result = run("read", "6300H", "6301H")
+        assert (result.exit_code, result.stdout, len(result.stderr.splitlines())) == (4, "", 2)
+
+    @pytest.mark.parametrize("wrong", ["output_curent", "P02.01"])
+    def test_a_name_that_cannot_be_read_is_refused_before_any_is(self, pty: drivebus.Simulator, wrong: str) -> None:
+        asked = []
+        for words in (["P00.03", wrong], [wrong]):
+            before = pty.line.requests
+            result = run("--profile", "gd350", "read", *words, port=pty.port)
+            assert (result.exit_code, result.stdout, wrong in result.stderr) == (2, "", True)
+            asked.append(pty.line.requests - before)
+        assert asked == [0, 0]
+
+    def test_silence_is_told_of_each(self) -> None:
+        result = run("--profile", "gd350", "--unit", "9", "--json", "read", "P00.03", "bus_voltage")
+        assert result.exit_code == 3
+        assert [row["exit_code"] for row in map(json.loads, result.stdout.splitlines())] == [3, 3]
+
     def test_an_unknown_name_shows_the_closest(self) -> None:
         result = run("read", "output_curent")
         assert result.exit_code == 2

@@ -11,7 +11,7 @@ import drivebus
 from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable
-from drivebus.cli.session import Session, exit_code, parse_format
+from drivebus.cli.session import Session, exit_code, parse_format, tell
 
 __all__ = ["cli", "main"]
 
@@ -28,9 +28,7 @@ class _Commands(click.Group):
         try:
             return super().invoke(context)
         except drivebus.DrivebusError as error:
-            # Notes say what was done before; Python 3.10 has none.
-            for line in (f"Error: {error}", *getattr(error, "__notes__", ())):
-                click.echo(printable(line), err=True)
+            tell(error)
             context.exit(exit_code(error))
         except OSError as error:
             # A reader that has gone ends the command in silence: click sees to that.

@@ -13,7 +13,7 @@ from rich.progress import Progress
 import drivebus
 from drivebus.cli import names, rules
 from drivebus.cli.output import Output
-from drivebus.cli.session import Session, pass_session, profile_of
+from drivebus.cli.session import Session, exit_code, pass_session, profile_of, tell
 
 __all__ = ["COMMANDS"]
 
@@ -208,23 +208,60 @@ def _show_sample(out: Output, live: Live | None, snapshot: drivebus.Snapshot, do
 @click.option("--verify", is_flag=True, help="Ask twice; both answers must agree.")
 @pass_session
 def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
-    """Read registers or parameters: by name, code (P00.11) or address (3004H, 0x3004)."""
+    """Read registers or parameters: by name, code (P00.11) or address (3004H, 0x3004).
+
+    What comes is shown although something else does not; why not is said then, and the exit code is of that.
+    """
+    rows: list[dict[str, Any]] = []
+    failed: list[tuple[str, drivebus.DrivebusError]] = []
     with session.drive() as drive:
-        profile = drive.profile
-        rows: list[list[Any]] = []
-        for text in wanted:
-            place = names.resolve(profile, text)
-            if isinstance(place, int):
-                [word] = drive.read_words(place, verify=verify)
-                rows.append([f"{place:04X}H", word, "", f"unknown register, raw {word:#06x}", None])
-            else:
-                known = drive.describe(place)
-                value = drive.read(place, verify=verify)
-                rows.append([known.code or known.name, value, known.unit, known.label, known.evidence])
+        places = [names.resolve(drive.profile, text) for text in wanted]
+        # Nothing is asked where one of them is wrong; what a parameter of the drive decides has to be asked.
+        drive.readable(*(name for name in places if isinstance(name, str) and drive.describe(name).variant is None))
+        for place in places:
+            row = _described(drive, place)
+            try:
+                row["value"] = _value(drive, place, row, verify)
+            except drivebus.DrivebusError as error:
+                failed.append((row["name"], error))
+                row |= {"error": str(error), "exit_code": exit_code(error)}
+            rows.append(row)
+    _show_read(session.out, rows)
+    for name, reason in failed:
+        tell(reason, name)
+    if failed:
+        raise click.exceptions.Exit(exit_code(failed[0][1]))
+
+
+def _described(drive: drivebus.Drive, place: str | int) -> dict[str, Any]:
+    """What is known of a name, or of an address without one, before it is asked."""
+    if isinstance(place, int):
+        return {"name": f"{place:04X}H", "value": None, "unit": "", "label": "unknown register", "evidence": None}
+    known = drive.describe(place)
+    name = known.code or known.name
+    return {"name": name, "value": None, "unit": known.unit, "label": known.label, "evidence": known.evidence}
+
+
+def _value(drive: drivebus.Drive, place: str | int, row: dict[str, Any], verify: bool) -> Any:
+    if isinstance(place, str):
+        return drive.read(place, verify=verify)
+    [word] = drive.read_words(place, verify=verify)
+    row["label"] += f", raw {word:#06x}"
+    return word
+
+
+def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
+    """Every row as JSON; for people, those that came."""
+    if out.as_json:
+        for row in rows:
+            out.record(row)
+        return
+    came = [row for row in rows if "error" not in row]
     columns = ["name", "value", "unit", "label", "evidence"]
-    if not session.out.as_json and all(row[-1] in ("verified", None) for row in rows):
-        columns, rows = columns[:-1], [row[:-1] for row in rows]
-    session.out.rows(columns, rows)
+    if all(row["evidence"] in ("verified", None) for row in came):
+        columns.remove("evidence")
+    if came:
+        out.rows(columns, [[row[column] for column in columns] for row in came])
 
 
 COMMANDS = [ports, scan, info, status, monitor, read]

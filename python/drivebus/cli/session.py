@@ -12,7 +12,7 @@ from typing import Any, cast
 import click
 
 import drivebus
-from drivebus.cli.output import Output
+from drivebus.cli.output import Output, printable
 
 __all__ = [
     "EXIT_CODES",
@@ -22,6 +22,7 @@ __all__ = [
     "parse_format",
     "pass_session",
     "profile_of",
+    "tell",
     "yes_option",
 ]
 
@@ -180,3 +181,10 @@ def parse_format(context: click.Context, parameter: click.Parameter, value: str)
 def exit_code(error: drivebus.DrivebusError) -> int:
     """What the process ends with after *error*."""
     return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), 1)
+
+
+def tell(error: drivebus.DrivebusError, about: str = "") -> None:
+    """Says *error* on standard error; *about* is what it is the error of, where it was one of several."""
+    # Notes say what was done before; Python 3.10 has none.
+    for line in (f"Error: {about + ': ' if about else ''}{error}", *getattr(error, "__notes__", ())):
+        click.echo(printable(line), err=True)
