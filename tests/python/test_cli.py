@@ -126,14 +126,6 @@ class TestLooking:
         assert "output_current" in result.stderr
         assert "Traceback" not in result.output
 
-    def test_monitor_takes_as_many_samples_as_asked(self) -> None:
-        samples = rows(run("--json", "monitor", "--count", "3", "output_current"))
-        assert len(samples) == 3
-        assert all(sample.keys() == {"time", "output_current"} for sample in samples)
-        lines = run("monitor", "--count", "2").stdout.splitlines()
-        assert len(lines) == 2
-        assert all("output_current=" in line for line in lines)
-
     def test_describe_needs_no_port_with_a_profile(self) -> None:
         [known] = rows(run("--profile", "gd350", "--json", "describe", "output_current", port=None))
         assert (known["address"], known["unit"]) == ("3004H", "A")

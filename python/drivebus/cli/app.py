@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools
+from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools, watch
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable
 from drivebus.cli.session import Session, exit_code, parse_format, tell
@@ -138,7 +138,7 @@ def cli(
     context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485, unverified, variants)
 
 
-for module in (look, explain, doctor, move, backup, frames, profiles, tools):
+for module in (look, watch, explain, doctor, move, backup, frames, profiles, tools):
     for command in module.COMMANDS:
         cli.add_command(command)
 

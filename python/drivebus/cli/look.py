@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import nullcontext
 from typing import Any
 
 import click
-from rich.live import Live
 from rich.progress import Progress
 
 import drivebus
@@ -156,54 +153,6 @@ def status(session: Session) -> None:
 
 
 @click.command()
-@click.argument("wanted", metavar="[NAME]...", nargs=-1, shell_complete=names.complete_name)
-@click.option("--interval", type=names.Seconds(0), default=0.5, show_default=True, help="Seconds between samples.")
-@click.option("--count", type=click.IntRange(1), help="Samples to take; without it, until Ctrl-C.")
-@pass_session
-def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: int | None) -> None:
-    """Watch registers as they change: all monitor registers, or those named."""
-    out = session.out
-    with session.drive() as drive:
-        profile = drive.profile
-        known = [names.named(profile, text) for text in wanted]
-        doubtful = {name: drive.describe(name).evidence for name in known or profile.monitor_names()}
-        doubtful = {name: evidence for name, evidence in doubtful.items() if evidence != "verified"}
-        taken = 0
-        with Live(console=out.console, auto_refresh=False) if out.live else nullcontext() as live:
-            try:
-                while True:
-                    snapshot = drive.monitor(*known)
-                    if not snapshot:
-                        raise drivebus.NotAllowed(
-                            f"nothing that is known of {profile.title} may be watched without --unverified; name what "
-                            "you want to see"
-                        )
-                    _show_sample(out, live, snapshot, doubtful)
-                    taken += 1
-                    if taken == count:
-                        return
-                    drive.bus.sleep(interval)
-            except KeyboardInterrupt:
-                return
-
-
-def _show_sample(out: Output, live: Live | None, snapshot: drivebus.Snapshot, doubtful: Mapping[str, str]) -> None:
-    """One sample; what is not verified (*doubtful*: the name and why not) is marked."""
-    if live is not None:
-        rows = [[name, value, snapshot.units[name], doubtful.get(name)] for name, value in snapshot.items()]
-        live.update(out.table(["register", "value", "unit", ""], rows), refresh=True)
-    elif out.as_json:
-        told = {name: doubtful[name] for name in snapshot if name in doubtful}
-        out.record({"time": snapshot.time, **snapshot, **({"evidence": told} if told else {})})
-    else:
-        pairs = (
-            f"{name}={value}{snapshot.units[name]}{f' [{doubtful[name]}]' if name in doubtful else ''}"
-            for name, value in snapshot.items()
-        )
-        out.say(f"{snapshot.time:.3f} {' '.join(pairs)}")
-
-
-@click.command()
 @click.argument("wanted", metavar="NAME...", nargs=-1, required=True, shell_complete=names.complete_name)
 @click.option("--verify", is_flag=True, help="Ask twice; both answers must agree.")
 @pass_session
@@ -264,4 +213,4 @@ def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
         out.rows(columns, [[row[column] for column in columns] for row in came])
 
 
-COMMANDS = [ports, scan, info, status, monitor, read]
+COMMANDS = [ports, scan, info, status, read]
