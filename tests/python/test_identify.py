@@ -37,7 +37,7 @@ def answer(simulator: Simulator, unit: int, *words: int) -> None:
     ("unit", "certainty", "family", "candidates", "code"),
     [
         (1, "certain", "gd350", ("gd350",), 0x01A0),
-        (2, "shared", None, ("gd300", "Goodrive300L lift drive"), 0x010A),
+        (2, "shared", None, ("gd300", "Goodrive300L lift drive", "Goodrive310-UL"), 0x010A),
         (3, "by answers", "vfd500", ("vfd500",), None),
         (4, "unknown", None, (), None),
         (5, "certain", "gd35", ("gd35",), 0x0108),
@@ -62,12 +62,23 @@ def test_how_sure_it_is(
 
 def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus) -> None:
     bus.read(1, CODE)  # first contact is over
-    answer(simulator, 1, 0x010D)
+    answer(simulator, 1, 0x0107)
     found = bus.identify(1)
-    assert (found.certainty, found.family, found.candidates) == ("unverified", "gd10", ("gd10",))
-    answer(simulator, 1, 0x010D)
-    with pytest.raises(NotAllowed, match=r"010DH, which is a gd10, a family without a profile"):
+    assert (found.certainty, found.family, found.candidates) == ("unverified", "gd200a", ("gd200a",))
+    answer(simulator, 1, 0x0107)
+    with pytest.raises(NotAllowed, match=r"0107H, which is a gd200a, a family without a profile"):
         bus.drive(1, unverified=True)
+
+
+@pytest.mark.parametrize(
+    ("code", "family"), [(0x0106, "gd20"), (0x010B, "gd100"), (0x010C, "gd200"), (0x010D, "gd10"), (0x0180, "sd1")]
+)
+def test_a_code_of_a_family_without_a_profile(simulator: Simulator, bus: Bus, code: int, family: str) -> None:
+    """GD300-LIFT manual, p. 131; GD310-UL manual, p. 211; GD20 manual, p. 140; IMO SD1 manual, p. 137."""
+    bus.read(1, CODE)  # first contact is over
+    answer(simulator, 1, code)
+    found = bus.identify(1)
+    assert (found.certainty, found.family) == ("certain", family)
 
 
 def test_a_code_that_nobody_knows_does_not_fall_to_another_family(simulator: Simulator, bus: Bus) -> None:
