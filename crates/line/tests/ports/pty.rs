@@ -6,17 +6,23 @@ use std::os::fd::OwnedFd;
 
 use drivebus_line::rs485::{Rs485, Switch};
 use drivebus_line::tty::{Tty, TtyOptions};
+use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{ControlModes, tcgetattr};
 
 use super::*;
 
 /// The other side of a pseudo-terminal, and the path to open.
+///
+/// The path stays its own until the program ends, also when the other side is closed: the system would give it to the next
+/// who asks for a pseudo-terminal, which may be another test, and what was lost would seem to be there.
 pub(crate) fn pair() -> (File, String) {
-    let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&far).unwrap();
     unlockpt(&far).unwrap();
     let path = ptsname(&far, Vec::new()).unwrap().into_string().unwrap();
+    let held = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty()).unwrap();
+    std::mem::forget(held);
     (far.into(), path)
 }
 

@@ -125,16 +125,15 @@ fn twenty_times_under_another_name() {
             let lost = poll_until_lost(&bus);
             assert_eq!((lost.kind, &lost.port), (PortErrorKind::Lost, &path));
             gone.join().unwrap();
-            // Held while the new one is made, so that it gets another name.
-            let (held, _) = pair();
             pull_out(&machine, by_link);
             let error = port_error(&read(&bus, 0x2000).unwrap_err());
             assert_eq!(error.kind, PortErrorKind::NotFound, "{error}");
             assert!(error.to_string().contains("A50285BI"), "{error}");
 
             let before = tries.load(Ordering::SeqCst);
+            let old = std::mem::take(&mut path);
             (path, gone) = plug_in(&machine, by_link);
-            drop(held);
+            assert_ne!(path, old);
             assert_eq!(read(&bus, 0x2103).unwrap(), word_at(0x2103), "the first call after the port is back");
             assert_eq!(tries.load(Ordering::SeqCst), before + 1);
             assert_eq!(bus.stats().reconnects, round);
@@ -147,15 +146,15 @@ fn twenty_times_under_another_name() {
 #[test]
 fn a_lost_port_is_closed_and_found_missing_once_a_call() {
     let machine = Machine::new();
-    let (path, gone) = plug_in(&machine, true); // by its name alone, somebody else's could be opened
+    let (path, gone) = plug_in(&machine, true);
     let mut adapter = machine.adapter(&path);
     let (opener, tries) = counted(Box::new(move || Ok(Box::new(adapter.open()?))));
     let bus = open(opener);
+    assert_eq!(times_open(&path), 2);
     poll_until_lost(&bus);
     gone.join().unwrap();
     pull_out(&machine, true);
-    // A pseudo-terminal lives until both sides are closed: the bus has closed its own.
-    assert!(!std::path::Path::new(&path).exists() || is_somebody_elses(&path));
+    assert_eq!(times_open(&path), 1, "only what keeps its name is left");
     let before = tries.load(Ordering::SeqCst);
     for count in 1..=6 {
         port_error(&read(&bus, 0x2000).unwrap_err());
@@ -163,10 +162,13 @@ fn a_lost_port_is_closed_and_found_missing_once_a_call() {
     }
 }
 
-/// Whether this process has it not open: its number may have gone to another program meanwhile.
-fn is_somebody_elses(path: &str) -> bool {
+/// How often this process has it open, whether it is still there or not.
+fn times_open(path: &str) -> usize {
+    let gone = format!("{path} (deleted)");
     let ours = std::fs::read_dir("/proc/self/fd").unwrap();
-    ours.filter_map(|file| std::fs::read_link(file.ok()?.path()).ok()).all(|target| target.to_str() != Some(path))
+    let targets =
+        ours.filter_map(|file| std::fs::read_link(file.ok()?.path()).ok()?.into_os_string().into_string().ok());
+    targets.filter(|target| target == path || *target == gone).count()
 }
 
 #[test]
