@@ -11,7 +11,7 @@ LOCKED := --locked
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.md' \))
+RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.json' -o -name '*.md' \))
 PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f \( -name '*.py' -o -name '*.pyi' -o -name py.typed \))
 # The extension module has no Rust tests, and linking a test of it would need a shared libpython.
 RUST_TESTED := --workspace --exclude drivebus-python
@@ -19,7 +19,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual soak-realtime wheel clean \
-        machine format types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
+        machine format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -101,6 +101,10 @@ counts: $(VENV)/.created dist/.wheel interop-parts
 
 counts-update: $(VENV)/.created interop-parts ## after a change of the hot path
 	$(BIN)/python tools/count_instructions.py --update
+
+# After a change of what profile.toml may hold: its schema is made of the types that read it.
+schema: $(VENV)/.created ## changes a file
+	DRIVEBUS_WRITE_SCHEMA=1 $(CARGO) test $(LOCKED) --quiet -p drivebus-drives --lib the_shipped_schema
 
 interop-parts:
 	@sh tools/debian_parts.sh

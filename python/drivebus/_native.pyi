@@ -307,6 +307,9 @@ class Profile:
     def load(folder: str | os.PathLike[str], /) -> Profile:
         """A folder with `profile.toml` and the CSV files. NotAllowed names file, line and reason."""
     @staticmethod
+    def schema() -> str:
+        """The JSON schema of `profile.toml`."""
+    @staticmethod
     def check(folder: str | os.PathLike[str], /) -> list[tuple[str, int | None, str]]:
         """All that is wrong with a folder: file, line (None where a file cannot be read) and reason of each."""
     @property

@@ -134,6 +134,11 @@ class Profile:
         """
         return [{"file": file, "line": line, "reason": reason} for file, line, reason in _native.Profile.check(path)]
 
+    @staticmethod
+    def schema() -> str:
+        """The JSON schema (draft 7) of `profile.toml`, for editors: its keys and their types."""
+        return _native.Profile.schema()
+
     def names(self) -> list[str]:
         """Every register name and parameter code, registers first, in address order."""
         return list(self._names)
@@ -387,13 +392,5 @@ def _builtin(name: str) -> Profile:
 
 
 def _fault(row: dict[str, Any]) -> Fault:
-    return Fault(
-        code=row["code"],
-        mnemonic=row["mnemonic"],
-        label=row["label"],
-        cause=row["cause"] or "",
-        remedy=row["remedy"] or "",
-        verified=row["verified"],
-        evidence=row["evidence"],
-        note=row["note"],
-    )
+    known: dict[str, Any] = {key: "" if told is None else told for key, told in row.items() if key != "source"}
+    return Fault(**known)

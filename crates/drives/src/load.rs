@@ -1,7 +1,7 @@
 //! Loading: from the files of a folder to a checked [`Profile`].
 //!
 //! Everything a file can have wrong is found here, with file, line and reason; a `Profile` that exists is consistent.
-//! `manifest` knows the shape of `profile.toml`, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
+//! `manifest` knows the shape of `profile.toml`, `placed` where its values stand, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
 //! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
 //! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
 //! between them, `sense` what cannot be meant, `fit` whether what came from below still fits.
@@ -13,6 +13,7 @@ mod fit;
 mod inherit;
 mod manifest;
 mod motion;
+mod placed;
 mod problems;
 mod rows;
 mod sense;
@@ -178,6 +179,12 @@ impl Profile {
     /// The names of the shipped profiles.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
         BUILTINS.iter().map(|builtin| builtin.name)
+    }
+
+    /// The JSON schema (draft 7) of `profile.toml`, for editors. It knows the keys and their types; what their values must
+    /// be, [`check`](Self::check) says.
+    pub fn schema() -> &'static str {
+        include_str!("../profiles/profile.schema.json")
     }
 
     /// Loads the profile in `folder`: `profile.toml`, `registers.csv`, `parameters.csv` and `faults.csv`, all UTF-8.

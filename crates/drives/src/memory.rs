@@ -2,6 +2,7 @@
 
 /// What the memory bit of a parameter's address means when it is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum MemoryBit {
     /// The write goes to RAM only; without the bit it is kept in EEPROM.

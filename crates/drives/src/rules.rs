@@ -2,6 +2,7 @@
 
 /// Whether a unit feeds a motor, or the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum UnitKind {
     /// It turns a motor.

@@ -133,6 +133,7 @@ fn a_rectifier_has_no_command_that_needs_a_motor() {
         name = "rectifier"
         title = "A rectifier"
         kind = "rectifier"
+        version = 1
         source = "leaflet"
         [requests]
         functions = [3, 6]
@@ -155,7 +156,7 @@ fn a_rectifier_has_no_command_that_needs_a_motor() {
     let reasons = Folder::new("rectifier", &files).reasons();
     assert_eq!(reasons.len(), 2, "{reasons:?}");
     for (reason, command) in reasons.iter().zip(["run_reverse", "jog_forward"]) {
-        assert!(reason.contains("line 17") && reason.ends_with(&format!("it has no {command}")), "{reason}");
+        assert!(reason.contains("line 18") && reason.ends_with(&format!("it has no {command}")), "{reason}");
     }
 }
 
@@ -189,6 +190,8 @@ fn a_row_keeps_the_roles_of_the_one_in_whose_place_it_stands() {
     let manifest = |name: &str, below: &str| format!("name = \"{name}\"\nsource = \"x\"\n{below}");
     let below = r#"
         title = "x"
+        kind = "inverter"
+        version = 1
         [requests]
         functions = [3, 6]
         max_words = 1

@@ -37,6 +37,11 @@ impl Profile {
         py.detach(|| drives::Profile::load(&path)).map(|profile| Self(Arc::new(profile))).map_err(refuse)
     }
 
+    #[staticmethod]
+    fn schema() -> &'static str {
+        drives::Profile::schema()
+    }
+
     /// All that is wrong with a folder: file, line and reason of each; a file that cannot be read has no line.
     #[staticmethod]
     #[pyo3(signature = (folder, /))]

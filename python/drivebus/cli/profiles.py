@@ -120,4 +120,13 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
         session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
 
 
+@profiles.command()
+def schema() -> None:
+    """Print the JSON schema of profile.toml: with it an editor knows the keys, and marks wrong ones while you type.
+
+    `drivebus profiles new` puts it beside the files that it writes.
+    """
+    click.echo(drivebus.Profile.schema(), nl=False)
+
+
 COMMANDS = [profiles]

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 
+import drivebus
+
 __all__ = ["family_name", "files"]
 
 _REGISTERS = "address,name,label,unit,scale,signed,words,low,high,high_from,variant,access,verified,note,source\n"
@@ -21,7 +23,10 @@ _EXAMPLE_PARAMETER = (
 )
 _EXAMPLE_FAULT = "1,OC,An example,Why it may have come,What to do about it,assumed,Replace this row.,\n"
 
+_SCHEMA = "profile.schema.json"
+
 _HEAD = """\
+#:schema ./{schema}
 # {what}
 #
 # The long tables stand beside this file: registers.csv, parameters.csv, faults.csv. After each change:
@@ -184,8 +189,9 @@ def files(folder: str, *, like: str | None = None, overlay: str | None = None) -
         rest = _VERSION + _NEW.format(name=name, title=name)
     filled = like is None and overlay is None
     return {
-        "profile.toml": _HEAD.format(folder=folder, name=name, **words) + rest,
+        "profile.toml": _HEAD.format(schema=_SCHEMA, folder=folder, name=name, **words) + rest,
         "registers.csv": _REGISTERS + _EXAMPLE_REGISTER * filled,
         "parameters.csv": _PARAMETERS + _EXAMPLE_PARAMETER * filled,
         "faults.csv": _FAULTS + _EXAMPLE_FAULT * filled,
+        _SCHEMA: drivebus.Profile.schema(),
     }

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use toml::Spanned;
-
 use super::Files;
 use super::entries::Entries;
 use super::facts;
 use super::fit;
 use super::manifest::{self, Manifest, line};
 use super::motion;
+use super::placed::Placed;
 use super::problems::Problems;
 use super::{File, inherit, rows, sense, succeed};
 use crate::entry::Entry;
@@ -106,13 +105,17 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
         (None, Some(base)) => Some(base.title.clone()),
         (None, None) => problems.keep(Err(missing("title"))),
     };
+    let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).ok_or_else(|| missing("kind"));
+    let kind = problems.keep(kind);
+    if base.is_none() && manifest.version.is_none() {
+        problems.add(file, 1, "\"version\" is missing; it is counted up with each change, from 1");
+    }
     let version = manifest.version.as_ref().map_or(1, |version| *version.get_ref());
     let family = match (&manifest.overlay, &base) {
         (Some(_), Some(base)) => base.family.clone(),
         _ => name.clone(),
     };
-    let (requests, title) = (requests?, title?);
-    let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).unwrap_or(UnitKind::Inverter);
+    let (requests, title, kind) = (requests?, title?, kind?);
     Some(match base {
         Some(base) => Profile { name, family, title, kind, version, requests, source: manifest.source.clone(), ..base },
         None => Profile {
@@ -151,7 +154,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
     })
 }
 
-fn name(file: &File, name: &Spanned<String>, problems: &mut Problems) -> Option<String> {
+fn name(file: &File, name: &Placed<String>, problems: &mut Problems) -> Option<String> {
     let text = name.get_ref();
     let plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || matches!(byte, b'-' | b'_');
     if text.is_empty() || !text.bytes().all(plain) {
@@ -224,7 +227,8 @@ fn check_variants(
     profile: &Profile,
     problems: &mut Problems,
 ) {
-    let known = || manifest.variants.keys().map(Spanned::get_ref).chain(profile.variants.keys()).map(String::as_str);
+    let known =
+        || manifest.variants.keys().map(|name| name.get_ref()).chain(profile.variants.keys()).map(String::as_str);
     for (line, wanted) in rows.iter().filter(|(_, wanted)| !known().any(|known| known == wanted)) {
         let closest = closest(wanted, known()).unwrap_or("none");
         let reason = format!("variant \"{wanted}\" has no table in profile.toml; the closest is \"{closest}\"");
@@ -240,7 +244,7 @@ fn variants(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &E
 }
 
 fn roles(file: &File, manifest: &Manifest, roles: &mut Roles, entries: &Entries, problems: &mut Problems) {
-    let mut own = |wanted: &Option<Spanned<String>>, role: &mut Option<String>| {
+    let mut own = |wanted: &Option<Placed<String>>, role: &mut Option<String>| {
         if let Some(wanted) = wanted {
             *role = entries.get(file, wanted, problems).map(|entry| entry.name.clone());
         }

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use toml::Spanned;
-
 use super::File;
 use super::manifest::line;
+use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
 use crate::entry::{Entry, Kind};
@@ -79,7 +78,7 @@ impl Entries {
     }
 
     /// The entry that `name`, in `file`, refers to; there is a problem if there is none.
-    pub(super) fn get(&self, file: &File, name: &Spanned<String>, problems: &mut Problems) -> Option<&Entry> {
+    pub(super) fn get(&self, file: &File, name: &Placed<String>, problems: &mut Problems) -> Option<&Entry> {
         let found = self.find(name.get_ref());
         if found.is_none() && !self.incomplete && !problems.is_full() {
             let wanted = name.get_ref();
@@ -94,7 +93,7 @@ impl Entries {
     pub(super) fn get_mut(
         &mut self,
         file: &File,
-        name: &Spanned<String>,
+        name: &Placed<String>,
         problems: &mut Problems,
     ) -> Option<&mut Entry> {
         let found = self.get(file, name, problems)?.name.clone();
@@ -102,12 +101,12 @@ impl Entries {
     }
 
     /// The names that `wanted` refers to.
-    pub(super) fn names(&self, file: &File, wanted: &[Spanned<String>], problems: &mut Problems) -> Vec<String> {
+    pub(super) fn names(&self, file: &File, wanted: &[Placed<String>], problems: &mut Problems) -> Vec<String> {
         wanted.iter().filter_map(|name| Some(self.get(file, name, problems)?.name.clone())).collect()
     }
 
     /// The parameters that `wanted` refers to, by code or by whole groups: `P14`.
-    pub(super) fn parameters(&self, file: &File, wanted: &[Spanned<String>], problems: &mut Problems) -> Vec<String> {
+    pub(super) fn parameters(&self, file: &File, wanted: &[Placed<String>], problems: &mut Problems) -> Vec<String> {
         let mut found = Vec::new();
         for name in wanted {
             let group = parse_code(&format!("{}.00", name.get_ref())).map(|(group, _)| group);

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use toml::Spanned;
-
 use super::entries::Entries;
 use super::manifest::{self, Field, line};
+use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::decimals;
 use super::{File, ProfileError};
@@ -23,7 +22,7 @@ use crate::variant::{Variant, VariantChoice};
 use crate::watchdog::Watchdog;
 
 /// Checks that `low` ≤ `item` ≤ `high`.
-pub(super) fn within<T>(file: &File, item: &Spanned<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>
+pub(super) fn within<T>(file: &File, item: &Placed<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>
 where
     T: Copy + PartialOrd + std::fmt::Display,
 {
@@ -56,7 +55,7 @@ pub(super) fn serial(file: &File, serial: &manifest::Serial) -> Result<SerialDef
     })
 }
 
-pub(super) fn memory(file: &File, spanned: &Spanned<manifest::Memory>) -> Result<Memory, ProfileError> {
+pub(super) fn memory(file: &File, spanned: &Placed<manifest::Memory>) -> Result<Memory, ProfileError> {
     let row = spanned.get_ref();
     if !row.verified && row.note.is_empty() {
         return Err(
@@ -74,7 +73,7 @@ pub(super) fn memory(file: &File, spanned: &Spanned<manifest::Memory>) -> Result
 
 pub(super) fn identifications(
     file: &File,
-    rows: &[Spanned<manifest::IdentificationCode>],
+    rows: &[Placed<manifest::IdentificationCode>],
     problems: &mut Problems,
 ) -> Vec<Identification> {
     let mut known: Vec<Identification> = Vec::new();
@@ -104,8 +103,8 @@ pub(super) fn signature(
     row: &manifest::Signature,
     problems: &mut Problems,
 ) -> Option<Signature> {
-    let mut addresses = |names: &[Spanned<String>]| -> Vec<u16> {
-        let address = |name: &Spanned<String>| match parse_address(name.get_ref()) {
+    let mut addresses = |names: &[Placed<String>]| -> Vec<u16> {
+        let address = |name: &Placed<String>| match parse_address(name.get_ref()) {
             Some(address) => Some(address),
             None => entries.get(file, name, problems)?.address,
         };
@@ -118,13 +117,13 @@ pub(super) fn signature(
 pub(super) fn control(
     file: &File,
     entries: &Entries,
-    rows: &[Spanned<manifest::Control>],
+    rows: &[Placed<manifest::Control>],
     problems: &mut Problems,
 ) -> Vec<Control> {
     let mut known = Vec::new();
     for spanned in rows {
         let row = spanned.get_ref();
-        let place = Spanned::new(spanned.span(), row.code.clone());
+        let place = spanned.beside(row.code.clone());
         let Some(entry) = entries.get(file, &place, problems) else { continue };
         if !row.verified && row.note.is_empty() {
             problems.add(file, line(file, spanned), "a value that is not verified needs a \"note\" that says why");
@@ -146,13 +145,13 @@ pub(super) fn control(
 pub(super) fn watchdog(
     file: &File,
     entries: &Entries,
-    spanned: &Spanned<manifest::Watchdog>,
+    spanned: &Placed<manifest::Watchdog>,
     problems: &mut Problems,
 ) -> Option<Watchdog> {
     let row = spanned.get_ref();
     let timeout = entries.get(file, &row.timeout, problems).map(|entry| entry.name.clone());
     let action = entries.get(file, &row.action, problems)?;
-    let mut word = |value: &Option<Spanned<i64>>| {
+    let mut word = |value: &Option<Placed<i64>>| {
         let value = value.as_ref()?;
         problems.keep(check(file, line(file, value), &action.quantity, &action.name, *value.get_ref()))
     };
@@ -174,7 +173,7 @@ pub(super) fn watchdog(
 /// The exceptions of `rows` over those of `known`.
 pub(super) fn exceptions(
     file: &File,
-    rows: &[Spanned<manifest::Exception>],
+    rows: &[Placed<manifest::Exception>],
     mut known: BTreeMap<u8, Exception>,
     problems: &mut Problems,
 ) -> BTreeMap<u8, Exception> {
@@ -199,7 +198,7 @@ pub(super) fn exceptions(
 pub(super) fn variant(
     file: &File,
     entries: &Entries,
-    spanned: &Spanned<manifest::Variant>,
+    spanned: &Placed<manifest::Variant>,
     problems: &mut Problems,
 ) -> Option<Variant> {
     let row = spanned.get_ref();
@@ -246,7 +245,7 @@ fn variant_quantity(row: &manifest::VariantChoice) -> Result<Quantity, String> {
 }
 
 /// The bit fields of one word, lowest first. They must not overlap, and their names must differ.
-pub(super) fn bit_fields(file: &File, fields: &[Spanned<Field>], problems: &mut Problems) -> Vec<BitField> {
+pub(super) fn bit_fields(file: &File, fields: &[Placed<Field>], problems: &mut Problems) -> Vec<BitField> {
     let mut known: Vec<BitField> = Vec::new();
     for spanned in fields {
         let field = bit_field(spanned.get_ref()).map_err(|reason| file.broken(line(file, spanned), reason));

@@ -1,9 +1,8 @@
 //! What a profile takes over from the one below it, and how much of it may then be trusted.
 
-use toml::Spanned;
-
 use super::File;
 use super::manifest::{Extends, Manifest, line};
+use super::placed::Placed;
 use super::problems::Problems;
 use crate::evidence::Evidence;
 use crate::lookup::{closest, names};
@@ -26,7 +25,7 @@ pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems
     base
 }
 
-fn drop_rows(base: &mut Profile, file: &File, dropped: &[Spanned<String>], problems: &mut Problems) {
+fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], problems: &mut Problems) {
     for name in dropped {
         if problems.is_full() {
             return;

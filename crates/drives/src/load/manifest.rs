@@ -1,306 +1,299 @@
 //! The shape of `profile.toml`: what may stand in it, and of which type. What it refers to is `assemble`'s to check.
 
+mod motion;
+#[cfg(test)]
+mod schema;
+
 use std::collections::BTreeMap;
 
+pub(super) use motion::{Commands, Control, SetpointRole, States, Variant, VariantChoice, Watchdog};
 use serde::Deserialize;
-use toml::Spanned;
 
+use super::placed::Placed;
 use super::{File, ProfileError, line_of, shape};
-use crate::command::Command;
 use crate::memory::MemoryBit;
 use crate::rules::UnitKind;
 use crate::setpoint::Setpoint;
-use crate::state::State;
 
+/// The rules of a family of drives. The long tables stand beside it: registers.csv, parameters.csv, faults.csv.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
-    pub(super) name: Spanned<String>,
+    /// One word: lower-case letters, digits, `-` and `_`.
+    pub(super) name: Placed<String>,
+    /// The family as its maker calls it.
     pub(super) title: Option<String>,
+    /// Whether it feeds a motor.
     pub(super) kind: Option<UnitKind>,
-    pub(super) version: Option<Spanned<u32>>,
+    /// A whole number from 1, counted up with each change; backups name it.
+    pub(super) version: Option<Placed<u32>>,
+    /// The documents it was made from.
     pub(super) source: String,
-    pub(super) extends: Option<Spanned<Extends>>,
-    pub(super) overlay: Option<Spanned<Overlay>>,
+    pub(super) extends: Option<Placed<Extends>>,
+    pub(super) overlay: Option<Placed<Overlay>>,
+    /// Names and codes of the profile below that this drive does not have.
     #[serde(default)]
-    pub(super) drop: Vec<Spanned<String>>,
+    pub(super) drop: Vec<Placed<String>>,
     pub(super) serial: Option<Serial>,
     pub(super) requests: Option<Requests>,
     pub(super) parameters: Option<Parameters>,
     pub(super) identification: Option<Identification>,
     pub(super) commands: Option<Commands>,
-    pub(super) state: Option<Spanned<States>>,
+    pub(super) state: Option<Placed<States>>,
     pub(super) status: Option<Status>,
-    pub(super) control: Option<Vec<Spanned<Control>>>,
+    /// What must be set before the drive obeys the bus, in this order.
+    pub(super) control: Option<Vec<Placed<Control>>>,
+    /// What can be given over the bus beside commands.
     #[serde(default)]
+    #[cfg_attr(test, schemars(schema_with = "schema::table::<Setpoint, SetpointRole>"))]
     pub(super) setpoints: BTreeMap<Setpoint, SetpointRole>,
+    /// Parameters that decide what some registers mean.
     #[serde(default)]
-    pub(super) variants: BTreeMap<Spanned<String>, Spanned<Variant>>,
+    pub(super) variants: BTreeMap<Placed<String>, Placed<Variant>>,
     pub(super) monitor: Option<Monitor>,
-    pub(super) watchdog: Option<Spanned<Watchdog>>,
+    pub(super) watchdog: Option<Placed<Watchdog>>,
     pub(super) faults: Option<Faults>,
+    /// Exceptions that mean something else than in the Modbus specification.
     #[serde(default)]
-    pub(super) exceptions: Vec<Spanned<Exception>>,
+    pub(super) exceptions: Vec<Placed<Exception>>,
+    /// The bits of a register, or of a parameter by its code.
     #[serde(default)]
-    pub(super) bits: BTreeMap<Spanned<String>, Vec<Spanned<Field>>>,
+    pub(super) bits: BTreeMap<Placed<String>, Vec<Placed<Field>>>,
 }
 
 /// A sister family, of which all is taken over that is not stated.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Extends {
-    pub(super) profile: Spanned<String>,
-    pub(super) assumption: Spanned<String>,
+    /// A shipped name, or a folder relative to this one.
+    pub(super) profile: Placed<String>,
+    /// Why that family may be taken for this one.
+    pub(super) assumption: Placed<String>,
+    /// What of it this family's own documents print too: names, codes, or tables such as `commands`.
     #[serde(default)]
-    pub(super) confirmed: Vec<Spanned<String>>,
+    pub(super) confirmed: Vec<Placed<String>>,
+    /// The documents that do.
     #[serde(default)]
     pub(super) confirmed_source: String,
 }
 
 /// A profile to which something is added.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Overlay {
-    pub(super) profile: Spanned<String>,
+    /// A shipped name, or a folder relative to this one.
+    pub(super) profile: Placed<String>,
 }
 
+/// The line as it leaves the factory.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Serial {
-    pub(super) baud_rate: Spanned<u32>,
-    pub(super) format: Spanned<String>,
-    pub(super) unit: Option<Spanned<u8>>,
+    /// Bits a second.
+    pub(super) baud_rate: Placed<u32>,
+    /// Data bits, parity, stop bits: `8E1`.
+    pub(super) format: Placed<String>,
+    /// The address, 1 to 247.
+    pub(super) unit: Option<Placed<u8>>,
+    /// How long the drive waits before it answers, in milliseconds.
     #[serde(default)]
     pub(super) response_delay_ms: u16,
+    /// Whether a document of this very family prints it.
     pub(super) verified: bool,
+    /// Where it is printed: document and page.
     pub(super) source: String,
 }
 
+/// What the drive takes as a request.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Requests {
+    /// The function codes that it takes: `[0x03, 0x06]`.
     pub(super) functions: Vec<u8>,
-    pub(super) max_words: Spanned<u16>,
+    /// Most words in one request, 1 to 125.
+    pub(super) max_words: Placed<u16>,
+    /// Whether a read may run from one parameter group into the next.
     #[serde(default = "yes")]
     pub(super) across_groups: bool,
+    /// Whether a document of this very family prints it.
     #[serde(default = "yes")]
     pub(super) verified: bool,
+    /// What to know about it; where it is not verified, why.
     #[serde(default)]
     pub(super) note: String,
+    /// Where it is printed: document and page.
     pub(super) source: String,
 }
 
 /// How the code of a parameter becomes an address.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 enum AddressRule {
     /// The group is the high byte, the index the low byte: P05.06 is 0506H.
     #[serde(rename = "group.index")]
     GroupIndex,
 }
 
+/// How the code of a parameter becomes an address, and which of them are special.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Parameters {
     /// There is one rule so far; a family that needs another says so by its name.
     #[serde(rename = "address")]
     _address: AddressRule,
-    pub(super) memory: Option<Spanned<Memory>>,
+    pub(super) memory: Option<Placed<Memory>>,
+    /// Groups that nobody may touch.
     pub(super) closed_groups: Option<Vec<u8>>,
-    pub(super) acts: Option<Vec<Spanned<String>>>,
-    pub(super) serial: Option<Vec<Spanned<String>>>,
-    pub(super) motor: Option<Vec<Spanned<String>>>,
-    pub(super) last: Option<Vec<Spanned<String>>>,
+    /// Codes whose write does something, such as tuning the motor.
+    pub(super) acts: Option<Vec<Placed<String>>>,
+    /// Codes or groups (`P14`) that set the line: a restore leaves them alone unless asked.
+    pub(super) serial: Option<Vec<Placed<String>>>,
+    /// Codes or groups (`P02`) that describe the motor: a restore leaves them alone unless asked.
+    pub(super) motor: Option<Vec<Placed<String>>>,
+    /// What a restore writes last, in this order.
+    pub(super) last: Option<Vec<Placed<String>>>,
+    /// Where it is printed: document and page.
     #[serde(rename = "source")]
     _source: String,
 }
 
+/// How the family says where a written parameter is kept. Without it every write may wear EEPROM.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Memory {
-    pub(super) bit: Spanned<u8>,
+    /// The bit of the address, 8 to 15.
+    pub(super) bit: Placed<u8>,
+    /// What it means when it is set.
     pub(super) means: MemoryBit,
+    /// Whether a document of this very family prints it.
     pub(super) verified: bool,
+    /// What to know about it; where it is not verified, why.
     #[serde(default)]
     pub(super) note: String,
+    /// Where it is printed: document and page.
     pub(super) source: String,
 }
 
+/// What the drive says it is.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Identification {
-    pub(super) register: Option<Spanned<String>>,
+    /// Where it says so.
+    pub(super) register: Option<Placed<String>>,
+    /// What its words mean.
     #[serde(default)]
-    pub(super) codes: Vec<Spanned<IdentificationCode>>,
+    pub(super) codes: Vec<Placed<IdentificationCode>>,
     pub(super) signature: Option<Signature>,
 }
 
+/// One code, and who says it.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct IdentificationCode {
+    /// The word.
     pub(super) code: u16,
+    /// The name of that family's profile, whether or not there is one.
     pub(super) family: String,
+    /// The family as its maker calls it.
     pub(super) title: String,
+    /// What else says the same.
     #[serde(default)]
     pub(super) shared: Vec<String>,
+    /// Whether a document of this very family prints it.
     pub(super) verified: bool,
+    /// What to know about it; where it is not verified, why.
     #[serde(default)]
     pub(super) note: String,
+    /// Where it is printed: document and page.
     pub(super) source: String,
 }
 
+/// How a unit that does not say what it is can be told.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Signature {
-    pub(super) answers: Vec<Spanned<String>>,
+    /// Names or addresses that it answers, read one word each.
+    pub(super) answers: Vec<Placed<String>>,
+    /// Names or addresses that it refuses.
     #[serde(default)]
-    pub(super) refuses: Vec<Spanned<String>>,
+    pub(super) refuses: Vec<Placed<String>>,
 }
 
+/// Registers with a role.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Commands {
-    pub(super) register: Spanned<String>,
-    pub(super) moves: Vec<Spanned<String>>,
-    #[serde(default)]
-    pub(super) codes: BTreeMap<Command, Spanned<u16>>,
-    pub(super) assumed: Option<AssumedCommands>,
-    /// TOML keys are text; `assemble` reads them as numbers.
-    #[serde(default)]
-    pub(super) other: BTreeMap<Spanned<String>, String>,
-    #[serde(rename = "source")]
-    _source: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AssumedCommands {
-    pub(super) reason: Spanned<String>,
-    pub(super) codes: BTreeMap<Command, Spanned<u16>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct States {
-    pub(super) register: Spanned<String>,
-    #[serde(default)]
-    pub(super) codes: BTreeMap<State, Spanned<u16>>,
-    #[serde(default)]
-    pub(super) when: Vec<Spanned<When>>,
-    #[serde(default = "yes")]
-    pub(super) verified: bool,
-    #[serde(default)]
-    pub(super) note: String,
-    pub(super) source: String,
-}
-
-/// A state that is told by bit fields.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct When {
-    #[serde(rename = "is")]
-    pub(super) state: State,
-    pub(super) fields: BTreeMap<String, u16>,
-}
-
-#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Status {
+    /// Registers whose bits tell `ready`, `motor`, `overload_alarm` or `control_channel`.
     #[serde(default)]
-    pub(super) words: Vec<Spanned<String>>,
-    pub(super) fault: Option<Spanned<String>>,
-    pub(super) frequency: Option<Spanned<String>>,
-    pub(super) setpoint: Option<Spanned<String>>,
+    pub(super) words: Vec<Placed<String>>,
+    /// The present fault.
+    pub(super) fault: Option<Placed<String>>,
+    /// The frequency at the output.
+    pub(super) frequency: Option<Placed<String>>,
+    /// The frequency setpoint in force.
+    pub(super) setpoint: Option<Placed<String>>,
 }
 
+/// What `monitor` shows when it is not told what.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Control {
-    pub(super) code: String,
-    pub(super) value: i64,
-    pub(super) label: String,
-    pub(super) verified: bool,
-    #[serde(default)]
-    pub(super) note: String,
-    pub(super) source: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SetpointRole {
-    pub(super) register: Spanned<String>,
-    #[serde(default)]
-    pub(super) needs: Vec<Spanned<Control>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Variant {
-    pub(super) parameter: Spanned<String>,
-    pub(super) choices: BTreeMap<String, Spanned<VariantChoice>>,
-    pub(super) verified: bool,
-    #[serde(default)]
-    pub(super) note: String,
-    pub(super) source: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct VariantChoice {
-    pub(super) value: u16,
-    #[serde(default)]
-    pub(super) unit: String,
-    pub(super) scale: u32,
-    #[serde(default)]
-    pub(super) signed: bool,
-    pub(super) low: Option<f64>,
-    pub(super) high: Option<f64>,
-}
-
-#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Monitor {
-    pub(super) registers: Vec<Spanned<String>>,
+    /// Names of registers.
+    pub(super) registers: Vec<Placed<String>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Watchdog {
-    pub(super) timeout: Spanned<String>,
-    pub(super) action: Spanned<String>,
-    pub(super) coast: Option<Spanned<i64>>,
-    pub(super) stop: Option<Spanned<i64>>,
-    pub(super) verified: bool,
-    #[serde(default)]
-    pub(super) note: String,
-    pub(super) source: String,
-}
-
+/// Where the drive keeps what happened.
 #[derive(Default, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Faults {
+    /// Parameters that hold the last faults, the latest first.
     #[serde(default)]
-    pub(super) history: Vec<Spanned<String>>,
+    pub(super) history: Vec<Placed<String>>,
+    /// What the drive measured at the last one.
     #[serde(default)]
-    pub(super) values: Vec<Spanned<String>>,
+    pub(super) values: Vec<Placed<String>>,
 }
 
+/// An exception of this family.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Exception {
+    /// Its code.
     pub(super) code: u8,
+    /// One word.
     pub(super) name: String,
+    /// What it means.
     pub(super) meaning: String,
+    /// Where it is printed: document and page.
     pub(super) source: String,
 }
 
+/// Some bits of a word.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Field {
+    /// One word.
     pub(super) name: String,
     /// The highest and the lowest bit.
     pub(super) bits: [u8; 2],
-    /// TOML keys are text; `assemble` reads them as numbers.
+    /// What they mean, by their value; without it a bit is off or on.
     pub(super) values: Option<BTreeMap<String, String>>,
+    /// Whether it is known well enough to be set without `unverified=True`.
     #[serde(default = "yes")]
     pub(super) verified: bool,
 }
@@ -318,7 +311,7 @@ pub(super) fn read(file: &File) -> Result<Manifest, Vec<ProfileError>> {
 }
 
 /// The line of `item` in `file`.
-pub(super) fn line<T>(file: &File, item: &Spanned<T>) -> u64 {
+pub(super) fn line<T>(file: &File, item: &Placed<T>) -> u64 {
     line_at(file, item.span().start)
 }
 

@@ -1,11 +1,10 @@
 //! What `profile.toml` says of commands and states: the words that move a motor, and those that tell what it does.
 
-use toml::Spanned;
-
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
 use super::manifest::{Manifest, States, line};
+use super::placed::Placed;
 use super::problems::Problems;
 use crate::command::{Command, CommandCode};
 use crate::lookup::{closest, names};
@@ -25,7 +24,7 @@ pub(super) fn commands(
     profile.commands.clear();
     profile.other_commands.clear();
     profile.commands_note.clear();
-    let mut all: Vec<(Command, &Spanned<u16>, bool)> = Vec::new();
+    let mut all: Vec<(Command, &Placed<u16>, bool)> = Vec::new();
     all.extend(table.codes.iter().map(|(&command, code)| (command, code, true)));
     if let Some(assumed) = &table.assumed {
         all.extend(assumed.codes.iter().map(|(&command, code)| (command, code, false)));

@@ -1,11 +1,10 @@
 //! What is right in its form and cannot be meant: a setpoint that can only be read, a state that every word shows.
 
-use toml::Spanned;
-
 use super::File;
 use super::entries::Entries;
 use super::manifest::{Manifest, line};
 use super::motion::for_rectifiers;
+use super::placed::Placed;
 use super::problems::Problems;
 use crate::entry::Access;
 use crate::profile::Profile;
@@ -17,7 +16,7 @@ pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problem
     itself(file, manifest, problems);
     motion(file, manifest, entries, problems);
     let no = |access: Access| {
-        move |name: &&Spanned<String>| entries.find(name.get_ref()).is_some_and(|row| row.access == access)
+        move |name: &&Placed<String>| entries.find(name.get_ref()).is_some_and(|row| row.access == access)
     };
     for name in read(manifest).into_iter().filter(no(Access::Wo)) {
         let reason = format!("\"{}\" can only be written, and would have to be read here", name.get_ref());
@@ -85,7 +84,7 @@ fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
 fn motion(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
     if let Some(commands) = &manifest.commands {
         let register = entries.find(commands.register.get_ref());
-        let is_it = |name: &Spanned<String>| entries.find(name.get_ref()) == register;
+        let is_it = |name: &Placed<String>| entries.find(name.get_ref()) == register;
         if register.is_some() && !commands.moves.iter().any(is_it) {
             let register = commands.register.get_ref();
             let reason = format!("\"moves\" must hold \"{register}\": what is written there can start a motor");
@@ -101,7 +100,7 @@ fn motion(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Pr
 }
 
 /// The registers that have to be read.
-fn read(manifest: &Manifest) -> Vec<&Spanned<String>> {
+fn read(manifest: &Manifest) -> Vec<&Placed<String>> {
     let status = manifest
         .status
         .iter()

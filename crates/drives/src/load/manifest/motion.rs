@@ -1,0 +1,173 @@
+//! The shape of the tables that say how the motor is moved: commands, states, what must be set before, setpoints, and what
+//! happens when the bus falls silent.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::{Placed, yes};
+use crate::command::Command;
+use crate::state::State;
+
+/// What makes the motor move.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Commands {
+    /// Where commands are written.
+    pub(in crate::load) register: Placed<String>,
+    /// Every register whose write can start a motor, that one among them.
+    pub(in crate::load) moves: Vec<Placed<String>>,
+    /// The words.
+    #[serde(default)]
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, u16>"))]
+    pub(in crate::load) codes: BTreeMap<Command, Placed<u16>>,
+    pub(in crate::load) assumed: Option<AssumedCommands>,
+    /// Words that mean something else: `"9" = "immediate stop"`.
+    #[serde(default)]
+    pub(in crate::load) other: BTreeMap<Placed<String>, String>,
+    /// Where it is printed: document and page.
+    #[serde(rename = "source")]
+    _source: String,
+}
+
+/// Commands that no document of the family prints.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct AssumedCommands {
+    /// Why they are thought to be right.
+    pub(in crate::load) reason: Placed<String>,
+    /// The words.
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, u16>"))]
+    pub(in crate::load) codes: BTreeMap<Command, Placed<u16>>,
+}
+
+/// What the motor does: by a number, or by bits.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct States {
+    /// Where it stands.
+    pub(in crate::load) register: Placed<String>,
+    /// The words.
+    #[serde(default)]
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<State, u16>"))]
+    pub(in crate::load) codes: BTreeMap<State, Placed<u16>>,
+    /// By bits: the first that fits.
+    #[serde(default)]
+    pub(in crate::load) when: Vec<Placed<When>>,
+    /// Whether a document of this very family prints it.
+    #[serde(default = "yes")]
+    pub(in crate::load) verified: bool,
+    /// What to know about it; where it is not verified, why.
+    #[serde(default)]
+    pub(in crate::load) note: String,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
+
+/// A state that is told by bit fields.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct When {
+    /// The state.
+    #[serde(rename = "is")]
+    pub(in crate::load) state: State,
+    /// Names of bits, and what they hold then.
+    pub(in crate::load) fields: BTreeMap<String, u16>,
+}
+
+/// A parameter, and what it must be.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Control {
+    /// Its code.
+    pub(in crate::load) code: String,
+    /// The value, in counts.
+    pub(in crate::load) value: i64,
+    /// What that means.
+    pub(in crate::load) label: String,
+    /// Whether a document of this very family prints it.
+    pub(in crate::load) verified: bool,
+    /// What to know about it; where it is not verified, why.
+    #[serde(default)]
+    pub(in crate::load) note: String,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
+
+/// One setpoint.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct SetpointRole {
+    /// Where it is written.
+    pub(in crate::load) register: Placed<String>,
+    /// What must be set before the drive follows it.
+    #[serde(default)]
+    pub(in crate::load) needs: Vec<Placed<Control>>,
+}
+
+/// A parameter that decides what some registers mean.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Variant {
+    /// The parameter that decides.
+    pub(in crate::load) parameter: Placed<String>,
+    /// By name, such as `Hz`.
+    pub(in crate::load) choices: BTreeMap<String, Placed<VariantChoice>>,
+    /// Whether a document of this very family prints it.
+    pub(in crate::load) verified: bool,
+    /// What to know about it; where it is not verified, why.
+    #[serde(default)]
+    pub(in crate::load) note: String,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
+
+/// What a register means with this choice.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct VariantChoice {
+    /// What the parameter is then, in counts.
+    pub(in crate::load) value: u16,
+    /// The unit; empty for a plain number.
+    #[serde(default)]
+    pub(in crate::load) unit: String,
+    /// Counts in one unit.
+    pub(in crate::load) scale: u32,
+    /// Whether the word is two's complement.
+    #[serde(default)]
+    pub(in crate::load) signed: bool,
+    /// The lowest value, in the unit.
+    pub(in crate::load) low: Option<f64>,
+    /// The highest value, in the unit.
+    pub(in crate::load) high: Option<f64>,
+}
+
+/// What makes the drive act by itself when the bus falls silent.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Watchdog {
+    /// The parameter with the time.
+    pub(in crate::load) timeout: Placed<String>,
+    /// The parameter with what it does then.
+    pub(in crate::load) action: Placed<String>,
+    /// What the action must be so that it coasts, in counts.
+    pub(in crate::load) coast: Option<Placed<i64>>,
+    /// What the action must be so that it stops, in counts.
+    pub(in crate::load) stop: Option<Placed<i64>>,
+    /// Whether a document of this very family prints it.
+    pub(in crate::load) verified: bool,
+    /// What to know about it; where it is not verified, why.
+    #[serde(default)]
+    pub(in crate::load) note: String,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
