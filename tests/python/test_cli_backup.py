@@ -187,6 +187,23 @@ def test_who_cannot_ask_for_the_state_is_told_to_look(tmp_path: Path) -> None:
     assert (result.exit_code, "cannot be asked of this family: look" in result.stderr) == (0, True)
 
 
+def test_a_second_write_of_one_parameter_is_asked_for(tmp_path: Path) -> None:
+    """A GD300 beyond its own limits: that it has a write to RAM alone is only assumed."""
+    file = tmp_path / "gd300.toml"
+    with drivebus.Simulator({1: "gd300"}, transport="tcp" if os.name == "nt" else "pty", baudrate=BAUD) as simulator:
+        assert run(simulator, "--profile", "gd300", "backup", file, "--force").exit_code == 0
+        text = file.read_text().replace('value = 50.00, unit = "Hz", raw = 5000', "value = 60.00")
+        file.write_text(text.replace("P00.03 = { value = 60.00", "P00.03 = { value = 70.00"))
+        with drivebus.Bus(simulator) as bus:
+            for address, word in ((0x8003, 9000), (0x0004, 8000)):
+                bus.write(1, address, word)
+        simulator.drive(1).power_cycle()
+        refused = run(simulator, "--profile", "gd300", "restore", file, "--yes", "--group", "P00")
+        assert (refused.exit_code, "`--twice`" in refused.stdout.replace("\n", " ")) == (1, True)
+        assert run(simulator, "--profile", "gd300", "restore", file, "--yes", "--twice").exit_code == 0
+        assert run(simulator, "--profile", "gd300", "diff", file).exit_code == 0
+
+
 def test_what_another_family_lacks_is_named(simulator: drivebus.Simulator, tmp_path: Path) -> None:
     """P30.02 is a VFD500's; no parameter of a GD350 has that code."""
     file = tmp_path / "vfd500.toml"

@@ -67,6 +67,7 @@ class Keeping(Parameters):
         serial: bool = False,
         motor: bool = False,
         force: bool = False,
+        twice: bool = False,
         unverified: bool = False,
         progress: Progress | None = None,
     ) -> Restoration:
@@ -75,7 +76,7 @@ class Keeping(Parameters):
         Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
         settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
         something when it is written; the report says so of each. Cut off at any moment, the same call goes on where it
-        was: the memory of no parameter is written twice.
+        was: the memory of no parameter is written twice, unless *twice*.
 
         Args:
             backup: A backup, or its file.
@@ -85,6 +86,8 @@ class Keeping(Parameters):
             motor: Also the data of the motor.
             force: Also to a drive of another identification or firmware, or of another family: then what has the same
                 code there gets the same value.
+            twice: Where a drive stands beyond its own limits and only another value on the way leads to the wanted one,
+                write that to its memory too, if it cannot be written to RAM alone.
             unverified: Also what this family is only assumed to have.
             progress: Is called with how many parameters are done, and how many are to be written.
 
@@ -97,9 +100,9 @@ class Keeping(Parameters):
         A refusal of one parameter ends nothing: it stands in the report.
         """
         dry_run, force = checks.flag("dry_run", dry_run), checks.flag("force", force)
-        serial, motor = checks.flag("serial", serial), checks.flag("motor", motor)
+        serial, motor, twice = checks.flag("serial", serial), checks.flag("motor", motor), checks.flag("twice", twice)
         kept = self._kept(backup, force)
-        work = Restore(self.trusting(unverified), kept, dry_run=dry_run, progress=progress)
+        work = Restore(self.trusting(unverified), kept, dry_run=dry_run, twice=twice, progress=progress)
         return await work.run(groups=groups, serial=serial, motor=motor, force=force)
 
     async def diff(

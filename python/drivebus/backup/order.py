@@ -1,24 +1,16 @@
 """In which order parameters are written, so that a drive accepts each at the moment at which it comes.
 
-A parameter that bounds another moves first where the other is to follow it, and second where it would overtake it.
-Where neither may move, one of them takes an intermediate step. Pure arithmetic: nothing here asks a drive.
+A parameter that bounds another moves first where the other is to follow it, and second where it would overtake it:
+between two sound states each is written once. Pure arithmetic: nothing here asks a drive.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from drivebus.backup.detour import Step, detour, hindrance, reached
 
 __all__ = ["Order", "Step"]
-
-
-class Step(NamedTuple):
-    """One write: *value* in engineering units, on the way only if not *final*."""
-
-    code: str
-    value: float
-    final: bool
 
 
 class Order:
@@ -29,6 +21,7 @@ class Order:
         wanted: What it shall have.
         pairs: Parameters of which the first is never above the second.
         last: What is written after all else, in this order, as far as bounds allow.
+        may_pass: Whether a parameter may have a value on the way, where no order of single writes leads to the end.
     """
 
     def __init__(
@@ -37,6 +30,7 @@ class Order:
         wanted: Mapping[str, float],
         pairs: Iterable[tuple[str, str]],
         last: Sequence[str] = (),
+        may_pass: Callable[[str, float], bool] = lambda _code, _value: False,
     ) -> None:
         self._now = dict(now)
         self._wanted = dict(wanted)
@@ -45,17 +39,27 @@ class Order:
         place = {code: index for index, code in enumerate(last)}
         self._every = sorted(wanted, key=lambda code: (place.get(code, -1), code not in bounding))
         self._rest = list(self._every)
-        self._stepped: set[str] = set()
+        self._may_pass = may_pass
+        self._way: list[Step] = []
+        self._passed: set[str] = set()
 
     def next(self) -> Step | None:
         """What to write now; None if nothing is left that the drive would accept."""
-        for code in self._rest:
-            if self.hindrance(code, self._wanted[code]) is None:
-                return Step(code, self._wanted[code], True)
-        for code in self._rest:
-            value = self._between(code)
-            if code not in self._stepped and value != self._now[code] and self._helps(code, value):
-                return Step(code, value, False)
+        step = self._on_the_way() or self._plain()
+        if step is None:
+            self._way = self._detour(lambda code, value: code not in self._passed and self._may_pass(code, value))
+            step = self._on_the_way()
+        return step
+
+    def _plain(self) -> Step | None:
+        takes = (code for code in self._rest if self.hindrance(code, self._wanted[code]) is None)
+        return next((Step(code, self._wanted[code], True) for code in takes), None)
+
+    def _on_the_way(self) -> Step | None:
+        while self._way:
+            step = self._way.pop(0)
+            if step.code in self._rest and self.hindrance(step.code, step.value) is None:
+                return step
         return None
 
     def wrote(self, step: Step, value: float) -> None:
@@ -64,7 +68,12 @@ class Order:
         if step.final:
             self.leave(step.code)
         else:
-            self._stepped.add(step.code)
+            self._passed.add(step.code)
+
+    def cannot(self, step: Step) -> None:
+        """The drive would not take *step*, which was one on the way."""
+        self._passed.add(step.code)
+        self._way.clear()
 
     def leave(self, code: str) -> None:
         """*code* is not written any more."""
@@ -76,10 +85,6 @@ class Order:
         back = {*self._rest, *codes}
         self._rest = [code for code in self._every if code in back]
 
-    def cannot(self, step: Step) -> None:
-        """The drive cannot have the value of *step*, which was one on the way."""
-        self._stepped.add(step.code)
-
     @property
     def rest(self) -> list[str]:
         """What is still to be written."""
@@ -87,23 +92,16 @@ class Order:
 
     def hindrance(self, code: str, value: float) -> str | None:
         """The parameter that does not let *code* be *value* now; None if nothing hinders."""
-        return self._hindrance(self._now, code, value)
+        return hindrance(self._now, self._pairs, code, value)
 
-    def _hindrance(self, now: Mapping[str, float], code: str, value: float) -> str | None:
-        for low, high in self._pairs:
-            if (code == high and value < now[low]) or (code == low and value > now[high]):
-                return low if code == high else high
-        return None
+    def passing(self, may_pass: Callable[[str, float], bool]) -> dict[str, list[str]]:
+        """What of the rest could be written after steps on the way, each with the codes of these steps."""
+        way = self._detour(may_pass)
+        by = [step.code for step in way if not step.final]
+        return dict.fromkeys(reached(self._now, self._left(), self._pairs, way), by)
 
-    def _between(self, code: str) -> float:
-        """The value nearest to the wanted one that the drive would accept now; the present one where there is none."""
-        lowest = max((self._now[low] for low, high in self._pairs if high == code), default=-math.inf)
-        highest = min((self._now[high] for low, high in self._pairs if low == code), default=math.inf)
-        nearest = min(max(self._wanted[code], lowest), highest)
-        return nearest if self.hindrance(code, nearest) is None else self._now[code]
+    def _detour(self, may: Callable[[str, float], bool]) -> list[Step]:
+        return detour(self._now, self._left(), self._pairs, may)
 
-    def _helps(self, code: str, value: float) -> bool:
-        """Whether something else could be written for good once *code* is *value*: no step is taken for nothing."""
-        then = {**self._now, code: value}
-        others = (other for other in self._rest if other != code)
-        return any(self._hindrance(then, other, self._wanted[other]) is None for other in others)
+    def _left(self) -> dict[str, float]:
+        return {code: self._wanted[code] for code in self._rest}

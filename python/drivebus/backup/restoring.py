@@ -29,12 +29,15 @@ __all__ = ["Restore"]
 class Restore:
     """One restore of one drive."""
 
-    def __init__(self, drive: Keeping, backup: Backup, *, dry_run: bool, progress: Progress | None) -> None:
+    def __init__(
+        self, drive: Keeping, backup: Backup, *, dry_run: bool, twice: bool, progress: Progress | None
+    ) -> None:
         self._drive = drive
         self._profile = drive.profile
         self._backup = backup
         self._rules = Rules(drive.profile)
         self._dry_run = dry_run
+        self._twice = twice
         self._progress = progress
         self._pending = self._done = 0
         self._had: dict[str, int] = {}
@@ -130,6 +133,7 @@ class Restore:
             {code: float(self._backup[code]) for code in pending},
             pairs,
             self._rules.last(),
+            self._may_pass,
         )
         written = -1
         while written != len(self._order):
@@ -140,28 +144,58 @@ class Restore:
                 await self._take(step, order)
             if not self._refused:
                 break
+        self._say_what_hindered(order)
+
+    def _say_what_hindered(self, order: Order) -> None:
+        passing = order.passing(self._would_pass)
         for code in order.rest:
             by = order.hindrance(code, float(self._backup[code]))
             limit = "another parameter" if by is None else f"{by}, which the drive has at {self._shown(by)}"
-            self._results[code] = ("blocked", f"it would be beyond {limit}")
+            self._results[code] = ("blocked", f"it would be beyond {limit}{_by_way_of(passing.get(code, ()))}")
+        for code, (result, reason) in self._results.items():
+            if result in ("refused", "blocked") and self._has[code] != self._had[code]:
+                self._results[code] = (result, f"{reason}; on the way there it was given {self._shown(code)}")
 
     async def _take(self, step: Step, order: Order) -> None:
         """Does one step, and says to *order* what came of it."""
+        code = step.code
+        raw = self._backup.raw[code] if step.final else self._profile.encode(code, step.value)
         try:
-            raw = self._backup.raw[step.code] if step.final else self._profile.encode(step.code, step.value)
-        except NotAllowed:
-            order.cannot(step)
-            return
-        try:
-            shown = await self._write(step.code, raw, store=step.final)
+            shown = await self._write(code, raw, store=step.final or not self._keeps_in_ram(code), final=step.final)
         except Refused:
-            self._refused.append(step.code)
-            order.leave(step.code)
+            if step.final:
+                self._refused.append(code)
+                order.leave(code)
+            else:
+                order.cannot(step)
             return
         except (*LINE_ERRORS, NotAllowed) as error:
             _note(error, [code for code, (result, _) in self._results.items() if result == "restored"])
             raise
-        order.wrote(step, float(self._profile.decode(step.code, shown)))
+        order.wrote(step, float(self._profile.decode(code, shown)))
+
+    def _may_pass(self, code: str, value: float) -> bool:
+        """Whether *code* may have *value* on the way to its own."""
+        return self._fits(code, value) and (self._twice or self._keeps_in_ram(code))
+
+    def _would_pass(self, code: str, value: float) -> bool:
+        """Whether it may not only because that would be one more write to its memory."""
+        return self._fits(code, value) and not self._twice and not self._keeps_in_ram(code)
+
+    def _fits(self, code: str, value: float) -> bool:
+        try:
+            self._profile.encode(code, value)
+        except NotAllowed:
+            return False
+        return True
+
+    def _keeps_in_ram(self, code: str) -> bool:
+        """Whether a way is known to write *code* without wearing its memory."""
+        try:
+            place(self._drive, code, store=False)
+        except NotAllowed:
+            return False
+        return True
 
     async def _change_line(self, codes: Sequence[str]) -> None:
         """Writes settings of the serial line, after all else and the address last: the drive may obey them at once."""
@@ -171,7 +205,7 @@ class Restore:
                 self._results[code] = ("blocked", f"the drive is not heard any more since {gone} was written")
                 continue
             try:
-                await self._write(code, self._backup.raw[code], store=True)
+                await self._write(code, self._backup.raw[code])
             except Refused:
                 continue
             except LINE_ERRORS as error:
@@ -183,7 +217,7 @@ class Restore:
                     "it was written, and the drive was not heard since: it may obey its new line already",
                 )
 
-    async def _write(self, code: str, raw: int, *, store: bool) -> int:
+    async def _write(self, code: str, raw: int, *, store: bool = True, final: bool = True) -> int:
         """Writes one parameter, or says that it would, and notes what came of it."""
         if self._dry_run:
             shown = raw
@@ -191,11 +225,12 @@ class Restore:
             try:
                 shown = await write(self._drive, code, raw, self._has[code], store=store)
             except Refused as error:
-                self._results[code] = ("refused", _meaning(error))
+                if final:
+                    self._results[code] = ("refused", _meaning(error))
                 raise
             self._has[code] = shown
         self._order.append(code)
-        if store:
+        if final:
             result = "planned" if self._dry_run else "restored"
             self._results[code] = (result, "") if shown == raw else ("differs", "the drive shows another value")
             self._done += 1
@@ -228,6 +263,15 @@ class Restore:
 
 def _meaning(error: Refused) -> str:
     return f"exception {error.code:02X}H, {error.name}: {error.meaning}" if error.meaning else str(error)
+
+
+def _by_way_of(codes: Sequence[str]) -> str:
+    if not codes:
+        return ""
+    return (
+        f"; what the drive has is beyond its own limits, and only another value of {' and '.join(codes)} leads there, "
+        "on the way. Its family has no known write to RAM alone: with twice=True (`--twice`) memory is written twice"
+    )
 
 
 def _note(error: DrivebusError, restored: Sequence[str]) -> None:

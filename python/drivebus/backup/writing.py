@@ -44,25 +44,18 @@ async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool
 
 
 def place(drive: Keeping, code: str, *, store: bool) -> int:
-    """Where *code* is written for good, or for a while; for good as well where no way for a while is known.
+    """Where *code* is written for good, or to RAM alone.
 
     Raises:
-        NotAllowed: How the family keeps a parameter for good is not verified.
+        NotAllowed: How the family does that is not known, or not verified.
     """
     profile = drive.profile
     memory = profile.memory()
-    sure = memory is None or memory["reason"] is None or drive.unverified
-    try:
-        address = profile.address(code, store=store)
-    except NotAllowed:
-        if store:
-            raise
-        return place(drive, code, store=True)
-    if sure or address == profile.describe(code).address:
+    address = profile.address(code, store=store)
+    plain = store and address == profile.describe(code).address
+    if memory is None or memory["reason"] is None or drive.unverified or plain:
         return address
-    if not store:
-        return place(drive, code, store=True)
-    raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason'] if memory else ''}")
+    raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")
 
 
 async def _look(drive: Keeping, code: str) -> int:

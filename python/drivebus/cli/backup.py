@@ -63,6 +63,7 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
 @click.option("--serial", is_flag=True, help="Also the serial settings. The drive may not be heard afterwards.")
 @click.option("--motor", is_flag=True, help="Also the data of the motor.")
 @click.option("--force", is_flag=True, help="Also to another family, identification or firmware.")
+@click.option("--twice", is_flag=True, help="Write a parameter to its memory twice where nothing else leads there.")
 @click.option("--dry-run", is_flag=True, help="Only show what would be written.")
 @yes_option
 @pass_session
@@ -73,6 +74,7 @@ def restore(
     serial: bool,
     motor: bool,
     force: bool,
+    twice: bool,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -87,6 +89,7 @@ def restore(
         "serial": serial,
         "motor": motor,
         "force": force,
+        "twice": twice,
     }
     with session.drive() as drive:
         plan = drive.restore(kept, dry_run=True, **options)
