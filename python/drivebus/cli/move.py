@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import click
 
 import drivebus
 from drivebus.cli import names
+from drivebus.cli.output import printable
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
 
 __all__ = ["COMMANDS"]
@@ -130,21 +132,39 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
             session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
         parameters = [name for name in wanted if drive.describe(name).kind == "parameter"] if store else []
         before = {name: drive.read(name) for name in parameters}
-        kept: list[str] = []
         if wanted:
             drive.write(wanted, store=store)
-        rows = []
-        for name, value in wanted.items():
-            known = drive.describe(name)
-            now = value if known.access == "wo" else drive.read(name)
-            rows.append([known.code or known.name, now, known.unit, known.label])
-            if name in before and before[name] == now:
-                kept.append(known.code or known.name)
         for place, word in words.items():
             drive.write_words(place, word, force=True)
-            rows.append([f"{place:04X}H", word, "", "unknown register, not read back"])
+        now = _read_back(drive, wanted)
+        kept: list[str] = []
+        rows: list[list[Any]] = []
+        for name in wanted:
+            known = drive.describe(name)
+            rows.append([known.code or known.name, now.get(name), known.unit, known.label])
+            if name in before and before[name] == now.get(name):
+                kept.append(known.code or known.name)
+        rows += [[f"{place:04X}H", word, "", "unknown register, not read back"] for place, word in words.items()]
         _say_kept(kept)
         session.out.rows(["name", "value", "unit", "label"], rows)
+
+
+def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, Any]:
+    """What is there now, of what was *written* and can be read; says so where it cannot be read any more.
+
+    That is no error of the writing: a password locks the drive from the moment it is set, a cable may be pulled.
+    """
+    described = {name: drive.describe(name) for name in written}
+    now = {name: value for name, value in written.items() if described[name].access == "wo"}
+    missing = [name for name in written if name not in now]
+    try:
+        while missing:
+            now[missing[0]] = drive.read(missing[0])
+            del missing[0]
+    except drivebus.DrivebusError as error:
+        lost = ", ".join(described[name].code or name for name in missing)
+        _say_lost(f"{lost}: written, and what is there now could not be read: {error}")
+    return now
 
 
 def _word(drive: drivebus.Drive, place: int, value: float | str, force: bool) -> int:
@@ -168,20 +188,24 @@ def _say_kept(names: list[str]) -> None:
         )
 
 
+def _say_lost(text: str) -> None:
+    """Says that something was done, and that the drive does not tell what came of it."""
+    click.echo(printable(text), err=True)
+
+
 def _done(session: Session, drive: drivebus.Drive, command: str) -> None:
-    status = drive.status()
+    """Says what the drive does now. What it does not tell is no error of *command*, which was confirmed."""
+    status: drivebus.Status | None = None
+    try:
+        status = drive.status()
+    except drivebus.DrivebusError as error:
+        _say_lost(f"unit {drive.unit}: {command} was done, and what it does now could not be read: {error}")
     if session.out.as_json:
+        told = ("state", "frequency", "setpoint", "fault")
         session.out.record(
-            {
-                "command": command,
-                "unit": drive.unit,
-                "state": status.state,
-                "frequency": status.frequency,
-                "setpoint": status.setpoint,
-                "fault": status.fault,
-            }
+            {"command": command, "unit": drive.unit, **{name: getattr(status, name, None) for name in told}}
         )
-    else:
+    elif status is not None:
         session.out.say(f"unit {drive.unit}: {status}")
 
 
