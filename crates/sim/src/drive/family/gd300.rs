@@ -8,7 +8,7 @@ use crate::drive::family::gd350;
 pub(crate) static GD300: Family = Family {
     name: "gd300",
     identification: 0x010A,
-    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NINE_INPUTS, GD300_STATE],
+    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD300_STATE],
     ..gd350::FAMILY
 };
 
@@ -20,12 +20,15 @@ pub(crate) static GD35_H1: Family = Family { name: "gd35-h1", identification: 0x
 const GD35_FAMILY: Family = Family {
     name: "gd35",
     identification: 0x0108,
-    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NINE_INPUTS, GD35_STATE],
+    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD35_STATE],
     ..gd350::FAMILY
 };
 
 /// The GD300 and GD35 manuals let 200AH go up to 1FFH only.
-const NINE_INPUTS: &[Register] = &[Register::set(0x200A, Range::Words(0, 0x1FF))];
+///
+/// Assumption: 2008H ends at 200.0 %, as in their lists of words for a fieldbus (GD300 p. 124, GD35 p. 122).
+const NARROWER: &[Register] =
+    &[Register::set(0x2008, Range::Words(0, 2_000)), Register::set(0x200A, Range::Words(0, 0x1FF))];
 
 /// Bits 8 to 11 of state word 2 are not printed for GD300 and GD35.
 const GD300_STATE: &[Register] = &[Register::read(
