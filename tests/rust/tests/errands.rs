@@ -4,13 +4,12 @@
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use drivebus_line::{
-    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Errand, Failure, Line, Priority, Reply, Running,
+    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Errand, Failure, Line, PortError, Priority, Reply, Running,
 };
-use drivebus_rtu::{Answer, Request, SerialFormat, UnitAddress};
-use drivebus_sim::{Options, Simulator};
+use drivebus_rtu::{Answer, Instant, Request, SerialFormat, UnitAddress};
+use drivebus_sim::{Options, SimLine, Simulator};
 
 const IDENTIFICATION: u16 = 0x2103;
 const ACCELERATION: u16 = 0x800B; // P00.11 in RAM
@@ -21,17 +20,20 @@ fn unit(raw: u8) -> UnitAddress {
     UnitAddress::new(raw).unwrap()
 }
 
-fn pair() -> (Simulator, Arc<Bus>) {
-    open(Options::default(), false)
+fn simulator() -> Simulator {
+    Simulator::new([(1, "gd350"), (2, "gd350")], Options::default()).unwrap()
 }
 
-fn open(simulation: Options, read_only: bool) -> (Simulator, Arc<Bus>) {
-    let simulator = Simulator::new([(1, "gd350"), (2, "gd350")], simulation).unwrap();
-    let line: Box<dyn Line> = Box::new(simulator.line());
+fn open(line: impl Line + 'static, read_only: bool) -> Arc<Bus> {
     let mut line = Some(line);
     let options = BusOptions { echo: AdapterEcho::Absent, read_only, ..BusOptions::new(SerialFormat::DEFAULT) };
-    let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
-    (simulator, Arc::new(bus))
+    Arc::new(Bus::open(Box::new(move || Ok(Box::new(line.take().unwrap()))), options, &mut || false).unwrap())
+}
+
+fn pair() -> (Simulator, Arc<Bus>) {
+    let simulator = simulator();
+    let bus = open(simulator.line(), false);
+    (simulator, bus)
 }
 
 /// Sends an errand whose outcome comes with `name`.
@@ -129,21 +131,63 @@ fn what_is_taken_back_is_neither_sent_nor_told() {
     assert!(simulator.drive(1).unwrap().writes().is_empty());
 }
 
-/// In real time, so that the request is met on the wire.
+/// Who is told that a request is on the wire, and who says that time may go on.
+type Meeting = (Sender<()>, Receiver<()>);
+
+/// A line on which a request can be met: time stands still while it is on the wire.
+#[derive(Debug)]
+struct Met {
+    line: SimLine,
+    meeting: Arc<Mutex<Option<Meeting>>>,
+}
+
+impl Line for Met {
+    fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
+        let sent = self.line.send(bytes);
+        if let Some((met, go_on)) = self.meeting.lock().unwrap().take() {
+            met.send(()).unwrap();
+            go_on.recv().unwrap();
+        }
+        sent
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
+        self.line.receive(buffer, until)
+    }
+
+    fn sleep(&mut self, until: Instant) {
+        self.line.sleep(until);
+    }
+
+    fn name(&self) -> String {
+        self.line.name()
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
 #[test]
 fn what_is_abandoned_on_the_wire_ends_and_is_not_repeated() {
-    let (simulator, bus) = open(Options::default().realtime(true), false);
-    let (to, outcomes) = channel();
+    let (simulator, meeting) = (simulator(), Arc::default());
+    let bus = open(Met { line: simulator.line(), meeting: Arc::clone(&meeting) }, false);
     bus.call(unit(1).into(), &identify(), CallOptions::default(), &mut || false, &mut |_| {}).unwrap();
     simulator.wire().drop_answers(1000);
     let before = simulator.wire().requests();
-    let options =
-        CallOptions { retries: Some(50), timeout: Some(Duration::from_millis(200)), ..CallOptions::default() };
+
+    let ((met, it_is_met), (go_on, may_go_on)) = (channel(), channel());
+    *meeting.lock().unwrap() = Some((met, may_go_on));
+    let (to, outcomes) = channel();
+    let options = CallOptions { retries: Some(50), ..CallOptions::default() };
     let running = send(&bus, 1, &identify(), options, &to).unwrap();
-    while simulator.wire().requests() == before {
-        std::thread::yield_now();
-    }
+    it_is_met.recv().unwrap();
     running.abandon();
+    go_on.send(()).unwrap();
     let (_, outcome) = outcomes.recv().unwrap();
     assert!(matches!(outcome.unwrap_err().failure, Failure::NoAnswer { .. }), "it was left to end");
     assert_eq!(simulator.wire().requests(), before + 1);
@@ -173,7 +217,7 @@ fn closing_tells_all_who_wait() {
 
 #[test]
 fn a_read_only_bus_refuses_before_anything_waits() {
-    let (_simulator, bus) = open(Options::default(), true);
+    let bus = open(simulator().line(), true);
     let (to, outcomes) = channel();
     assert!(send(&bus, 1, &Request::write(ACCELERATION, 20), CallOptions::default(), &to).is_none());
     assert!(matches!(outcomes.recv().unwrap().1.unwrap_err().failure, Failure::ReadOnly { function: 6 }));
