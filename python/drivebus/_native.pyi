@@ -339,6 +339,8 @@ class Profile:
         """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `identification`, `setpoints.torque`."""
     def status_words(self) -> list[str]:
         """The words whose bit fields tell more of the state."""
+    def reports_as(self) -> list[str]:
+        """The families whose identification codes a unit may report, its own first."""
     def identifications(self) -> list[dict[str, Any]]:
         """`code`, `family`, `title`, `shared`, `verified`, `note`, `source` of each code."""
     def signature(self) -> tuple[list[int], list[int]] | None:

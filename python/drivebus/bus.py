@@ -279,8 +279,12 @@ class Bus(BusFace[_native.Bus]):
         *,
         unverified: bool = False,
         variants: Mapping[str, str] | None = None,
+        trust_profile: bool = False,
     ) -> Drive:
         """The drive at *unit*.
+
+        A *profile* is believed until something is to be written: first the drive is asked what it is, and where it says
+        that it is another, nothing is written to it (`NotAllowed`). A stop, a coast and the end of a jog ask nothing.
 
         Args:
             unit: Its address, 1..247.
@@ -289,6 +293,7 @@ class Bus(BusFace[_native.Bus]):
             unverified: Whether what no document of its family proves is done all the same, in every call. Without a
                 *profile* also: take it for what it may be, where there is one candidate only.
             variants: What a parameter of the drive decides, where it is known: `{"speed_unit": "Hz"}` of a VFD500.
+            trust_profile: The *profile* is meant, whatever the drive says of itself.
 
         Raises:
             NotAllowed: No such profile or variant; or what the drive tells is not sure enough: give a profile.
@@ -296,7 +301,7 @@ class Bus(BusFace[_native.Bus]):
         """
         unit = checks.unit(unit)
         known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
-        drive = Drive(self, unit, known, code, unverified=unverified)
+        drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)
         return drive
 

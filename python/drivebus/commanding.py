@@ -36,6 +36,10 @@ _MAY = {
 }
 """What may have happened when a command was sent and nothing is known of it."""
 
+_WHATEVER_IT_IS = ("reset_fault",)
+"""Commands that are given to a unit that contradicts its profile too, as those that halt are: whether a drive gets out
+of a fault shall not depend on a name. It has shown that fault in the words of the profile."""
+
 HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
@@ -74,7 +78,7 @@ class Commanding(Setpoints):
             if urgent:
                 await self._send(address, words, urgent=True)
             else:
-                await self._write(address, words)
+                await self._write(address, words, judged=name not in _WHATEVER_IT_IS)
         except LINE_ERRORS as error:
             if error.started is None:
                 if not urgent:

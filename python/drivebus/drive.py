@@ -53,7 +53,8 @@ class Drive:
         profile: What its words mean.
         unverified: Whether what no document of its family proves is done all the same, in every call.
 
-    *identification* is what it said when it was asked what it is; None if it was not.
+    *identification* is what it said when it was asked what it is; None if it was not. With *trust_profile*, what it
+    says against its profile does not count.
     """
 
     def __init__(
@@ -64,11 +65,14 @@ class Drive:
         identification: int | None = None,
         *,
         unverified: bool = False,
+        trust_profile: bool = False,
     ) -> None:
         self.bus = bus
         self.unit = unit
         self.profile = profile
-        self._operations = Operations(BlockingBus(bus), unit, profile, identification, unverified=unverified)
+        self._operations = Operations(
+            BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile
+        )
 
     def __repr__(self) -> str:
         return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
@@ -102,6 +106,7 @@ class Drive:
     ask = blocking(Operations.ask)
     give = blocking(Operations.give)
     ping = blocking(Operations.ping)
+    contradiction = blocking(Operations.contradiction)
     wait_for_speed = blocking(Operations.wait_for_speed)
     wait_until_stopped = blocking(Operations.wait_until_stopped)
     check_control = blocking(Operations.check_control)

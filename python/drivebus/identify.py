@@ -14,9 +14,9 @@ from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
 from drivebus.profile import Profile, profiles
 
-__all__ = ["code_registers", "identify", "usable"]
+__all__ = ["LOCKED", "code_registers", "codes", "identify", "usable"]
 
-_LOCKED = 0x09
+LOCKED = 0x09
 """The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
 
 _PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
@@ -38,11 +38,11 @@ async def identify(read: Read, unit: int) -> Identification:
             [code] = await read(unit, address)
         except Refused as error:
             answered[address] = False
-            why = _PASSWORD if error.code == _LOCKED else ""
+            why = _PASSWORD if error.code == LOCKED else ""
             told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")
             continue
         answered[address] = True
-        if code in _codes():
+        if code in codes():
             return _by_code(unit, code)
         told.append(f"it says {code:04X}H, which no list names")
     candidates = await _by_answers(read, unit, answered)
@@ -69,7 +69,7 @@ def usable(found: Identification, unverified: bool) -> str | None:
 
 
 def _by_code(unit: int, code: int) -> Identification:
-    rows = _codes()[code]
+    rows = codes()[code]
     families = tuple(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
     title = " or ".join(dict.fromkeys(row["title"] for row in rows))
     printed = next((row for row in rows if row["verified"]), None)
@@ -118,7 +118,7 @@ def code_registers() -> tuple[int, ...]:
 
 
 @functools.cache
-def _codes() -> dict[int, list[dict[str, Any]]]:
+def codes() -> dict[int, list[dict[str, Any]]]:
     """What the shipped profiles say of each code; of profiles that say the same of a family, the first."""
     codes: dict[int, dict[str, dict[str, Any]]] = {}
     for name in profiles():

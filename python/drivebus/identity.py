@@ -1,8 +1,10 @@
-"""Whether the unit at an address is still the one it was.
+"""Whether the unit at an address is what it was named as, and still the one it was.
+
+People name a profile, and mistake one drive for another. So what the unit says of itself is asked before anything goes
+out that moves a motor or changes a value, and where it speaks against the profile, nothing goes out.
 
 A port that was lost and opened again may be another one: an adapter plugged in elsewhere, a cable moved to another
-machine, where the same address is another drive. So what the unit says of itself is asked again before anything goes
-out that moves a motor or changes a value. A stop does not wait for it.
+machine, where the same address is another drive. So it is asked again then. A stop does not wait for it.
 
 Families that have an identification code are known by it, and others by which words they answer and which they refuse:
 also by what they say where other families have such a code, for that is how one of those gives itself away.
@@ -12,8 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
-from drivebus.identify import code_registers
+from drivebus.identify import LOCKED, code_registers
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
@@ -27,31 +30,44 @@ class Identity:
         unit: Its address, 1..247.
         profile: Where its family says what it is.
         code: What it said, if it was asked before.
+        trusted: Whether the profile is believed, whatever the unit says.
     """
 
-    def __init__(self, bus: AwaitableBus, unit: int, profile: ProfileProtocol, code: int | None = None) -> None:
+    def __init__(
+        self,
+        bus: AwaitableBus,
+        unit: int,
+        profile: ProfileProtocol,
+        code: int | None = None,
+        *,
+        trusted: bool = False,
+    ) -> None:
         self._unit = unit
+        self._profile = profile
+        self._trusted = trusted
         self._words, self._probes = _questions(profile)
         self._known = None if code is None else _named(code)
         self._opened = bus.reconnects
 
-    async def check(self, bus: AwaitableBus) -> int:
+    async def check(self, bus: AwaitableBus, *, judged: bool = True) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
-        A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time.
+        A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
+        are one that a password locks and one that contradicts its profile. Whether it does that is looked at only where
+        it is to be *judged*.
 
         Returns:
             The connection for which that holds: what is sent on it goes to the unit that was asked.
 
         Raises:
-            NotAllowed: Another unit answers at this address now.
+            NotAllowed: What it says speaks against the profile, or another unit answers at this address now.
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
         opened = bus.reconnects
         if self._known is not None and opened == self._opened:
             return opened
         try:
-            told = await self._ask(bus)
+            answers = await self._ask(bus)
         except LINE_ERRORS as error:
             if self._known is None:
                 return opened
@@ -62,8 +78,13 @@ class Identity:
                 unit=self._unit,
                 raw=error.raw,
             ) from error
+        told = self._told(answers)
         if self._known is None:
-            self._known = told
+            against = None if self._trusted else contradiction(self._profile, self._unit, answers)
+            if against is None and not any(answer.exception == LOCKED for answer in answers):
+                self._known = told
+            elif against is not None and judged:
+                raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
         elif told != self._known:
             raise NotAllowed(
                 f"another drive answers as unit {self._unit} since the port was opened again: its identification was "
@@ -74,20 +95,31 @@ class Identity:
         self._opened = opened
         return opened
 
-    async def _ask(self, bus: AwaitableBus) -> str:
-        answers = [(address, await self._answer(bus, address)) for address in self._probes]
-        answers += [(address, await self._answer(bus, address, word=True)) for address in self._words]
-        if len(answers) == 1:
-            return answers[0][1]
-        return ", ".join(f"{_named(address)} {told}" for address, told in answers)
+    async def contradiction(self, bus: AwaitableBus) -> str | None:
+        """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
+        return contradiction(self._profile, self._unit, await self._ask(bus))
 
-    async def _answer(self, bus: AwaitableBus, address: int, *, word: bool = False) -> str:
-        """How the unit answered at *address*: that it did, or which *word* it said, or how it refused to."""
+    async def _ask(self, bus: AwaitableBus) -> list[Answer]:
+        return [await self._answer(bus, address) for address in (*self._words, *self._probes)]
+
+    async def _answer(self, bus: AwaitableBus, address: int) -> Answer:
         try:
-            [told] = await bus.read(self._unit, address)
+            [word] = await bus.read(self._unit, address)
         except Refused as error:
-            return f"refused with exception {error.code:02X}H"
-        return _named(told) if word else "answered"
+            return Answer(address, None, error.code)
+        return Answer(address, word, None)
+
+    def _told(self, answers: Sequence[Answer]) -> str:
+        """What is compared with what it says later: of a probe that it answered, and not what."""
+        told = {answer.address: self._shown(answer) for answer in answers}
+        if len(told) == 1:
+            return next(iter(told.values()))
+        return ", ".join(f"{_named(address)} {said}" for address, said in told.items())
+
+    def _shown(self, answer: Answer) -> str:
+        if answer.word is None:
+            return f"refused with exception {answer.exception:02X}H"
+        return _named(answer.word) if answer.address in self._words else "answered"
 
 
 def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
@@ -96,7 +128,7 @@ def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
     address = None if register is None else profile.describe(register).address
     if address is not None:
         return (address,), ()
-    signature = profile.signature()
+    signature = signature_of(profile)
     if signature is not None:
         return (), (*signature["answers"], *signature["refuses"])
     # Whether it has the words that are always asked of its family is better than nothing.

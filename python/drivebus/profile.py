@@ -83,6 +83,10 @@ class Profile:
         """The family: its own name, or for an overlay that of the profile below it."""
         return self._native.family
 
+    def reports_as(self) -> list[str]:
+        """The families whose codes a unit may report: with a profile that lists none, also those of what it extends."""
+        return self._native.reports_as()
+
     @property
     def kind(self) -> str:
         """`"inverter"`, or `"rectifier"` for a unit that feeds no motor."""

@@ -240,6 +240,12 @@ class ProfileProtocol(Protocol):
     def with_variants(self, chosen: Mapping[str, str]) -> ProfileProtocol:
         """The same family with variants fixed."""
 
+    def reports_as(self) -> list[str]:
+        """The families whose identification codes a unit may report, its own first."""
+
+    def identifications(self) -> list[dict[str, Any]]:
+        """The identification codes that are listed: `code`, `family`, `title`, `shared`."""
+
     def signature(self) -> dict[str, list[int]] | None:
         """The words that a unit of this family `answers`, and those it `refuses`, where it has no code."""
 

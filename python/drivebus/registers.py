@@ -42,7 +42,8 @@ class Registers:
         profile: What its words mean.
         unverified: Whether what no document of its family proves is done all the same.
 
-    *identification* is what it said when it was asked what it is; None if it was not.
+    *identification* is what it said when it was asked what it is; None if it was not. With *trust_profile*, what it
+    says against its profile does not count.
     """
 
     unverified = False
@@ -55,10 +56,12 @@ class Registers:
         identification: int | None = None,
         *,
         unverified: bool = False,
+        trust_profile: bool = False,
     ) -> None:
         self.bus = bus
         self.unit = unit
-        self._identity = Identity(bus, unit, profile, identification)
+        trusted = checks.flag("trust_profile", trust_profile)
+        self._identity = Identity(bus, unit, profile, identification, trusted=trusted)
         self._seen: list[tuple[str, float]] = []
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
@@ -120,6 +123,16 @@ class Registers:
             f"{parameter} of unit {self.unit} is {raw}, which means nothing known; {given}. Nothing was written",
             unit=self.unit,
         )
+
+    async def contradiction(self) -> str | None:
+        """What the unit says of itself that speaks against its profile, and what to do; None if nothing does.
+
+        Reads, as the first write does. For a *trust_profile* too.
+
+        Raises:
+            NoAnswer, BadAnswer, PortError: It did not tell.
+        """
+        return await self._identity.contradiction(self.bus)
 
     def describe(self, name: str) -> Description:
         """All that is known of a register or parameter. Nothing is sent.
@@ -245,17 +258,23 @@ class Registers:
         )
 
     async def _write(
-        self, address: int, value: int | Sequence[int], *, read_back: int | None = None, force: bool = False
+        self,
+        address: int,
+        value: int | Sequence[int],
+        *,
+        read_back: int | None = None,
+        force: bool = False,
+        judged: bool = True,
     ) -> None:
-        """Writes to the unit, if it still is the one it was."""
-        connection = await self._identity.check(self.bus)
+        """Writes to the unit, if it still is the one it was and, where that is *judged*, does not say it is another."""
+        connection = await self._identity.check(self.bus, judged=judged)
         try:
             await self._send(address, value, read_back=read_back, connection=connection, force=force)
         except PortError as error:
             if error.started is not None or self.bus.reconnects == connection:
                 raise
             # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
-            connection = await self._identity.check(self.bus)
+            connection = await self._identity.check(self.bus, judged=judged)
             await self._send(address, value, read_back=read_back, connection=connection, force=force)
 
     async def _send(

@@ -342,7 +342,8 @@ class TestWhoAnswers:
             drive.write("P00.11", 2.0)
 
     def test_one_that_refuses_to_tell_is_known_by_that(self, bus: StandIn) -> None:
-        drive = Drive(bus, 1, Profile.builtin("gd350"))
+        # Every GD350 tells; that this one is one, somebody knows better.
+        drive = Drive(bus, 1, Profile.builtin("gd350"), trust_profile=True)
         refusal = drivebus.Refused("no", code=2)
         bus.failures = [refusal]
         drive.write("P00.11", 2.0)

@@ -28,6 +28,8 @@ use crate::watchdog::Watchdog;
 pub struct Profile {
     pub(crate) name: String,
     pub(crate) family: String,
+    /// The families whose codes a unit may report, its own first.
+    pub(crate) reports_as: Vec<String>,
     pub(crate) title: String,
     pub(crate) kind: UnitKind,
     pub(crate) version: u32,
@@ -73,6 +75,12 @@ impl Profile {
     /// The family: its own name, or for an overlay that of the profile below it.
     pub fn family(&self) -> &str {
         &self.family
+    }
+
+    /// The families whose identification codes a unit may report: its own, and where the profile extends another one and
+    /// lists no code of its own, those of that one.
+    pub fn reports_as(&self) -> &[String] {
+        &self.reports_as
     }
 
     /// Its name for people: `INVT Goodrive350`.

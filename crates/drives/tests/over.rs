@@ -62,6 +62,7 @@ fn an_overlay_adds_and_replaces_and_leaves_the_rest_as_it_is() {
     assert_eq!(profile.control(), base.control());
     // The code of the drive names the family below, and that is asked for it.
     assert_eq!(profile.identifications(), []);
+    assert_eq!(profile.reports_as(), ["gd350"]);
 }
 
 #[test]
@@ -94,6 +95,13 @@ fn a_sister_family_is_trusted_as_far_as_its_own_documents_go() {
     assert!(profile.memory().unwrap().verified, "it is confirmed");
     assert_eq!(profile.write_address(profile.find("P00.11").unwrap(), Store::Ram), Ok(0x800B));
     assert_eq!((profile.identifications(), profile.family()), ([].as_slice(), "gd999"));
+    assert_eq!(profile.reports_as(), ["gd999", "gd350"], "it lists no code of its own");
+
+    let code = "[[identification.codes]]\ncode = 0x0199\nfamily = \"gd999\"\ntitle = \"Goodrive999\"\nverified = true\n\
+                source = \"GD999 leaflet, p. 1\"\n";
+    let profile = Folder::new("sister-code", &[("profile.toml", &format!("{manifest}\n{code}"))]).load().unwrap();
+    assert_eq!(profile.reports_as(), ["gd999"]);
+    assert_eq!(Profile::builtin("gd300").unwrap().reports_as(), ["gd300"]);
 }
 
 #[test]

@@ -111,6 +111,10 @@ impl Profile {
         self.0.status_words().map(known_as).collect()
     }
 
+    fn reports_as(&self) -> Vec<String> {
+        self.0.reports_as().to_vec()
+    }
+
     fn identifications<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.0.identifications().iter().map(|row| tables::identification(py, row)).collect()
     }

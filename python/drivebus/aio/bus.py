@@ -186,11 +186,12 @@ class Bus(BusFace[Line]):
         *,
         unverified: bool = False,
         variants: Mapping[str, str] | None = None,
+        trust_profile: bool = False,
     ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
         known, code = await who.profile_of(self, unit, profile, variants, unverified)
-        drive = Drive(self, unit, known, code, unverified=unverified)
+        drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)
         return drive
 

@@ -51,10 +51,10 @@ class Reader:
         address, count, inside = self._planned.pop(0)
         drive = self._drive
         # Known before the first answer, so that a port that is opened again meanwhile brings no words of another drive.
-        await drive._identity.check(drive.bus)
+        await drive._identity.check(drive.bus, judged=False)
         try:
             words = await drive.read_words(address, count)
-            await drive._identity.check(drive.bus)
+            await drive._identity.check(drive.bus, judged=False)
         except Refused as error:
             if error.name == _LOCKED:
                 raise

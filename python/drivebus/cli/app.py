@@ -17,7 +17,8 @@ __all__ = ["cli", "main"]
 
 
 # Each variable is named by hand: with click's own prefix, DRIVEBUS_RUN_YES would answer the question before a motor
-# starts, and DRIVEBUS_WRITE_STORE would wear EEPROM, without a word on the command line.
+# starts, and DRIVEBUS_WRITE_STORE would wear EEPROM, without a word on the command line. --trust-profile has none: set
+# for one drive, it would be believed of the next.
 
 
 class _Commands(click.Group):
@@ -46,7 +47,7 @@ class _Commands(click.Group):
     },
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed. "
-    "Each option before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
+    "Options before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
     "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is "
     "not a safety function: an emergency stop is a wire.",
 )
@@ -101,6 +102,11 @@ class _Commands(click.Group):
     help="Family or folder; without it, the drive is asked.",
 )
 @click.option(
+    "--trust-profile",
+    is_flag=True,
+    help="The profile is meant: write also to a drive that says it is of another family.",
+)
+@click.option(
     "--unverified",
     is_flag=True,
     envvar="DRIVEBUS_UNVERIFIED",
@@ -127,6 +133,7 @@ def cli(
     rs485: str | None,
     unit: int,
     profile: str | None,
+    trust_profile: bool,
     unverified: bool,
     variants: dict[str, str],
     as_json: bool,
@@ -135,7 +142,8 @@ def cli(
 
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
-    context.obj = Session(port, baud, line_format, unit, profile, Output(as_json), rs485, unverified, variants)
+    out = Output(as_json)
+    context.obj = Session(port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile)
 
 
 for module in (look, watch, explain, doctor, move, backup, frames, profiles, tools):

@@ -88,6 +88,7 @@ def info(session: Session) -> None:
             raise
         control = drive.check_control()
         profile = profile_of(drive)
+        against = drive.contradiction()
         out.facts(
             {
                 "unit": drive.unit,
@@ -96,13 +97,16 @@ def info(session: Session) -> None:
                 "title": profile.title,
                 "kind": profile.kind,
                 **facts,
+                "contradiction": against,
                 "memory": "; ".join(rules.memory(profile)),
                 "round_trip_ms": _round_trip(bus, drive.unit),
                 "status": str(drive.status()),
                 "obeys_bus": bool(control) if len(control) else None,
             }
         )
-        if found.candidates and profile.family not in found.candidates:
+        if against is not None:
+            click.echo(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.", err=True)
+        elif found.candidates and profile.family not in found.candidates:
             click.echo(f"It is treated as {profile.family}, and does not say that it is one.", err=True)
         if not len(control):
             out.say("What makes it obey the bus is not known.")

@@ -57,6 +57,7 @@ class Session:
         rs485: Who switches the direction, as `drivebus.Bus` has it: `"kernel"`, `"rts"`, `"auto"`; None: the adapter.
         unverified: Whether what no document of the very family proves may be used.
         variants: What parameters of the drive make of its registers, by name.
+        trust_profile: Whether the profile is meant, whatever the drive says of itself.
     """
 
     port: str | None
@@ -68,6 +69,7 @@ class Session:
     rs485: str | None = None
     unverified: bool = False
     variants: Mapping[str, str] = field(default_factory=dict)
+    trust_profile: bool = False
 
     @property
     def direction(self) -> dict[str, object] | None:
@@ -116,7 +118,13 @@ class Session:
 
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
         """The drive that the options name, on a bus that is open."""
-        return bus.drive(self.unit, self.profile, unverified=self.unverified, variants=self.variants or None)
+        return bus.drive(
+            self.unit,
+            self.profile,
+            unverified=self.unverified,
+            variants=self.variants or None,
+            trust_profile=self.trust_profile,
+        )
 
     def known_profile(self) -> drivebus.Profile:
         """The profile that the options name, from the drive itself only if it has to be asked."""

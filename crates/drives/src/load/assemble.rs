@@ -61,6 +61,9 @@ pub(super) fn profile(
     lists(file, manifest, &mut profile, &entries, problems);
     if let Some(identification) = &manifest.identification {
         profile.identifications = facts::identifications(file, &identification.codes, problems);
+        if profile.identifications.iter().any(|row| row.family == profile.family) {
+            profile.reports_as.truncate(1);
+        }
         let signature = identification.signature.as_ref();
         profile.signature = signature.and_then(|row| facts::signature(file, &entries, row, problems));
     }
@@ -115,12 +118,27 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
         (Some(_), Some(base)) => base.family.clone(),
         _ => name.clone(),
     };
+    let mut reports_as = base.as_ref().map(|base| base.reports_as.clone()).unwrap_or_default();
+    if reports_as.first() != Some(&family) {
+        reports_as.insert(0, family.clone());
+    }
     let (requests, title, kind) = (requests?, title?, kind?);
     Some(match base {
-        Some(base) => Profile { name, family, title, kind, version, requests, source: manifest.source.clone(), ..base },
+        Some(base) => Profile {
+            name,
+            family,
+            reports_as,
+            title,
+            kind,
+            version,
+            requests,
+            source: manifest.source.clone(),
+            ..base
+        },
         None => Profile {
             name,
             family,
+            reports_as,
             title,
             kind,
             version,

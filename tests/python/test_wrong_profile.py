@@ -1,0 +1,433 @@
+"""A profile was named, and the unit says that it is something else: nothing is written to it.
+
+What each family says at 2103H: GD350 manual, chapter 9.4.5 (GD350 01A0H, GD35 0108H, GD35-H1 0109H, GD300 010AH). Of no
+other family is a page with a code at hand; their simulated drives refuse 2103H with 02H.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import drivebus
+import drivebus.aio
+from drivebus import Bus, Drive, NotAllowed, Profile, Simulator
+from drivebus.cli import cli
+
+CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
+
+SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"]
+"""The families whose units refuse 2103H."""
+
+TAKEN_FOR: dict[str, list[str]] = {
+    # These have a code: one that says another, or refuses to say one, is none of them.
+    "gd350": ["gd350"],
+    "gd35": ["gd35"],
+    "gd35-h1": ["gd35-h1"],
+    "gd300": ["gd300"],
+    # This one answers r25.00 and P30.14, which no other does.
+    "vfd500": ["vfd500"],
+    # Of these nothing is known that they must say; only a code gives another one away.
+    "gd600": SILENT_ON_CODES,
+    "gd600-rectifier": SILENT_ON_CODES,
+    "gd3000": SILENT_ON_CODES,
+    "gd3000-rectifier": SILENT_ON_CODES,
+    "chf100a": SILENT_ON_CODES,
+    "chv100": SILENT_ON_CODES,
+}
+"""What each profile may be named for without being contradicted."""
+
+SAYS = {"gd350": "01A0H", "gd35": "0108H", "gd35-h1": "0109H", "gd300": "010AH"}
+
+PAIRS = [(named, unit) for named in TAKEN_FOR for unit in TAKEN_FOR]
+
+every_pair = pytest.mark.parametrize(("named", "unit"), PAIRS)
+
+
+def line_with(family: str) -> Simulator:
+    return Simulator({1: family}, transport="process", clock="virtual")
+
+
+@pytest.fixture
+def gd300() -> Iterator[tuple[Simulator, Bus]]:
+    """A GD300, after first contact."""
+    with line_with("gd300") as simulator, Bus(simulator, timeout=0.25, retries=0) as bus:
+        bus.echo(1)
+        yield simulator, bus
+
+
+@pytest.fixture
+def vfd500() -> Iterator[tuple[Simulator, Bus]]:
+    """A VFD500, after first contact."""
+    with line_with("vfd500") as simulator, Bus(simulator, timeout=0.25, retries=0) as bus:
+        bus.echo(1)
+        yield simulator, bus
+
+
+def asked(simulator: Simulator) -> list[bytes]:
+    """The requests on the line, without the loop-back of first contact."""
+    return [frame for _, who, frame in simulator.line.trace() if who == "master" and frame[1] != 0x08]
+
+
+def written(simulator: Simulator) -> list[bytes]:
+    return [frame for frame in asked(simulator) if frame[1] in (0x06, 0x10)]
+
+
+def answer(simulator: Simulator, word: int) -> None:
+    """The next answer on the line brings *word*."""
+    body = bytes([1, 3, 2, *word.to_bytes(2, "big")])
+    simulator.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+
+
+def refuse(simulator: Simulator, exception: int) -> None:
+    """The next answer on the line is this refusal of a read."""
+    body = bytes([1, 0x83, exception])
+    simulator.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+
+
+def test_the_table_has_every_family() -> None:
+    assert set(TAKEN_FOR) == set(drivebus.profiles())
+    assert len(PAIRS) == 121
+
+
+@every_pair
+def test_what_is_contradicted_gets_nothing(named: str, unit: str) -> None:
+    with line_with(unit) as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, named)
+        if unit in TAKEN_FOR[named]:
+            # Another one may refuse it; that is the drive's own word, and not held back here.
+            with suppress(drivebus.Refused):
+                drive.write_words(0x0114, 50)
+            assert len(written(simulator)) == 1
+            assert drive.contradiction() is None
+            return
+        for _ in range(2):  # it is not forgotten by having been said
+            with pytest.raises(NotAllowed) as error:
+                drive.write_words(0x0114, 50)
+        assert written(simulator) == []
+        told = str(error.value)
+        for said in (f"unit 1 was named {named}", "nothing was written", "trust_profile=True", "--trust-profile"):
+            assert said in told
+        if unit in SAYS:
+            assert f"it says {SAYS[unit]}" in told
+            assert f'profile="{unit}"' in told
+            assert Profile.builtin(unit).title.removeprefix("INVT ") in told
+        assert drive.contradiction() is not None
+        assert error.value.unit == 1
+
+
+@every_pair
+def test_both_faces_refuse_the_same(named: str, unit: str) -> None:
+    async def main() -> str | None:
+        with line_with(unit) as simulator:
+            async with drivebus.aio.Bus(simulator) as bus:
+                drive = await bus.drive(1, named)
+                try:
+                    await drive.write_words(0x0114, 50)
+                except (NotAllowed, drivebus.Refused) as error:
+                    return str(error)
+                return None
+
+    with line_with(unit) as simulator, Bus(simulator) as bus:
+        told = None
+        try:
+            bus.drive(1, named).write_words(0x0114, 50)
+        except (NotAllowed, drivebus.Refused) as error:
+            told = str(error)
+    assert asyncio.run(main()) == told
+
+
+@every_pair
+def test_who_knows_better_says_so(named: str, unit: str) -> None:
+    with line_with(unit) as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, named, trust_profile=True)
+        with suppress(drivebus.Refused):
+            drive.write_words(0x0114, 50)
+        assert len(written(simulator)) == 1
+        assert (drive.contradiction() is None) == (unit in TAKEN_FOR[named])
+
+
+WRITES: list[Callable[[Drive], Any]] = [
+    lambda drive: drive.run(),
+    lambda drive: drive.run(10.0, reverse=True, force=True),
+    lambda drive: drive.jog(),
+    lambda drive: drive.write("P00.11", 2.0),
+    lambda drive: drive.write({"P00.11": 2.0, "P00.12": 2.0}, store=True),
+    lambda drive: drive.give("analog_output_1", 10.0),
+    lambda drive: drive.special_control(motor=2),
+    lambda drive: drive.prepare_control(setpoint="pid"),
+    lambda drive: drive.watchdog(1.0, unverified=True),
+    lambda drive: drive.write_words(0x000B, [20, 20]),
+    lambda drive: setattr(drive, "setpoint", 10.0),
+]
+
+
+@pytest.mark.parametrize("write", WRITES)
+def test_nothing_that_moves_or_changes_anything_goes_out(write: Callable[[Drive], Any]) -> None:
+    """A GD300 that obeys the bus, and is named GD350: their commands are the same, and still it is not asked to run."""
+    with line_with("gd300") as simulator, Bus(simulator) as bus:
+        bus.drive(1, unverified=True).prepare_control()
+        before = len(written(simulator))
+        with pytest.raises(NotAllowed, match="says 010AH"):
+            write(bus.drive(1, "gd350", unverified=True))
+        assert len(written(simulator)) == before
+
+
+def test_what_ends_a_motion_asks_nothing_and_is_not_refused(gd300: tuple[Simulator, Bus]) -> None:
+    """5 stops, 6 coasts, 8 ends a jog: GD350 manual, section 9.4.5."""
+    simulator, bus = gd300
+    drive = bus.drive(1, "gd350")
+    for end, code in ((drive.stop, 5), (drive.coast, 6), (drive.jog_stop, 8)):
+        before = len(asked(simulator))
+        end(confirm=0)
+        assert [frame[:6].hex(" ") for frame in asked(simulator)[before:]] == [f"01 06 20 00 00 {code:02x}"]
+
+
+def test_a_fault_is_reset_all_the_same(gd300: tuple[Simulator, Bus]) -> None:
+    simulator, bus = gd300
+    bus.drive(1, unverified=True).prepare_control()
+    simulator.drive(1).trip(4)
+    before = len(written(simulator))
+    drive = bus.drive(1, "gd350")
+    drive.reset_fault()
+    assert [frame[:6].hex(" ") for frame in written(simulator)[before:]] == ["01 06 20 00 00 07"]
+    # That it was asked for the reset does not count as having been judged.
+    with pytest.raises(NotAllowed, match="says 010AH"):
+        drive.write("P00.11", 2.0)
+
+
+def test_reads_are_not_held_up(gd300: tuple[Simulator, Bus]) -> None:
+    simulator, bus = gd300
+    drive = bus.drive(1, "gd350")
+    drive.status()
+    drive.monitor()
+    drive.read("P00.11")
+    assert not [frame for frame in asked(simulator) if frame[2:4] == b"\x21\x03"]
+    assert len(drive.backup()) > 0
+
+
+def test_it_is_asked_once(gd300: tuple[Simulator, Bus]) -> None:
+    simulator, bus = gd300
+    drive = bus.drive(1, "gd300")
+    for seconds in (2.0, 3.0, 4.0):
+        drive.write("P00.11", seconds, unverified=True)
+    assert len([frame for frame in asked(simulator) if frame[2:4] == b"\x21\x03"]) == 1
+
+
+class TestWhatTellsNothing:
+    """Firmwares differ, drives are locked, lines fail: only what is listed for another family speaks against one."""
+
+    @pytest.mark.parametrize("named", ["gd300", "gd350", "gd600", "gd3000", "chf100a"])
+    def test_a_code_that_no_list_names(self, gd300: tuple[Simulator, Bus], named: str) -> None:
+        simulator, bus = gd300
+        answer(simulator, 0x0199)
+        bus.drive(1, named, unverified=True).write_words(0x000B, 20)
+        assert len(written(simulator)) == 1
+
+    def test_a_word_where_a_vfd500_has_no_code(
+        self, vfd500: tuple[Simulator, Bus], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Whether it has a parameter at 2103H (it would be P33.03) is not printed."""
+        simulator, bus = vfd500
+        read = bus.read
+        monkeypatch.setattr(bus, "read", lambda *what, **how: [3] if what[1] == CODE else read(*what, **how))
+        bus.drive(1, "vfd500").torque = 10.0
+        assert len(written(simulator)) == 1
+
+    @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05, 0x06, 0x09])
+    def test_an_exception_that_is_not_about_the_address(self, gd300: tuple[Simulator, Bus], exception: int) -> None:
+        """09H: a password locks it, and it refuses whatever is asked. GD350 manual, section 9.4.7."""
+        simulator, bus = gd300
+        refuse(simulator, exception)
+        bus.drive(1, "gd350").write("P00.11", 2.0)
+        assert len(written(simulator)) == 1
+
+    def test_a_drive_that_is_unlocked_is_asked_again(self, gd300: tuple[Simulator, Bus]) -> None:
+        simulator, bus = gd300
+        drive = bus.drive(1, "gd350")
+        refuse(simulator, 0x09)
+        drive.write_words(0x000B, 20)
+        with pytest.raises(NotAllowed, match="says 010AH"):
+            drive.write_words(0x000B, 30)
+        assert len(written(simulator)) == 1
+
+    @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05])
+    def test_the_same_of_a_vfd500(self, vfd500: tuple[Simulator, Bus], exception: int) -> None:
+        """05H: reading is refused, as a parameter may be. VFD500 manual, p. 133."""
+        simulator, bus = vfd500
+        refuse(simulator, exception)
+        bus.drive(1, "vfd500").torque = 10.0
+        assert len(written(simulator)) == 1
+
+    def test_silence(self, gd300: tuple[Simulator, Bus]) -> None:
+        simulator, bus = gd300
+        drive = bus.drive(1, "gd350")
+        simulator.line.script([(1, "silence")])
+        drive.write_words(0x000B, 20)
+        assert len(written(simulator)) == 1
+        # It did not tell then, and is asked the next time.
+        with pytest.raises(NotAllowed, match="says 010AH"):
+            drive.write_words(0x000B, 30)
+        assert len(written(simulator)) == 1
+
+
+class TestWhatTells:
+    @pytest.mark.parametrize(
+        ("word", "said"),
+        [
+            (0x01A0, r"01A0H, which is a Goodrive350 \(gd350\).*profile=\"gd350\""),
+            # From a GD200L manual, and from programs: a family without a profile.
+            (0x010C, r"010CH, which is a Goodrive200, 200A or 200L \(gd200\).*no profile of it"),
+            (0x010D, r"010DH, which is a Goodrive10 mini \(gd10\).*no profile of it"),
+        ],
+    )
+    @pytest.mark.parametrize("named", ["gd35", "gd600", "vfd500"])
+    def test_a_code_that_is_listed_for_another_family(
+        self,
+        vfd500: tuple[Simulator, Bus],
+        monkeypatch: pytest.MonkeyPatch,
+        named: str,
+        word: int,
+        said: str,
+    ) -> None:
+        simulator, bus = vfd500
+        read = bus.read
+        monkeypatch.setattr(bus, "read", lambda *what, **how: [word] if what[1] == CODE else read(*what, **how))
+        with pytest.raises(NotAllowed, match=said):
+            bus.drive(1, named, unverified=True).write_words(0x000B, 20)
+        assert written(simulator) == []
+
+    @pytest.mark.parametrize("word", [0x01A1, 0x01A2])
+    def test_a_sister_that_reports_another_code(self, gd300: tuple[Simulator, Bus], word: int) -> None:
+        """GD350-UL and GD350A: GD350 manual (manualshive 2085703), p. 329."""
+        simulator, bus = gd300
+        answer(simulator, word)
+        bus.drive(1, "gd350").write("P00.11", 2.0)
+        assert len(written(simulator)) == 1
+
+    @pytest.mark.parametrize("address", [FAULT_500, SPEED_UNIT_500])
+    def test_a_word_that_the_family_must_have(
+        self, vfd500: tuple[Simulator, Bus], monkeypatch: pytest.MonkeyPatch, address: int
+    ) -> None:
+        simulator, bus = vfd500
+        drive = bus.drive(1, "vfd500")
+        read = bus.read
+
+        def other(unit: int, place: int, *rest: int, **how: bool) -> list[int]:
+            # 6300H is nowhere: the drive itself refuses.
+            return read(unit, 0x6300 if place == address else place, *rest, **how)
+
+        monkeypatch.setattr(bus, "read", other)
+        with pytest.raises(NotAllowed, match=rf"refuses {address:04X}H \(exception 02H"):
+            drive.torque = 10.0
+        assert written(simulator) == []
+
+
+class TestProfilesOfOnesOwn:
+    @staticmethod
+    def new(folder: Path, *options: str) -> Path:
+        result = CliRunner().invoke(cli, ["profiles", "new", str(folder), *options])
+        assert result.exit_code == 0, result.output
+        return folder
+
+    @staticmethod
+    def contradiction(family: str, profile: Path) -> str | None:
+        with line_with(family) as simulator, Bus(simulator) as bus:
+            return bus.drive(1, profile).contradiction()
+
+    def test_an_overlay_is_its_base(self, tmp_path: Path) -> None:
+        folder = self.new(tmp_path / "ours", "--overlay", "gd300")
+        assert self.contradiction("gd300", folder) is None
+        assert "010AH" not in str(self.contradiction("gd350", folder))
+        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+        assert "refuses 2103H" in str(self.contradiction("gd600", folder))
+
+    def test_one_that_extends_another_counts_as_that(self, tmp_path: Path) -> None:
+        """It lists no code of its own: that its units refuse 2103H is no wonder, as the row is only assumed."""
+        folder = self.new(tmp_path / "ours", "--like", "gd300")
+        assert Profile.load(folder).family == "ours"
+        assert self.contradiction("gd300", folder) is None
+        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+        assert self.contradiction("gd600", folder) is None
+
+    def test_one_that_extends_another_and_has_a_code_is_known_by_that(self, tmp_path: Path) -> None:
+        folder = self.new(tmp_path / "ours", "--like", "gd300")
+        with (folder / "profile.toml").open("a", encoding="utf-8") as file:
+            file.write(
+                '\n[[identification.codes]]\ncode = 0x0199\nfamily = "ours"\ntitle = "Ours"\nverified = true\n'
+                'source = "Our manual"\n'
+            )
+        assert "says 010AH" in str(self.contradiction("gd300", folder))
+        assert "refuses 2103H" in str(self.contradiction("gd600", folder))
+
+    def test_an_overlay_on_one_without_a_code_has_its_signature(self, tmp_path: Path) -> None:
+        folder = self.new(tmp_path / "ours", "--overlay", "vfd500")
+        assert self.contradiction("vfd500", folder) is None
+        assert "refuses 1900H" in str(self.contradiction("gd600", folder))
+        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+
+    def test_one_with_codes_of_its_own_is_judged_by_them(self) -> None:
+        """The EX-9 of the test vectors says 0900H or 0901H at 2103H."""
+        ex9 = Path(__file__).resolve().parent.parent / "vectors/profiles/ex9"
+        assert "says 01A0H" in str(self.contradiction("gd350", ex9))
+        assert "refuses 2103H" in str(self.contradiction("gd600", ex9))
+        with line_with("gd350") as simulator, Bus(simulator) as bus:
+            bus.echo(1)
+            answer(simulator, 0x0901)
+            assert bus.drive(1, ex9).contradiction() is None
+
+    @pytest.mark.parametrize("unit", ["gd350", "gd600", "vfd500"])
+    def test_one_that_says_nothing_of_how_its_units_are_known_is_not_judged(self, tmp_path: Path, unit: str) -> None:
+        assert self.contradiction(unit, self.new(tmp_path / "ours")) is None
+
+
+def at(port: str, *words: str, env: dict[str, str] | None = None) -> Result:
+    """A command to a simulated drive, in virtual time."""
+    result = CliRunner().invoke(cli, ["--port", f"sim://{port}?clock=virtual", *words], prog_name="drivebus", env=env)
+    assert "Traceback" not in result.output
+    return result
+
+
+class TestCommandLine:
+    @every_pair
+    def test_a_write_ends_with_2_and_says_why(self, named: str, unit: str) -> None:
+        """`raw` sends what it is told; `write` of a word that has no name is what every family can be told."""
+        result = at(unit, "--profile", named, "write", "--force", "0x0FFE=1", "--yes")
+        if unit in TAKEN_FOR[named]:
+            assert result.exit_code == 4, result.output  # there is nothing at that address
+            return
+        assert result.exit_code == 2, result.output
+        assert f"unit 1 was named {named}" in result.stderr
+        assert "--trust-profile" in result.stderr
+        assert at(unit, "--profile", named, "--trust-profile", "write", "--force", "0x0FFE=1", "--yes").exit_code == 4
+
+    def test_a_start(self) -> None:
+        result = at("gd300", "--profile", "gd350", "prepare", "--yes")
+        assert (result.exit_code, "--profile gd300" in result.stderr) == (2, True)
+        assert at("gd300", "--profile", "gd350", "--trust-profile", "prepare", "--yes").exit_code == 0
+
+    def test_a_stop_goes_out(self) -> None:
+        for command in ("stop", "coast"):
+            assert at("gd300", "--profile", "gd350", command).exit_code == 0
+
+    def test_the_environment_does_not_say_it(self) -> None:
+        """A variable that was set for one drive would be believed of the next."""
+        env = {"DRIVEBUS_TRUST_PROFILE": "1", "DRIVEBUS_PROFILE": "gd350"}
+        assert at("gd300", "prepare", "--yes", env=env).exit_code == 2
+
+    def test_info_says_it(self) -> None:
+        result = at("gd300", "--profile", "gd350", "info")
+        assert result.exit_code == 0
+        assert re.search(r"named gd350.*says 010AH", result.stderr)
+        said = at("gd300", "--profile", "gd350", "--json", "info").stdout.splitlines()[0]
+        assert "says 010AH" in json.loads(said)["contradiction"]
+        said = at("gd300", "--json", "info").stdout.splitlines()[0]
+        assert json.loads(said)["contradiction"] is None
