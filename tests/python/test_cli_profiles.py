@@ -175,6 +175,38 @@ def test_all_faults_with_causes_and_remedies() -> None:
     assert known[18]["verified"] is False
 
 
+class TestOneFault:
+    """What a keypad shows, looked up; numbers and mnemonics from the fault list of the GD350's chapter 9.4."""
+
+    @pytest.mark.parametrize(
+        ("typed", "numbers"),
+        [(["OL1"], [11]), (["ol1"], [11]), (["11"], [11]), (["STo"], [35]), (["STO"], [40]), (["sto"], [35, 40])],
+    )
+    def test_by_number_and_by_what_is_displayed(self, typed: list[str], numbers: list[int]) -> None:
+        assert [row["code"] for row in rows("--profile", "gd350", "faults", *typed)] == numbers
+
+    def test_by_words(self) -> None:
+        found = rows("--profile", "gd350", "faults", "overcurrent")
+        assert [row["mnemonic"] for row in found] == ["OC1", "OC2", "OC3"]
+
+    def test_one_alone_is_told_with_its_note(self) -> None:
+        text = run("--profile", "gd350", "faults", "STO").stdout
+        assert text.startswith("STO (40)")
+        assert "remedy" in text
+        assert "35 (STo)" in text  # it is not that one
+
+    def test_describe_says_where_a_fault_is_told(self) -> None:
+        result = run("--profile", "gd350", "describe", "ol1")
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert "it is a fault: `drivebus faults OL1`" in result.stderr
+
+    @pytest.mark.parametrize("unknown", [["999"], ["OLX"], ["1e3"]])
+    def test_an_unknown_one_is_said(self, unknown: list[str]) -> None:
+        result = run("--profile", "gd350", "faults", *unknown)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert f"gd350 names no fault '{unknown[0]}'" in result.stderr
+
+
 def test_the_shell_completes_all_families() -> None:
     from click.shell_completion import ShellComplete
 

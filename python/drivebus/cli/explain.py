@@ -31,6 +31,11 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
     try:
         known = profile.describe(names.named(profile, wanted))
     except drivebus.NotAllowed:
+        shown = next((fault.mnemonic for fault in profile.faults() if fault.mnemonic.lower() == wanted.lower()), "")
+        if shown:
+            raise drivebus.NotAllowed(
+                f"{wanted!r} is no register or parameter of {profile.name}; it is a fault: `drivebus faults {shown}`"
+            ) from None
         found = profile.search(wanted, limit=_MATCHES)
         if not found:
             raise
@@ -62,12 +67,17 @@ def _match(profile: drivebus.Profile, name: str) -> list[Any]:
 
 
 @click.command()
+@click.argument("text", metavar="[FAULT]...", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="List every fault the family knows; asks no drive for faults.")
 @pass_session
-def faults(session: Session, everything: bool) -> None:
-    """Explain the present fault, and list the last ones, with the values the drive kept of the last."""
-    if everything:
-        _show_all(session)
+def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
+    """Explain the present fault, and list the last ones, with the values the drive kept of the last.
+
+    FAULT is a number, what the keypad shows (`drivebus faults OL1`), or words (`drivebus faults earth short`): it is
+    explained, and no drive is asked for faults.
+    """
+    if everything or text:
+        _show_known(session, " ".join(text))
         return
     out = session.out
     with session.drive() as drive:
@@ -113,11 +123,40 @@ def _numbered(history: list[drivebus.Fault]) -> list[tuple[str, drivebus.Fault]]
     return [("last" if number == 0 else f"{number} before", fault) for number, fault in enumerate(history)]
 
 
-def _show_all(session: Session) -> None:
-    known = session.known_profile().faults()
+def _show_known(session: Session, text: str) -> None:
+    """The faults of the family that *text* means; all for none. One alone is told with all that is known of it."""
+    profile = session.known_profile()
+    known = _meant(profile.faults(), text)
+    if text and not known:
+        raise drivebus.NotAllowed(
+            f"{profile.name} names no fault {text!r}; `drivebus faults --all` lists those it names"
+        )
+    if text and len(known) == 1 and not session.out.as_json:
+        [fault] = known
+        session.out.say(str(fault))
+        session.out.facts({"cause": fault.cause, "remedy": fault.remedy, "note": fault.note})
+        return
     if not known and not session.out.as_json:
         session.out.say("No fault of this family is known by number; the drive's manual has them.")
     session.out.rows(_COLUMNS, [_row(fault) for fault in known])
+
+
+def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:
+    """Those that *text* means: by number, by what the keypad shows, or by words in what is said of them.
+
+    `STo` and `STO` are two faults. Who types neither (`sto`) is shown both.
+    """
+    words = text.lower().split()
+    for means in (
+        lambda fault: text.isdecimal() and fault.code == int(text),
+        lambda fault: fault.mnemonic == text,
+        lambda fault: fault.mnemonic.lower() == text.lower(),
+        lambda fault: all(word in f"{fault.mnemonic} {fault.label} {fault.cause}".lower() for word in words),
+    ):
+        found = [fault for fault in known if means(fault)]
+        if found or text.isdecimal():
+            return found
+    return []
 
 
 def _values(drive: drivebus.Drive, values: Mapping[str, Any]) -> list[list[Any]]:
