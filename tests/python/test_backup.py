@@ -70,6 +70,16 @@ def test_one_that_is_refused_is_named_and_costs_no_other(drive: Drive, without: 
     assert {"P00.10", "P00.11", "P00.14"} <= {*taken}
 
 
+def test_what_this_program_put_into_ram_alone_is_marked(drive: Drive, tmp_path: Path) -> None:
+    drive.write({"P00.11": 3.0, "P00.12": 4.0})
+    drive.write("P00.12", 4.0, store=True)
+    kept = drive.backup(tmp_path / "drive.toml")
+    assert kept.in_ram == {"P00.11"}
+    marked = [line for line in kept.text().splitlines() if "in RAM alone" in line]
+    assert [line.split(" ")[0] for line in marked] == ["P00.11"]
+    assert Backup.load(tmp_path / "drive.toml").raw == kept.raw
+
+
 def test_a_locked_drive_ends_it(drive: Drive, virtual: Simulator, store: Store) -> None:
     store(drive, {"P07.00": 1234})
     before = virtual.line.requests
@@ -122,6 +132,15 @@ def test_nothing_is_taken_of_another_drive_behind_the_port(
     monkeypatch.setattr(Bus, "reconnects", property(lambda _: int(count[0] > 8)))
     with pytest.raises(NotAllowed, match="another drive answers as unit 1 since the port was opened again"):
         getattr(virtual_bus.drive(1, "gd350"), use)(path)
+
+
+def test_what_was_changed_by_hand_meanwhile_is_read_again(drive: Drive, tmp_path: Path) -> None:
+    part = tmp_path / "drive.toml.part"
+    whole = drive.backup()
+    begun = whole.text().replace("complete = true", "complete = false")
+    part.write_text(begun.replace('value = 4.0, unit = "kHz", raw = 40,', 'value = 5.0, unit = "kHz", raw = 50,'))
+    assert Backup.load(part).raw["P00.14"] == 50
+    assert drive.backup(tmp_path / "drive.toml").raw == whole.raw
 
 
 def test_a_half_backup_is_neither_restored_nor_compared(drive: Drive, tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_lines_stay_where_they_are_and_say_what_they_mean(virtual_drive: Drive, 
         assert codes == sorted(codes)
     assert codes == ["P00.15", "P07.27", "P07.28", "P07.29", "P07.30", "P07.31", "P07.32"]
     assert 'P00.03 = { value = 50.00, unit = "Hz", raw = 5000 }  # Maximum output frequency' in before
-    assert "P14.01 = { value = 4, raw = 4 }  # Baud rate: 19200" in before
+    assert "P14.01 = { value = 4, raw = 4, told = 4 }  # Baud rate: 19200" in before
     virtual_drive.write("P00.11", 20.0, store=True, unverified=True)
     virtual_drive.backup(file)
     after = file.read_text(encoding="utf-8").splitlines()

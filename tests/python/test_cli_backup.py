@@ -191,11 +191,12 @@ def test_a_second_write_of_one_parameter_is_asked_for(tmp_path: Path) -> None:
     """A GD300 beyond its own limits: that it has a write to RAM alone is only assumed."""
     file = tmp_path / "gd300.toml"
     with drivebus.Simulator({1: "gd300"}, transport="tcp" if os.name == "nt" else "pty", baudrate=BAUD) as simulator:
-        assert run(simulator, "--profile", "gd300", "backup", file, "--force").exit_code == 0
-        text = file.read_text().replace('value = 50.00, unit = "Hz", raw = 5000', "value = 60.00")
-        file.write_text(text.replace("P00.03 = { value = 60.00", "P00.03 = { value = 70.00"))
         with drivebus.Bus(simulator) as bus:
-            for address, word in ((0x8003, 9000), (0x0004, 8000)):
+            for address, word in ((0x0003, 7000), (0x0004, 6000)):
+                bus.write(1, address, word)
+        assert run(simulator, "--profile", "gd300", "backup", file).exit_code == 0
+        with drivebus.Bus(simulator) as bus:
+            for address, word in ((0x0004, 5000), (0x0003, 5000), (0x8003, 9000), (0x0004, 8000)):
                 bus.write(1, address, word)
         simulator.drive(1).power_cycle()
         refused = run(simulator, "--profile", "gd300", "restore", file, "--yes", "--group", "P00")

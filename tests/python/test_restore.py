@@ -79,6 +79,48 @@ def test_a_dry_run_writes_nothing_and_says_the_same(virtual: Simulator, drive: D
     assert [item.code for item in plan.having("planned")] == [item.code for item in report.having("restored")]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        'P00.14 = { value = 5.0, unit = "kHz", raw = 50, told = 40 }',
+        "P00.14 = { value = 5.0, told = 40 }",
+        "P00.14 = { value = 5.0, raw = 50 }",
+    ],
+)
+def test_what_was_changed_by_hand_and_is_not_verified_needs_to_be_asked_for(
+    virtual: Simulator, drive: Drive, tmp_path: Path, line: str
+) -> None:
+    """That P00.14 of a GD350 is the carrier frequency, in tenths of a kilohertz, is printed for sister series only."""
+    path = tmp_path / "drive.toml"
+    lines = drive.backup(path).text().splitlines()
+    [mine] = [index for index, text in enumerate(lines) if text.startswith("P00.14 = ")]
+    assert lines[mine].startswith('P00.14 = { value = 4.0, unit = "kHz", raw = 40, told = 40 }')
+    lines[mine] = line
+    path.write_text("\n".join(lines))
+    for dry_run in (True, False):
+        report = drive.restore(path, dry_run=dry_run)
+        [item] = report.having("blocked")
+        assert (item.code, report.ok) == ("P00.14", False)
+        assert "not what the drive told" in item.reason
+        assert "`--unverified`" in item.reason
+    assert stored(virtual) == []
+    assert [item.code for item in drive.restore(path, unverified=True).having("restored")] == ["P00.14"]
+    assert stored(virtual) == [0x000E]
+    assert drive.restore(path).ok
+
+
+def test_what_was_changed_by_hand_and_is_verified_is_written(drive: Drive, tmp_path: Path) -> None:
+    path = tmp_path / "drive.toml"
+    text = (
+        drive.backup(path)
+        .text()
+        .replace('P00.11 = { value = 10.0, unit = "s", raw = 100 }', "P00.11 = { value = 3.0 }")
+    )
+    path.write_text(text)
+    assert [item.code for item in drive.restore(path).having("restored")] == ["P00.11"]
+    assert drive.read("P00.11") == 3.0
+
+
 def test_sources_of_commands_come_last(drive: Drive, store: Store) -> None:
     drive.prepare_control(store=True)
     store(drive, {"P00.11": 3.0})
@@ -345,3 +387,16 @@ def test_another_family_is_given_only_by_force_what_is_the_same_there(
                 == "P14.01 is another thing in a Veikong VFD500: A percentage whose name is not printed"
             )
     assert virtual.drive(1).take_writes()[-1][2] == 30
+
+
+def test_another_family_is_given_what_is_not_verified_there_only_where_that_is_asked(
+    drive: Drive, store: Store
+) -> None:
+    store(drive, {"P00.14": 5.0})
+    kept = drive.backup()
+    with Simulator({1: "gd300"}, transport="process", clock="virtual") as others, Bus(others) as bus:
+        other = bus.drive(1, "gd300")
+        report = {item.code: item.result for item in other.restore(kept, force=True)}
+        assert report["P00.14"] == "blocked"
+        report = {item.code: item.result for item in other.restore(kept, force=True, unverified=True)}
+        assert report["P00.14"] == "restored"

@@ -6,7 +6,7 @@ Plain data beside the profile that says what they mean; how it looks in a file i
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -75,10 +75,12 @@ class Backup(Mapping[str, Value]):
         unread: Why each of the others is not among them.
         complete: Whether all that can be read was read; a backup that was interrupted is not.
         profile: What its words mean.
+        told: The words that the drive told: those of `raw`, unless a file was changed by hand.
+        in_ram: What the program that took it had written to RAM alone before: lost when the drive is switched off.
         translated_from: The family whose codes they were, where the same values stand under the codes of another.
     """
 
-    __slots__ = ("complete", "origin", "profile", "raw", "translated_from", "unread")
+    __slots__ = ("complete", "in_ram", "origin", "profile", "raw", "told", "translated_from", "unread")
 
     def __init__(
         self,
@@ -88,6 +90,8 @@ class Backup(Mapping[str, Value]):
         profile: ProfileProtocol,
         *,
         complete: bool = True,
+        told: Mapping[str, int] | None = None,
+        in_ram: Iterable[str] = (),
         translated_from: str | None = None,
     ) -> None:
         place = Rules(profile).place
@@ -96,6 +100,8 @@ class Backup(Mapping[str, Value]):
         self.unread: Mapping[str, str] = dict(sorted(unread.items(), key=lambda item: place(item[0])))
         self.profile = profile
         self.complete = complete
+        self.told: Mapping[str, int] = self.raw if told is None else dict(told)
+        self.in_ram = frozenset(in_ram)
         self.translated_from = translated_from
 
     @classmethod
@@ -112,7 +118,7 @@ class Backup(Mapping[str, Value]):
         """
         path = Path(path)
         found = parse.parse(path, disk.read(path), _shipped if profile is None else _meant_by(profile))
-        return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete)
+        return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete, told=found.told)
 
     def diff(self, other: Backup | None = None, *, everything: bool = False) -> Diff:
         """How *other* differs from this one; how this differs from what the factory set, as far as known, for None.
@@ -147,7 +153,19 @@ class Backup(Mapping[str, Value]):
                 raw[code] = profile.encode(code, value)
             except NotAllowed as error:
                 unread[code] = str(error)
-        return Backup(self.origin, raw, unread, profile, complete=self.complete, translated_from=self.origin.family)
+        return Backup(
+            self.origin, raw, unread, profile, complete=self.complete, told={}, translated_from=self.origin.family
+        )
+
+    def unproved(self, code: str) -> str | None:
+        """Why the word of *code* rests on what is not verified for the family; None where it does not.
+
+        What a drive told is its own word, whatever it means.
+        """
+        known = self.profile.describe(code)
+        if known.evidence == "verified" or self.told.get(code) == self.raw[code]:
+            return None
+        return known.reason or "no document of this family says so"
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file, whole or not at all: what was there before is there until the new one is."""
@@ -155,7 +173,7 @@ class Backup(Mapping[str, Value]):
 
     def text(self) -> str:
         """What stands in the file: sorted, one parameter a line."""
-        return text.text(self.origin, self.raw, self.unread, self.profile, self.complete)
+        return text.text(self)
 
     def __getitem__(self, code: str) -> Value:
         return text.worded(self.profile, code, self.raw[code])

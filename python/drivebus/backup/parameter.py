@@ -12,7 +12,7 @@ from drivebus.values import Description
 
 __all__ = ["FIELDS", "Wrong", "word"]
 
-FIELDS = ("value", "unit", "raw", "beyond")
+FIELDS = ("value", "unit", "raw", "told", "beyond")
 """What may stand in the line of a parameter."""
 
 
@@ -20,8 +20,8 @@ class Wrong(Exception):
     """What is wrong with one line."""
 
 
-def word(profile: ProfileProtocol, code: str, fields: object) -> int:
-    """The word that the line of *code* stands for.
+def word(profile: ProfileProtocol, code: str, fields: object) -> tuple[int, int | None]:
+    """The word that the line of *code* stands for, and the word that the drive told, where the line has that.
 
     Raises:
         Wrong: Something does not fit.
@@ -34,7 +34,7 @@ def word(profile: ProfileProtocol, code: str, fields: object) -> int:
             raise Wrong(f"{code} has no field {key!r}{checks.closest(key, FIELDS)}")
     if "value" not in fields:
         raise Wrong(f"{code} lacks its value; write {_example(profile, known)}")
-    value, unit, raw, beyond = (fields.get(key) for key in FIELDS)
+    value, unit, raw, told, beyond = (fields.get(key) for key in FIELDS)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise Wrong(f"{code}: value {_shown(value)} is no number")
     if "unit" in fields and unit != known.unit:
@@ -42,12 +42,20 @@ def word(profile: ProfileProtocol, code: str, fields: object) -> int:
     if "beyond" in fields and not isinstance(beyond, bool):
         raise Wrong(f"{code}: beyond must be true or false, and is {_shown(beyond)}")
     most = (1 << 16 * known.words) - 1
-    if "raw" in fields and (isinstance(raw, bool) or not isinstance(raw, int) or not 0 <= raw <= most):
-        raise Wrong(f"{code}: raw {_shown(raw)} is no whole number in 0..{most}")
+    for key in ("raw", "told"):
+        given = fields.get(key, 0)
+        if isinstance(given, bool) or not isinstance(given, int) or not 0 <= given <= most:
+            raise Wrong(f"{code}: {key} {_shown(given)} is no whole number in 0..{most}")
+    return _meant(profile, known, value, raw, beyond is True), told
+
+
+def _meant(profile: ProfileProtocol, known: Description, value: float, raw: int | None, beyond: bool) -> int:
+    """The word for *value*, with which *raw* has to agree."""
+    code = known.code or ""
     if raw is not None and (beyond or known.words > 1):
         if profile.decode(code, raw) != value:
             raise Wrong(_disagree(profile, known, value, raw))
-        return int(raw)
+        return raw
     if known.words > 1:
         raise Wrong(f"{code} has two words: its line needs `raw`")
     try:

@@ -55,12 +55,14 @@ class Parsed:
         profile: What its words mean.
         origin: The fields of an `Origin`.
         raw: The word of each parameter.
+        told: The word that the drive told, of those whose line has that.
         complete: Whether the backup was finished.
     """
 
     profile: ProfileProtocol
     origin: dict[str, Any]
     raw: dict[str, int]
+    told: dict[str, int]
     complete: bool
 
 
@@ -115,7 +117,7 @@ def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], Pr
         raise file.refuse()
     if callable(profile):
         profile = profile(file.drive["family"])
-    raw = _parameters(file, profile)
+    raw, told = _parameters(file, profile)
     if file.wrong:
         raise file.refuse(profile)
     origin = {
@@ -129,7 +131,7 @@ def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], Pr
         "taken": datetime.fromtimestamp(0, timezone.utc),
         **file.drive,
     }
-    return Parsed(profile, origin, raw, file.top.get("complete", True))
+    return Parsed(profile, origin, raw, told, file.top.get("complete", True))
 
 
 def _line(file: _File, number: int, data: bytes) -> None:
@@ -201,16 +203,19 @@ def _check_head(file: _File) -> None:
         file.wrong.append((1, 'the file does not say whose it is: [drive] lacks a line such as family = "gd350"'))
 
 
-def _parameters(file: _File, profile: ProfileProtocol) -> dict[str, int]:
-    """The word of each parameter; what is wrong is noted."""
+def _parameters(file: _File, profile: ProfileProtocol) -> tuple[dict[str, int], dict[str, int]]:
+    """The word of each parameter, and what the drive told where a line has that; what is wrong is noted."""
     raw: dict[str, int] = {}
+    told: dict[str, int] = {}
     lines: dict[str, int] = {}
     for number, code, value in file.parameters:
         try:
-            taken = word(profile, code, value)
+            meant, was = word(profile, code, value)
             if code in lines:
                 raise Wrong(f"{code} is given twice; it stands in line {lines[code]} already")
-            raw[code], lines[code] = taken, number
+            raw[code], lines[code] = meant, number
+            if was is not None:
+                told[code] = was
         except Wrong as error:
             file.wrong.append((number, str(error)))
-    return raw
+    return raw, told

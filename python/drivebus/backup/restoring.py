@@ -60,7 +60,7 @@ class Restore:
         for code in wanted:
             if code not in self._results and code not in asked:
                 self._results[code] = ("skipped", self._rules.unasked(code, serial=serial, motor=motor) or "")
-        pending = [code for code in asked if code not in self._results and self._has_a_place(code)]
+        pending = [code for code in asked if code not in self._results and self._may_be_sent(code)]
         if pending and not self._dry_run:
             await self._check_stopped(pending)
         self._pending = len(pending)
@@ -98,12 +98,16 @@ class Restore:
             elif words.raw[code] == self._backup.raw[code] and not self._drive._is_in_ram(code):
                 self._results[code] = ("same", "")
 
-    def _has_a_place(self, code: str) -> bool:
-        """Whether the family's rule says where *code* is stored; known of all before the first is written."""
+    def _may_be_sent(self, code: str) -> bool:
+        """Whether it is known where *code* is stored, and what its value means; of all, before the first is written."""
+        unproved = None if self._drive.unverified else self._backup.unproved(code)
         try:
             place(self._drive, code, store=True)
         except NotAllowed as error:
             self._results[code] = ("blocked", str(error))
+        else:
+            if unproved is not None:
+                self._results[code] = ("blocked", _unproved(unproved))
         return code not in self._results
 
     async def _check_stopped(self, pending: Sequence[str]) -> None:
@@ -271,6 +275,13 @@ def _by_way_of(codes: Sequence[str]) -> str:
     return (
         f"; what the drive has is beyond its own limits, and only another value of {' and '.join(codes)} leads there, "
         "on the way. Its family has no known write to RAM alone: with twice=True (`--twice`) memory is written twice"
+    )
+
+
+def _unproved(reason: str) -> str:
+    return (
+        f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With unverified=True "
+        "(`--unverified`) it is written all the same"
     )
 
 

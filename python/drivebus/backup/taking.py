@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from drivebus._native import __version__
 from drivebus.backup import disk
@@ -14,6 +15,9 @@ from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed, Refused
 from drivebus.registers import Registers
+
+if TYPE_CHECKING:
+    from drivebus.backup.keeping import Keeping
 
 __all__ = ["Progress", "origin_of", "take"]
 
@@ -65,7 +69,7 @@ def _may_be_asked(drive: Registers, name: str) -> bool:
     return known.address is not None and (known.evidence != "assumed" or drive.unverified)
 
 
-async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
+async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
     """Reads every parameter that can be read. What was read before a break is not read again.
 
     Raises:
@@ -87,12 +91,20 @@ async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool
         if before is not None:
             origin = replace(origin, taken=before.origin.taken)
             raw = {code: word for code, word in before.raw.items() if code in codes}
+            for code in raw.keys() & before.told.keys():
+                # What was changed by hand meanwhile is read again.
+                if before.told[code] != raw[code]:
+                    del raw[code]
     reader = Reader(drive, [code for code in codes if code not in raw])
     total, done, steps = len(codes), len(raw), 0
 
+    def taken(complete: bool) -> Backup:
+        in_ram = filter(drive._is_in_ram, raw)
+        return Backup(origin, raw, unread, drive.profile, complete=complete, in_ram=in_ram)
+
     def keep() -> None:
         if path is not None:
-            Backup(origin, raw, unread, drive.profile, complete=False).save(disk.part_of(path))
+            taken(complete=False).save(disk.part_of(path))
 
     # Whether it can be written there at all is known before the drive is asked for an hour.
     keep()
@@ -111,7 +123,7 @@ async def take(drive: Registers, path: Path | None, *, resume: bool, force: bool
     except BaseException:
         keep()
         raise
-    backup = Backup(origin, raw, unread, drive.profile)
+    backup = taken(complete=True)
     if path is not None:
         backup.save(path)
         disk.remove(disk.part_of(path))

@@ -6,7 +6,6 @@ The same drive gives the same lines, so that version control shows what changed 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from drivebus.backup.rules import Rules
@@ -15,7 +14,7 @@ from drivebus.protocols import ProfileProtocol
 from drivebus.values import Choice, Value
 
 if TYPE_CHECKING:
-    from drivebus.backup.model import Origin
+    from drivebus.backup.model import Backup
 
 __all__ = ["FORMAT", "number", "printable", "text", "worded"]
 
@@ -23,15 +22,15 @@ FORMAT = 1
 
 _HEAD = """\
 # The parameters of one drive. A line may be changed or taken out: change the value, and the raw word with it or take
-# `raw = …` out. `drivebus diff` compares this file with the drive, `drivebus restore` shows what it would write first.
+# `raw = …` out. `told` is what the drive told where no document of its family says what that means: leave it as it is.
+# `drivebus diff` compares this file with the drive, `drivebus restore` shows what it would write first.
 """
 
 
-def text(
-    origin: Origin, raw: Mapping[str, int], unread: Mapping[str, str], profile: ProfileProtocol, complete: bool
-) -> str:
+def text(backup: Backup) -> str:
     """The whole file."""
-    header: dict[str, Any] = {"format": FORMAT, "complete": complete}
+    origin, raw, unread, profile = backup.origin, backup.raw, backup.unread, backup.profile
+    header: dict[str, Any] = {"format": FORMAT, "complete": backup.complete}
     lines = [_HEAD.rstrip("\n"), *(f"{key} = {_toml(value)}" for key, value in header.items()), "", "[drive]"]
     for key in (
         "family",
@@ -54,9 +53,10 @@ def text(
     rules = Rules(profile)
     sections: dict[str, list[str]] = {"parameters": [], "readings": []}
     for code in sorted({*raw, *unread}, key=rules.place):
-        section = sections["parameters" if rules.uncompared(code) is None else "readings"]
+        is_set = rules.uncompared(code) is None
+        section = sections["parameters" if is_set else "readings"]
         if code in raw:
-            section.append(_line(profile, code, raw[code]))
+            section.append(_line(backup, code, is_set))
         else:
             section.append(printable(f"# {code} ({profile.describe(code).label}) is not here: {unread[code]}"))
     lines += ["", "[parameters]", *sections["parameters"]]
@@ -69,15 +69,20 @@ def text(
     return "\n".join(lines) + "\n"
 
 
-def _line(profile: ProfileProtocol, code: str, raw: int) -> str:
+def _line(backup: Backup, code: str, is_set: bool) -> str:
+    profile, raw = backup.profile, backup.raw[code]
     known = profile.describe(code)
     value = worded(profile, code, raw)
     fields = {"value": number(value, known.scale), "raw": str(raw)}
     if known.unit:
         fields = {"value": fields["value"], "unit": _toml(known.unit), "raw": fields["raw"]}
+    if is_set and known.evidence != "verified" and code in backup.told:
+        fields["told"] = str(backup.told[code])
     if _is_beyond(profile, code, raw):
         fields["beyond"] = "true"
     comment = f"{known.label}: {value.label}" if isinstance(value, Choice) else known.label
+    if code in backup.in_ram:
+        comment += "; in RAM alone, where the program that took this had put it: lost when the drive is switched off"
     inside = ", ".join(f"{key} = {shown}" for key, shown in fields.items())
     return printable(f"{code} = {{ {inside} }}  # {comment}")
 
