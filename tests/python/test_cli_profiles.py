@@ -156,9 +156,14 @@ class TestDescribe:
         assert [row["name"] for row in rows("--profile", EX9, "describe", "setfrequency")] == ["set_frequency"]
         assert [row["name"] for row in rows("--profile", "gd350", "describe", "rpm")] == ["rotation_speed"]
 
+    def test_a_misspelt_word_and_what_the_field_calls_it_are_found(self) -> None:
+        for text, name in (("out_curent", "output_current"), ("amps", "output_current"), ("P14-04", "P14.04")):
+            assert name in [row["code"] or row["name"] for row in rows("--profile", EX9, "describe", text)][:3]
+        assert "no 'dc link'" in run("--profile", "gd350", "describe", "dc", "link").stdout
+
     def test_nothing_that_comes_near(self) -> None:
-        result = run("--profile", EX9, "describe", "out_curent")
-        assert (result.exit_code, "output_current" in result.stderr) == (2, True)
+        result = run("--profile", EX9, "describe", "frobnicate")
+        assert (result.exit_code, 'no "frobnicate"; the closest is' in result.stderr) == (2, True)
 
     def test_a_variant_decides_the_unit(self) -> None:
         [plain] = rows("--profile", EX9, "describe", "set_speed")

@@ -62,6 +62,7 @@ mod search;
 mod serial;
 mod setpoint;
 mod state;
+mod synonyms;
 mod value;
 mod variant;
 mod watchdog;

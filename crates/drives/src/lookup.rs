@@ -72,8 +72,25 @@ impl Profile {
         Err(NameError::Unknown {
             profile: self.name().to_owned(),
             name: name.to_owned(),
-            closest: closest(wanted, self.entries().flat_map(names)).unwrap_or_default().to_owned(),
+            closest: self.closest(wanted).to_owned(),
         })
+    }
+
+    /// The entry whose code or address somebody typed, if not as it is printed.
+    pub(crate) fn find_loosely(&self, text: &str) -> Option<&Entry> {
+        match parse_loose_code(text) {
+            Some((group, index)) => {
+                self.entry_at(parameter_address(group, index)).filter(|entry| entry.code().is_some())
+            }
+            None => self.entry_at(parse_loose_address(text)?),
+        }
+    }
+
+    /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds.
+    fn closest(&self, name: &str) -> &str {
+        let names = || self.entries().flat_map(names);
+        let found = || self.search(name, 1).first().map(|entry| entry.alias().unwrap_or(entry.name()));
+        near(name, names()).or_else(found).or_else(|| closest(name, names())).unwrap_or_default()
     }
 
     fn unknown_address(&self, name: &str, address: u16) -> NameError {
@@ -103,6 +120,25 @@ pub(crate) fn parse_code(text: &str) -> Option<(u8, u8)> {
     Some((number(group)?, number(index)?))
 }
 
+/// Reads a code as people type it: `P00-11`, `p 0,11`, `P0011`. Only to look for something: what is read or written has to
+/// be named.
+fn parse_loose_code(text: &str) -> Option<(u8, u8)> {
+    let text: String = text.split_whitespace().collect();
+    let code = text.strip_prefix(['P', 'p', 'R', 'r'])?;
+    let (group, index) = match code.split_once(['.', '-', '_', ',', ':', '/']) {
+        Some(parts) => parts,
+        None if code.len() == 4 => (code.get(..2)?, code.get(2..)?),
+        None => return None,
+    };
+    parse_code(&format!("P{group}.{index}"))
+}
+
+/// Reads an address as people type it, also without a sign that it is one: `2103`, `0x 2103`. Likewise.
+fn parse_loose_address(text: &str) -> Option<u16> {
+    let text: String = text.split_whitespace().collect();
+    parse_address(&text).or_else(|| (text.len() == 4).then(|| parse_address(&format!("0x{text}"))).flatten())
+}
+
 /// The address of a parameter by the rule group.index: P05.06 is 0506H, P10.01 is 0A01H.
 pub(crate) fn parameter_address(group: u8, index: u8) -> u16 {
     u16::from_be_bytes([group, index])
@@ -130,6 +166,18 @@ pub(crate) fn closest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>)
     })
 }
 
+/// The candidate that `name` is most likely a misspelling of; `None` where none is near.
+///
+/// One letter of three may be wrong, and of a word of three none.
+pub(crate) fn near<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let letters: Vec<char> = name.to_lowercase().chars().collect();
+    let wrong = match letters.len() {
+        ..=3 => 0,
+        len => (len + 1) / 3,
+    };
+    closest(name, candidates).filter(|candidate| distance(&letters, &candidate.to_lowercase()) <= wrong)
+}
+
 /// Whether the letters of `part` stand in `whole` in their order; two of them say nothing.
 fn is_part(part: &[char], whole: &str) -> bool {
     let mut rest = whole.chars();
@@ -153,7 +201,7 @@ fn distance(from: &[char], to: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{closest, distance, parse_address, parse_code};
+    use super::{closest, distance, near, parse_address, parse_code, parse_loose_address, parse_loose_code};
 
     #[test]
     fn distances_are_levenshteins() {
@@ -173,6 +221,35 @@ mod tests {
         assert_eq!(closest("contrl", known()), Some("control_command"));
         assert_eq!(closest("P00.02", known()), Some("P00.01"));
         assert_eq!(closest("nope", ["gd350", "gd600-rectifier"].into_iter()), Some("gd350"));
+    }
+
+    #[test]
+    fn only_what_is_spelt_like_it_is_near() {
+        let known = || ["ramp", "current", "acceleration", "brake"].into_iter();
+        for (typed, meant) in
+            [("curent", "current"), ("acelleration", "acceleration"), ("Rampe", "ramp"), ("brkae", "brake")]
+        {
+            assert_eq!(near(typed, known()), Some(meant), "{typed}");
+        }
+        for typed in ["ram", "cur", "frobnicate", ""] {
+            assert_eq!(near(typed, known()), None, "{typed}");
+        }
+    }
+
+    #[test]
+    fn codes_and_addresses_are_looked_for_as_people_type_them() {
+        for text in ["P00-11", "p00.11", "P0.11", "p 00,11", "P0011", "r00:11"] {
+            assert_eq!(parse_loose_code(text), Some((0, 11)), "{text}");
+        }
+        for text in ["", "p", "P00", "P001", "P00110", "00.11", "ramp", "power", "P00.1.1", "päöü", "pééé"] {
+            assert_eq!(parse_loose_code(text), None, "{text}");
+        }
+        for text in ["2103", "2103h", "2103 H", "0x2103", "0x 2103"] {
+            assert_eq!(parse_loose_address(text), Some(0x2103), "{text}");
+        }
+        for text in ["", "210", "21033", "ramp", "+103", "ééé"] {
+            assert_eq!(parse_loose_address(text), None, "{text}");
+        }
     }
 
     #[test]

@@ -24,7 +24,8 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
     """Say all that is known of a register or parameter, or search for one.
 
     A name, code or address is described. Anything else (`drivebus describe torque`) lists what has it in its name,
-    label, choices or note, best first. With --profile, no drive is asked.
+    label, choices or note, best first; "ramp" or "dc link" finds what else it is called. With --profile, no drive is
+    asked.
     """
     profile = session.known_profile()
     wanted = " ".join(text)
