@@ -127,7 +127,7 @@ def _numbered(history: list[drivebus.Fault]) -> list[tuple[str, drivebus.Fault]]
 def _show_known(session: Session, text: str) -> None:
     """The faults of the family that *text* means; all for none. One alone is told with all that is known of it."""
     profile = session.known_profile()
-    known = _meant(profile.faults(), text)
+    known = _meant(profile.faults(), text) if text else profile.faults()
     if text and not known:
         raise drivebus.NotAllowed(
             f"{profile.name} names no fault {text!r}; `drivebus faults --all` lists those it names"
