@@ -16,8 +16,13 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 import drivebus
+
+# A busy machine takes its time: nothing here is judged by the clock on the wall.
+settings.register_profile("drivebus", deadline=None)
+settings.load_profile("drivebus")
 
 # Whoever starts the tests in the background may have them ignore these, and the programs under test would inherit it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
