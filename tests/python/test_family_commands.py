@@ -31,6 +31,7 @@ BEFORE = {"stop": "run_forward", "coast": "run_forward", "jog_stop": "jog_forwar
 """What must go on for a command to have something to end."""
 
 EVERY = [(family, command) for family in FAMILIES for command in COMMANDS]
+REGISTERS = {given(family["commands"]["register"]) for family in FAMILIES} - {None}
 KNOWN = [(family, command) for family, command in EVERY if given(family["commands"][command]) is not None]
 
 
@@ -69,7 +70,7 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
         address = int.from_bytes(frame[2:4], "big")
         data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
         words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
-        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in (0x2000, 0x7000)]
+        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in REGISTERS]
     return found
 
 

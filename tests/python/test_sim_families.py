@@ -174,7 +174,10 @@ def test_what_is_meant_for_another_family_reaches_nothing(simulator: Simulator, 
 
 def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
-        assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
+        if family == "chf100a":  # its manual names 03H and 06H (p. 107)
+            assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == 0x01
+        else:
+            assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
         assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == 0x01, family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):

@@ -66,7 +66,7 @@ fn what_no_page_shows_is_not_there() {
         ("gd600-rectifier", &[0x2001, 0x2101, 0x2102, 0x3000, 0x0B00, 0x0001]),
         ("gd3000", &[0x2002, 0x2101, 0x2103, 0x3002, 0x5000, 0x000A, 0x0E05, 0x0B00]),
         ("gd3000-rectifier", &[0x2001, 0x2101, 0x2102, 0x3000, 0x0E00, 0x0001]),
-        ("chf100a", &[0x1000, 0x2000, 0x2100, 0x0000, 0x0001, 0x3017]),
+        ("chf100a", &[0x2001, 0x2100, 0x2103, 0x0000, 0x0001, 0x3017]),
         ("chv100", &[0x1000, 0x2000, 0x2100, 0x0000, 0x0001, 0x3017]),
     ] {
         let mut bench = Bench::of(family);
@@ -138,7 +138,7 @@ fn the_rectifier_of_goodrive3000_keeps_its_serial_settings_in_group_11() {
 }
 
 #[test]
-fn chf100a_and_chv100_show_the_block_at_3000h_and_obey_nobody() {
+fn chf100a_and_chv100_show_the_block_at_3000h() {
     for family in ["chf100a", "chv100"] {
         let mut bench = Bench::of(family);
         let [running, set, bus, ..] = bench.read::<16>(0x3000);
@@ -147,4 +147,30 @@ fn chf100a_and_chv100_show_the_block_at_3000h_and_obey_nobody() {
         bench.drive().trip(3).unwrap();
         assert_eq!(bench.read::<1>(0x5000), [3], "{family}");
     }
+}
+
+/// CHF100A manual, p. 107: commands at 1000H, the state at 1001H, a setpoint in percent at 2000H.
+#[test]
+fn chf100a_takes_commands_at_1000h_and_no_command_at_2000h() {
+    let mut bench = Bench::of("chf100a");
+    assert_eq!(bench.ask(1, &[0x08, 0, 0, 0x12, 0xAB]), Some(vec![0x88, 0x01]));
+    for code in 1..=8 {
+        bench.write(0x2000, code); // at most 0.08 %
+    }
+    bench.refuses_write(0x2000, 10_001, 0x04);
+    bench.write(0x2000, (-10_000_i16).cast_unsigned());
+    assert_eq!((bench.read::<1>(0x1001), bench.drive().state()), ([3], "stopped"));
+    for (code, state) in [(1, 1), (6, 3), (2, 2), (6, 3)] {
+        bench.write(0x1000, code);
+        assert_eq!(bench.read::<1>(0x1001), [state], "{code}");
+        let begin = bench.taken();
+        bench.go_to(begin, 120.0); // a coasting motor comes to rest
+    }
+    for code in [0, 9] {
+        bench.refuses_write(0x1000, code, 0x04);
+    }
+    bench.drive().trip(3).unwrap();
+    assert_eq!(bench.read::<1>(0x1001), [4]);
+    bench.write(0x1000, 7);
+    assert_eq!(bench.read::<1>(0x1001), [3]);
 }

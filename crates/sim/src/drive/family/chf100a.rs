@@ -1,19 +1,32 @@
-//! CHF100A and CHV100: the block at 3000H, to read, that Goodrive350's manual names as compatible with them.
+//! CHF100A and CHV100: the block at 3000H, to read, that Goodrive350's manual names as compatible with them. CHF100A also
+//! takes commands at 1000H, shows its state at 1001H and takes a setpoint in hundredths of a percent at 2000H (CHF100A
+//! manual, p. 107, which names 03H and 06H and no other function).
 //!
-//! Their own way of taking commands is in no page at hand: the bus cannot move them, and every other address is refused
-//! with 02H.
+//! How CHV100 takes commands is in no page at hand: the bus cannot move it. Every other address is refused with 02H.
 //!
 //! - Assumption: they have the identification code at 3016H and the fault number at 5000H too; the code is unknown and
 //!   reads as 0.
-//! - Assumption: exceptions are those of Goodrive350.
+//! - Assumption: exceptions are those of Goodrive350, and 1000H reads as the last command.
+//! - Assumption: CHF100A obeys the bus always, and its speed comes from elsewhere: which parameters hand either to the
+//!   bus is not printed. So what is written to 2000H moves nothing, and it reads as 0.
+//! - Assumption: 3006H counts tenths of a percent.
 
-use super::{Family, Faults, Kind, Memory, Roles, gd350};
+use super::{Family, Faults, Kind, Memory, Range, Register, Roles, Shows, gd350};
 
-pub(crate) static CHF100A: Family = FAMILY;
-pub(crate) static CHV100: Family = Family { name: "chv100", ..FAMILY };
+pub(crate) static CHF100A: Family = Family {
+    name: "chf100a",
+    functions: &[0x03, 0x06],
+    control: 0x1000,
+    command: Some(0x1000),
+    commands: gd350::commands,
+    registers: &[CONTROL, gd350::MONITOR],
+    roles: Roles { speed_source: Some(NEVER), ..Roles::NONE },
+    ..FAMILY
+};
+pub(crate) static CHV100: Family = FAMILY;
 
 const FAMILY: Family = Family {
-    name: "chf100a",
+    name: "chv100",
     kind: Kind::Inverter,
     functions: &[0x03, 0x06, 0x08],
     exception: gd350::exception,
@@ -29,3 +42,12 @@ const FAMILY: Family = Family {
     roles: Roles::NONE,
     faults: Faults { overload: 11, silent_bus: 18 },
 };
+
+/// A parameter that is not there has no value.
+const NEVER: (u16, u16) = (u16::MAX, 0);
+
+const CONTROL: &[Register] = &[
+    Register::set(0x1000, Range::Words(1, 8)),
+    Register::read(0x1001, Shows::State([1, 2, 3, 4])),
+    Register::set(0x2000, Range::Signed(-10_000, 10_000)),
+];
