@@ -123,7 +123,7 @@ PYTHON: dict[str, set[str]] = {
         "watchdog",
         "who",
     },
-    "doctor": {"_native", "bus", "checks", "drive", "errors", "found", "ports", "rtu", "sim", "values"},
+    "doctor": {"_native", "bus", "checks", "drive", "errors", "found", "ports", "profile", "rtu", "sim", "values"},
     "__main__": {"cli"},
     "__init__": {
         "_native",

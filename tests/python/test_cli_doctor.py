@@ -72,6 +72,41 @@ def test_the_options_before_the_command_count() -> None:
     assert {row["unit"] for row in behind} == {None, 1}
 
 
+def test_a_unit_that_does_not_say_what_it_is_can_be_named() -> None:
+    """A GD600 has no identification code. Its P00.01 and P00.06 are asked for where it was named."""
+    unknown = rows(run("--json", "doctor", "sim://gd600?clock=virtual"))
+    assert "control" not in {row["name"] for row in unknown}
+    [control] = [row for row in rows(named("gd600")) if row["name"] == "control"]
+    assert "P00.01" in control["text"]
+    assert "`drivebus --profile gd600" in control["advice"]
+
+
+def test_what_is_not_known_is_not_said_to_be_well() -> None:
+    """What makes a CHF100A obey the bus is not known; the fault register of a GD600 is assumed."""
+    [control] = [row for row in rows(named("chf100a")) if row["name"] == "control"]
+    assert (control["severity"], "is not known" in control["text"]) == ("note", True)
+    [fault] = [row for row in rows(named("gd600")) if row["name"] == "fault"]
+    assert (fault["severity"], "--unverified" in fault["text"]) == ("note", True)
+    assert "fault" not in {row["name"] for row in rows(named("gd600", "--unverified"))}
+
+
+def named(family: str, *words: str) -> Result:
+    return run("--json", "--profile", family, *words, "doctor", f"sim://{family}?clock=virtual")
+
+
+def test_a_unit_that_says_what_it_is_is_not_taken_for_another() -> None:
+    result = run("--json", "--profile", "vfd500", "doctor", SIM, "--unit", "1")
+    [family] = [row for row in rows(result) if row["name"] == "family"]
+    assert (result.exit_code, family["severity"], "gd350" in family["text"]) == (2, "warning", True)
+    assert "DRIVEBUS_PROFILE" in family["advice"]
+    assert run("--profile", "gd350", "doctor", SIM).exit_code == 0
+
+
+def test_a_profile_that_is_none_opens_nothing() -> None:
+    result = run("--profile", "gd355", "doctor", "/dev/ttyNoSuchPort")
+    assert (result.exit_code, "gd350" in result.stderr, result.stdout) == (2, True, "")
+
+
 @pytest.mark.skipif(os.name == "nt", reason="no pty")
 @pytest.mark.parametrize("command", ["doctor", "status"])
 def test_the_direction_is_asked_for(command: str) -> None:

@@ -46,7 +46,8 @@ def doctor(
 ) -> None:
     """Find what is wrong with an adapter, a line and its units, and say what to do. Reads only.
 
-    Without --unit, addresses 1 to 32 are asked. Where nobody answers, other baud rates and parities are tried.
+    Without --unit, addresses 1 to 32 are asked. Where nobody answers, other baud rates and parities are tried. A
+    --profile before the command is for units that do not say themselves what they are.
     """
     port = port or session.port
     if port is None:
@@ -67,6 +68,8 @@ def doctor(
             full=full,
             listen=listen,
             rs485=session.direction,
+            profile=session.profile,
+            unverified=session.unverified,
             tell=status.update if status is not None else None,
         )
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.

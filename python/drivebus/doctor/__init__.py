@@ -22,6 +22,7 @@ from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard_findings, overh
 from drivebus.doctor.unit import unit_findings
 from drivebus.errors import BadAnswer, NoAnswer, PortError
 from drivebus.found import Found
+from drivebus.profile import Profile
 from drivebus.sim import Simulator
 
 __all__ = ["Finding", "Severity", "examine"]
@@ -57,6 +58,8 @@ def examine(
     listen: float = 1.0,
     echoes: int = 25,
     rs485: Mapping[str, object] | None = None,
+    profile: str | os.PathLike[str] | Profile | None = None,
+    unverified: bool = False,
     tell: Callable[[str], None] | None = None,
     open: Callable[..., Bus] = Bus,  # noqa: A002 - what it is
 ) -> Generator[Finding, None, None]:
@@ -76,6 +79,8 @@ def examine(
         listen: Seconds to listen before anything is asked.
         echoes: How many each unit is asked for.
         rs485: As for `Bus`.
+        profile: What those units are that do not say it themselves; as for `Bus.drive`.
+        unverified: Whether what no document of a family proves is read too.
         tell: Is called with what is being done, for whoever watches.
         open: What opens a bus; called as `Bus` is, for each of the settings tried.
 
@@ -87,14 +92,19 @@ def examine(
         checks.unit(unit)
     listen = checks.number("listen", listen, 0.0, 3600.0)
     echoes = checks.whole("echoes", echoes, 1, 100_000) * (10 if full else 1)
+    named = None if profile is None else Profile.find(profile)
     say = tell or (lambda _: None)
+    checks.flag("unverified", unverified)
+
+    def about(bus: Bus, found: Found) -> Iterator[Finding]:
+        return unit_findings(bus, found, echoes, say, named, unverified)
 
     def opened(settings: Settings) -> Bus:
         options: dict[str, Any] = {**vars(settings), "rs485": rs485, "read_only": True}
         return open(port, **options)
 
     given = Settings(baudrate, bytesize, parity, stopbits)
-    return _examine(port, unit, given, full, listen, echoes, say, opened, _has_settings(port))
+    return _examine(port, unit, given, full, listen, about, say, opened, _has_settings(port))
 
 
 def _has_settings(port: object) -> bool:
@@ -110,7 +120,7 @@ def _examine(
     given: Settings,
     full: bool,
     listen: float,
-    echoes: int,
+    about: Callable[[Bus, Found], Iterator[Finding]],
     tell: Callable[[str], None],
     opened: Callable[[Settings], Bus],
     tries_settings: bool,
@@ -170,7 +180,7 @@ def _examine(
             return
     with opened(settings) as bus:
         for each in found if full else found[:_MOST_UNITS]:
-            yield from unit_findings(bus, each, echoes, tell)
+            yield from about(bus, each)
         yield from _hints(bus)
 
 

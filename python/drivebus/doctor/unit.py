@@ -12,6 +12,7 @@ from drivebus.doctor.traffic import frames_in, is_frame
 from drivebus.drive import Drive
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, NotAllowed, Refused
 from drivebus.found import Found
+from drivebus.profile import Profile, profiles
 
 __all__ = ["unit_findings"]
 
@@ -47,8 +48,18 @@ class _Echoes:
         return len(self.turnarounds)
 
 
-def unit_findings(bus: Bus, found: Found, echoes: int, tell: Callable[[str], None]) -> Iterator[Finding]:
-    """About the unit that was *found* on *bus*. Asks *echoes* echoes and a few reads; writes nothing."""
+def unit_findings(
+    bus: Bus,
+    found: Found,
+    echoes: int,
+    tell: Callable[[str], None],
+    named: Profile | None = None,
+    unverified: bool = False,
+) -> Iterator[Finding]:
+    """About the unit that was *found* on *bus*. Asks *echoes* echoes and a few reads; writes nothing.
+
+    It is taken for what it was *named*, unless it says itself that it is something else.
+    """
     unit = found.unit
     tally = _ask(bus, unit, echoes, tell)
     tally.late = int(bus.stats()["units"].get(unit, {}).get("late_replies", 0))
@@ -59,7 +70,11 @@ def unit_findings(bus: Bus, found: Found, echoes: int, tell: Callable[[str], Non
         return
     tell(f"reading the settings of unit {unit}")
     try:
-        yield from _settings(bus.drive(unit, found.profile), bus, tally.turnarounds)
+        if named is not None and found.certainty == "certain" and found.profile != named.family:
+            yield _another(found, named)
+            named = None
+        drive = bus.drive(unit, named or found.profile, unverified=unverified)
+        yield from _settings(drive, bus, tally.turnarounds, named is not None)
     except NotAllowed as error:
         yield Finding("unit", "family", Severity.NOTE, str(error), unit=unit)
     except DrivebusError as error:
@@ -71,6 +86,19 @@ def unit_findings(bus: Bus, found: Found, echoes: int, tell: Callable[[str], Non
             unit=unit,
             error=type(error),
         )
+
+
+def _another(found: Found, named: Profile) -> Finding:
+    return Finding(
+        "unit",
+        "family",
+        Severity.WARNING,
+        f"unit {found.unit} says that it is a {found.profile}, and it was named {named.name}; it is taken for what it "
+        "says",
+        "leave --profile out, or unset DRIVEBUS_PROFILE: the same word can mean another command to another family",
+        unit=found.unit,
+        error=NotAllowed,
+    )
 
 
 def _ask(bus: Bus, unit: int, echoes: int, tell: Callable[[str], None]) -> _Echoes:
@@ -214,7 +242,7 @@ def _turnaround(unit: int, times: list[float]) -> Finding:
     return Finding("unit", "turnaround", Severity.OK, text, unit=unit, values=values)
 
 
-def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Finding]:
+def _settings(drive: Drive, bus: Bus, turnarounds: list[float], is_named: bool) -> Iterator[Finding]:
     """What the drive itself says about the bus: its delay, its time-out, its fault, and whom it obeys."""
     unit, profile = drive.unit, drive.profile
     known = set(profile.names())
@@ -242,7 +270,11 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
         if limit == 0:
             text = f"unit {unit} does not notice when the bus falls silent (P14.04 is 0)"
         yield Finding("unit", "watchdog", Severity.OK, text, unit=unit, values={"silence": limit})
-    fault = drive.fault()
+    try:
+        fault = drive.fault()
+    except NotAllowed as error:
+        fault = None
+        yield Finding("unit", "fault", Severity.NOTE, str(error), unit=unit)
     if fault is not None:
         is_ours = fault.mnemonic == _COMMUNICATION_FAULT
         yield Finding(
@@ -255,7 +287,10 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
             error=NoAnswer if is_ours else None,
         )
     control = drive.check_control()
-    if control:
+    if not len(control):
+        text = f"what makes unit {unit}, a {profile.title}, obey the bus is not known"
+        yield Finding("unit", "control", Severity.NOTE, text, unit=unit)
+    elif control:
         yield Finding("unit", "control", Severity.OK, f"unit {unit} is set to obey the bus", unit=unit)
     else:
         wrong = "; ".join(
@@ -266,7 +301,8 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float]) -> Iterator[Find
         )
         surely = any(item.actual is not None and not item.ok for item in control)
         # Only a unit that says what it is needs no --profile, and prepare writes only what is verified without a word.
-        given = f" --profile {drive.profile.name}" if drive.profile.role("identification") is None else ""
+        name = drive.profile.name if drive.profile.name in profiles() else "FOLDER"
+        given = f" --profile {name}" if is_named or drive.profile.role("identification") is None else ""
         doubtful = any(not item.ok and not item.verified for item in control)
         yield Finding(
             "unit",
