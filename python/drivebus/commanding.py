@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.evidence import Evidence
+from drivebus.falling import Fall
 from drivebus.looking import Seen
 from drivebus.setpoints import Setpoints
 from drivebus.values import ControlSource
@@ -105,16 +106,21 @@ class Commanding(Setpoints):
         except (*LINE_ERRORS, Refused) as error:
             return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
 
-    async def _confirm(self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float) -> None:
+    async def _confirm(
+        self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float, fall: Fall | None = None
+    ) -> None:
+        """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
         if within == 0 or self._planned_look().plan is None:
             return
         deadline = self.bus.now() + within
         while True:
             try:
-                seen = await self._glance(urgent=command in HALTS)
+                seen = await self._glance(urgent=command in HALTS and self.bus.now() <= deadline)
                 if await shows(seen):
                     return
                 last = f"state seen last: {seen}"
+                if fall is not None and fall.frequency is not None:
+                    last += f", at {fall.frequency:g} Hz"
                 source = seen.source
                 if source not in (ControlSource.COMMUNICATION, None):
                     last += f", with commands from the {source}"
@@ -129,7 +135,7 @@ class Commanding(Setpoints):
                     f"{_MAY[command]}; {self._seen_last()}. It was not repeated",
                     unit=self.unit,
                 ) from error
-            if self.bus.now() >= deadline:
+            if self.bus.now() >= (deadline if fall is None else fall.until):
                 break
             await self.bus.sleep(POLL_INTERVAL)
         raise Unconfirmed(

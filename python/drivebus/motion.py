@@ -6,11 +6,14 @@ never repeated. Success is what the drive's own state says afterwards; if that c
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from drivebus import checks
 from drivebus.commanding import Commanding
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.falling import Fall
 from drivebus.looking import Seen
 from drivebus.values import ControlSource, State
 
@@ -101,8 +104,11 @@ class Motion(Commanding):
     async def stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
 
-        Returns when the drive is stopped or its frequency falls; `wait_until_stopped` waits for the end. Where the
-        family has no state that may be used, when the drive has confirmed the command.
+        Returns when the drive is stopped, or its frequency falls and only the stop explains that; `wait_until_stopped`
+        waits for the end. Where the family has no state that may be used, when the drive has confirmed the command.
+
+        A frequency above the setpoint would fall without a stop as well, and so may one of a jog that caught a motor
+        which turned. Then this waits for as long as it falls, a minute at most, and beyond *confirm*.
 
         It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
         seems deaf too. Sent once.
@@ -117,7 +123,10 @@ class Motion(Commanding):
         await self.trusting(unverified)._halt("stop", confirm)
 
     async def coast(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
-        """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`."""
+        """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`.
+
+        Returns when the drive is stopped: what coasts has no ramp.
+        """
         await self.trusting(unverified)._halt("coast", confirm)
 
     async def jog_stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
@@ -218,6 +227,9 @@ class Motion(Commanding):
         frequency = await self.output_frequency() if turning_round else None
         # Who started it so must not be kept from stopping it.
         self._ventured.update([command] if self.unverified else [])
+        jog = command.startswith("jog")
+        # Of a jog that is not looked at, nobody knows whether it caught a motor that turned faster.
+        self._jogged_from[:] = [math.inf] if jog else []
         await self._command(command, setpoint)
 
         async def shows(seen: Seen) -> bool:
@@ -230,6 +242,10 @@ class Motion(Commanding):
             return now is not None and frequency is not None and now < frequency
 
         await self._confirm(command, shows, confirm)
+        if jog and confirm:
+            with suppress(*LINE_ERRORS, Refused):
+                begun = await self.output_frequency()
+                self._jogged_from[:] = [] if begun is None else [abs(begun)]
 
     async def _halt(self, command: str, confirm: float) -> None:
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
@@ -238,22 +254,41 @@ class Motion(Commanding):
         await drive._command(command)
         if drive._evidence.without_state() is not None:
             return  # its confirmation is all there is
-        first: list[float | None] = []
+        fall = Fall(drive.bus.now(), confirm)
 
         async def shows(seen: Seen) -> bool:
             if seen.state is State.UNKNOWN:
                 return False
             if not seen.state.running:
                 return True
-            now = await drive.output_frequency(urgent=True)
-            first.append(now)
-            return now is None or (first[0] is not None and now < first[0])
+            frequency, setpoint = await drive._frequencies(urgent=not fall.is_overdue(drive.bus.now()))
+            if frequency is None:
+                # No ramp can be seen, so the drive's confirmation is all there is; but what coasts does not run.
+                return command != "coast"
+            fall.see(frequency, drive.bus.now())
+            if command == "coast" or seen.source not in (ControlSource.COMMUNICATION, None):
+                return False
+            if drive._jogged_from:
+                # What rose to the jog frequency falls by a stop only.
+                return fall.began_above(drive._jogged_from[0]) and fall.proves(math.inf)
+            return fall.proves(setpoint)
 
-        await drive._confirm(command, shows, confirm)
+        await drive._confirm(command, shows, confirm, fall)
 
     def _halting(self, command: str) -> Self:
         """Itself; where a start was forced on what is not verified, as *command* is, with the same trust."""
         return self.trusting(bool(self._ventured) and self._evidence.unusable(command) is not None)
+
+    async def _frequencies(self, *, urgent: bool) -> tuple[float | None, float]:
+        """Output frequency and setpoint in force, in Hz, in one read; what the family does not tell is None, or inf."""
+        names = {role: self.profile.role(role) for role in ("frequency", "setpoint")}
+        known = {role: name for role, name in names.items() if name and self._evidence.unreadable(name) is None}
+        if "frequency" not in known:
+            return None, math.inf
+        plan = self.profile.compile(list(known.values()))
+        words = [await self.read_words(address, count, urgent=urgent) for address, count in plan.reads]
+        told = {role: abs(float(value)) for role, value in zip(known, plan.values(words), strict=True)}
+        return told["frequency"], told.get("setpoint", math.inf)
 
     async def output_frequency(self, *, urgent: bool = False) -> float | None:
         """In Hz; None where the family does not tell."""

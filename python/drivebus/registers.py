@@ -66,6 +66,7 @@ class Registers:
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
         self._ventured: set[str] = set()
+        self._jogged_from: list[float] = []
         self._know(profile, checks.flag("unverified", unverified))
 
     def _know(self, profile: ProfileProtocol, unverified: bool) -> None:

@@ -18,6 +18,7 @@ from drivebus.at_once import at_once
 from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
 from drivebus.evidence import not_verified
+from drivebus.falling import PATIENCE
 from drivebus.motion import Motion
 from drivebus.values import State, Value
 
@@ -25,10 +26,6 @@ __all__ = ["Settings", "Watchdog"]
 
 _READS_PER_TIMEOUT = 4
 """How often the drive is asked within its time-out: three answers may be lost before it acts."""
-
-_PATIENCE = 1.0
-"""Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes off
-a hundredth of a hertz in that time."""
 
 _AT_REST = (State.STOPPED, State.FAULT, State.POWER_OFF)
 
@@ -135,7 +132,7 @@ class Settings:
             frequency = await self._drive.output_frequency()
             now = bus.now()
             if frequency is not None and frequency < lowest:
-                lowest, deadline = frequency, now + _PATIENCE
+                lowest, deadline = frequency, now + PATIENCE
             elif now >= deadline:
                 return False
             await bus.sleep(POLL_INTERVAL)

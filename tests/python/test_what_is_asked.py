@@ -176,7 +176,7 @@ class TestWhatGoesFirst:
 
     def test_the_frequency_that_shows_a_ramp(self, bus: StandIn, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
         # The state word says forward until the ramp is over, and the frequency falls with every look.
-        monkeypatch.setattr(bus, "words", {STATE: 1, STATE + 1: 0, FREQUENCY: 1000})
+        monkeypatch.setattr(bus, "words", {STATE: 1, STATE + 1: COMMUNICATION, FREQUENCY: 1000, FREQUENCY + 1: 1000})
         take = bus._take
 
         def slow_down(what: str, address: int, **how: object) -> None:

@@ -1,0 +1,187 @@
+"""What proves that a stop works: a state that no longer runs, or a fall that only the stop explains.
+
+A frequency also falls to a lower setpoint, and to the jog frequency after a jog that caught a motor which turned. A
+drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not pass for one
+that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import drivebus
+import drivebus.aio
+from drivebus import Bus, Drive, Simulator, State, Unconfirmed
+
+COMMAND, STATE, FREQUENCY = 0x2000, 0x2100, 0x3000
+STOP, COAST = 5, 6
+OTHER_BUS = {"P00.02": 1}
+"""The drive takes the words, and does nothing by them; its status words still say communication."""
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def drive(simulator: Simulator) -> Iterator[Drive]:
+    with Bus(simulator, timeout=0.25) as bus:
+        drive = bus.drive(1)
+        drive.prepare_control()
+        yield drive
+
+
+def commands(simulator: Simulator) -> list[int]:
+    return [word for _, address, word in simulator.drive(1).writes() if address == COMMAND]
+
+
+def asked_after(simulator: Simulator, command: int) -> list[int]:
+    """The addresses that were read after *command* was written last."""
+    frames = [frame for _, who, frame in simulator.line.trace() if who == "master"]
+    last = max(at for at, frame in enumerate(frames) if frame[1:6] == bytes([6, 0x20, 0, 0, command]))
+    return [int.from_bytes(frame[2:4], "big") for frame in frames[last + 1 :]]
+
+
+def at_speed(drive: Drive, hz: float = 50.0) -> None:
+    drive.run(hz)
+    drive.wait_for_speed(timeout=30)
+
+
+class TestTheUsualCase:
+    def test_a_stop_from_its_speed_is_proved_by_two_looks(self, simulator: Simulator, drive: Drive) -> None:
+        at_speed(drive)
+        drive.stop()
+        assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
+        assert drive.state() is State.FORWARD
+
+    def test_a_stop_while_it_gets_faster(self, simulator: Simulator, drive: Drive) -> None:
+        drive.run(50.0)
+        drive.bus.sleep(2.0)
+        drive.stop()
+        assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
+
+    @pytest.mark.parametrize("reverse", [False, True])
+    def test_the_end_of_a_jog(self, simulator: Simulator, drive: Drive, reverse: bool) -> None:
+        drive.jog(reverse)
+        drive.bus.sleep(3.0)
+        drive.jog_stop()
+        assert asked_after(simulator, 8) == [STATE, FREQUENCY] * 2
+
+    def test_a_coast_is_off_at_once(self, simulator: Simulator, drive: Drive) -> None:
+        at_speed(drive)
+        drive.coast()
+        assert asked_after(simulator, COAST) == [STATE]
+
+    def test_a_stop_of_what_stands(self, simulator: Simulator, drive: Drive) -> None:
+        drive.stop()
+        assert asked_after(simulator, STOP) == [STATE]
+
+
+class TestAFallThatProvesNothing:
+    def test_a_jog_that_caught_the_motor(self, simulator: Simulator, drive: Drive) -> None:
+        """It slows down to the jog frequency, and would jog there for ever."""
+        at_speed(drive)
+        drive.coast()
+        drive.jog()
+        drive.write(OTHER_BUS, unverified=True)
+        with pytest.raises(Unconfirmed, match=r"stop was sent.*the motor may still turn.*forward, at 5 Hz"):
+            drive.stop()
+        assert drive.state() is State.FORWARD
+        assert commands(simulator).count(STOP) == 1
+
+    def test_a_lower_setpoint(self, simulator: Simulator, drive: Drive) -> None:
+        at_speed(drive)
+        drive.setpoint = 10.0
+        drive.bus.sleep(0.5)
+        drive.write(OTHER_BUS, unverified=True)
+        with pytest.raises(Unconfirmed, match=r"forward, at 10 Hz"):
+            drive.stop()
+        assert commands(simulator).count(STOP) == 1
+
+    def test_a_lower_setpoint_of_a_motor_that_is_caught(self, drive: Drive) -> None:
+        at_speed(drive)
+        drive.coast()
+        drive.run(10.0)
+        drive.write(OTHER_BUS, unverified=True)
+        with pytest.raises(Unconfirmed, match=r"forward, at 10 Hz"):
+            drive.stop()
+
+    def test_the_end_of_a_jog_of_a_motor_that_runs(self, drive: Drive) -> None:
+        """Command 8 ends nothing but a jog."""
+        at_speed(drive)
+        drive.setpoint = 10.0
+        drive.bus.sleep(0.5)
+        with pytest.raises(Unconfirmed, match=r"jog_stop was sent.*forward, at 10 Hz"):
+            drive.jog_stop()
+
+    def test_a_coast_that_is_not_obeyed(self, drive: Drive) -> None:
+        """What coasts is off at once: that its frequency falls proves nothing."""
+        at_speed(drive)
+        drive.setpoint = 10.0
+        drive.write(OTHER_BUS, unverified=True)
+        with pytest.raises(Unconfirmed, match=r"coast was sent.*may still be fed.*forward, at 10 Hz"):
+            drive.coast()
+
+    def test_a_drive_that_obeys_its_keypad(self, drive: Drive) -> None:
+        """Its speed then comes from there: whoever stands at it may slow it down."""
+        at_speed(drive, 40.0)
+        drive.write("P00.10", 20.0, unverified=True)
+        drive.write({"P00.06": 0, "P00.01": 0}, unverified=True)
+        with pytest.raises(Unconfirmed, match="with commands from the keypad"):
+            drive.stop()
+
+
+class TestAStopThatWorksMeanwhile:
+    """It passes, only later: where the fall has two reasons, it is looked at until one is left."""
+
+    def test_under_a_lower_setpoint(self, simulator: Simulator, drive: Drive) -> None:
+        at_speed(drive)
+        drive.setpoint = 45.0
+        drive.bus.sleep(0.1)
+        drive.stop()
+        assert 44.0 < simulator.drive(1).frequency < 45.0
+
+    def test_far_under_a_lower_setpoint(self, simulator: Simulator, drive: Drive) -> None:
+        """The ramp from 50 Hz to 10 Hz takes 8 s, and `confirm` is 1 s: it is no failure while it falls."""
+        at_speed(drive)
+        drive.setpoint = 10.0
+        drive.bus.sleep(0.1)
+        drive.stop()
+        assert 9.0 < simulator.drive(1).frequency < 10.0
+
+    def test_out_of_a_jog_that_caught_the_motor(self, drive: Drive) -> None:
+        at_speed(drive)
+        drive.coast()
+        drive.jog()
+        drive.stop()
+        assert drive.state() is State.STOPPED
+
+    def test_at_the_end_of_a_block(self, simulator: Simulator, drive: Drive) -> None:
+        """Neither a second stop, nor a coast."""
+        with drive.running(50.0):
+            drive.wait_for_speed(timeout=30)
+            drive.setpoint = 10.0
+        assert [word for word in commands(simulator) if word in (STOP, COAST)] == [STOP]
+
+    def test_both_faces_look_alike(self, simulator: Simulator, drive: Drive) -> None:
+        async def main(other: Simulator) -> list[Any]:
+            async with drivebus.aio.Bus(other, timeout=0.25) as bus:
+                drive = await bus.drive(1)
+                await drive.prepare_control()
+                await drive.run(50.0)
+                await drive.wait_for_speed(timeout=30)
+                await drive.set_setpoint(45.0)
+                await drive.stop()
+            return asked_after(other, STOP)
+
+        at_speed(drive)
+        drive.setpoint = 45.0
+        drive.stop()
+        with Simulator({1: "gd350"}, transport="process", clock="virtual") as other:
+            assert asyncio.run(main(other)) == asked_after(simulator, STOP)
