@@ -61,8 +61,7 @@ impl Profile {
             if self.is_closed(address) {
                 return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
             }
-            // `P0.1` is P00.01.
-            if let Some(entry) = self.entry_at(address).filter(|entry| entry.code().is_some()) {
+            if let Some(entry) = self.numbered(group, index) {
                 return Ok(entry);
             }
         }
@@ -76,12 +75,16 @@ impl Profile {
         })
     }
 
+    /// The parameter whose code has these numbers: `P0.1` is P00.01. What is at the address that others have for it says
+    /// nothing where codes tell no addresses.
+    fn numbered(&self, group: u8, index: u8) -> Option<&Entry> {
+        self.entries().find(|entry| entry.code().and_then(parse_code) == Some((group, index)))
+    }
+
     /// The entry whose code or address somebody typed, if not as it is printed.
     pub(crate) fn find_loosely(&self, text: &str) -> Option<&Entry> {
         match parse_loose_code(text) {
-            Some((group, index)) => {
-                self.entry_at(parameter_address(group, index)).filter(|entry| entry.code().is_some())
-            }
+            Some((group, index)) => self.numbered(group, index),
             None => self.entry_at(parse_loose_address(text)?),
         }
     }
@@ -137,6 +140,11 @@ fn parse_loose_code(text: &str) -> Option<(u8, u8)> {
 fn parse_loose_address(text: &str) -> Option<u16> {
     let text: String = text.split_whitespace().collect();
     parse_address(&text).or_else(|| (text.len() == 4).then(|| parse_address(&format!("0x{text}"))).flatten())
+}
+
+/// The group of a parameter, as its code says it: `P05` of P05.06, `C1` of C1-01, `ACC` of ACC.
+pub(crate) fn group(code: &str) -> &str {
+    code.split(['.', '-']).next().unwrap_or(code)
 }
 
 /// The address of a parameter by the rule group.index: P05.06 is 0506H, P10.01 is 0A01H.

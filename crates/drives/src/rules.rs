@@ -32,6 +32,8 @@ pub struct Requests {
 /// Parameters that need care, by code.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Groups {
+    /// The code of a parameter says nothing of its address: each row does.
+    pub(crate) listed: bool,
     /// Groups that the maker keeps closed.
     pub(crate) closed: Vec<u8>,
     /// Their write does something, and is not simply kept.

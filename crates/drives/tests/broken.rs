@@ -113,6 +113,7 @@ fn every_mistake_names_file_line_and_reason() {
         ("registers.csv", "P00.03,rw", "P00.03,rx", "rw, ro, wo"),
         ("parameters.csv", "P00.11,", "P99.11,", "closed"),
         ("parameters.csv", "P00.11,", "P0011,", "P05.06"),
+        ("parameters.csv", "0=off;1=on", "\"0=off,1=on\"", "by semicolons"),
         ("parameters.csv", "P00.12,", "P00.11,", "twice"),
         ("parameters.csv", "2=communication", "two=communication", "2=communication"),
         ("parameters.csv", "0=off;1=on", "0=off;0=on", "twice"),

@@ -142,7 +142,7 @@ def complete_group(context: click.Context, _parameter: click.Parameter, incomple
     """Groups of the profile that is given, or of all; behind the dot codes."""
     known = (profile.describe(name).code for profile in _profiles(context) for name in profile.names())
     codes = [code for code in known if code is not None]
-    texts = codes if "." in incomplete else [code.partition(".")[0] for code in codes]
+    texts = codes if {".", "-"} & set(incomplete) else [code.replace("-", ".").partition(".")[0] for code in codes]
     return [CompletionItem(text) for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower())]
 
 

@@ -62,7 +62,7 @@ source = "Not read yet: what nearly every drive can"
 
 # P05.06 is at 0506H. Without [parameters.memory] every write of a parameter is taken to wear EEPROM.
 [parameters]
-address = "group.index"
+address = "group.index"  # or "listed": each row of parameters.csv has its own, in a column "address"
 # closed_groups = [99]   # groups that nobody may touch
 # acts = ["P00.15"]      # writing it does something, such as tuning the motor
 # serial = ["P14"]       # the drive's own line: a restore leaves it alone unless asked

@@ -6,7 +6,7 @@ use super::Files;
 use super::entries::Entries;
 use super::facts;
 use super::fit;
-use super::manifest::{self, Manifest, line};
+use super::manifest::{self, AddressRule, Manifest, line};
 use super::motion;
 use super::placed::Placed;
 use super::problems::Problems;
@@ -28,6 +28,7 @@ pub(super) fn profile(
     let file = &files.manifest;
     let mut profile = start(file, manifest, base, problems)?;
     if let Some(parameters) = &manifest.parameters {
+        profile.groups.listed = parameters.address == AddressRule::Listed;
         if let Some(closed) = &parameters.closed_groups {
             profile.groups.closed.clone_from(closed);
         }
@@ -202,7 +203,7 @@ fn entries(files: &Files, manifest: &Manifest, profile: &mut Profile, problems: 
     let mut variants = Vec::new();
     let tables = [
         files.registers.as_ref().map(|file| (file, rows::registers(file, problems))),
-        files.parameters.as_ref().map(|file| (file, rows::parameters(file, problems))),
+        files.parameters.as_ref().map(|file| (file, rows::parameters(file, profile.groups.listed, problems))),
     ];
     let is_missing = profile.entries.is_empty() && tables.iter().any(Option::is_none);
     for (file, rows) in tables.into_iter().flatten() {

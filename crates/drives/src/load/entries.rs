@@ -8,7 +8,7 @@ use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
 use crate::entry::{Entry, Kind};
-use crate::lookup::{closest, names, parse_code};
+use crate::lookup::{closest, group, names, parse_code};
 use crate::memory::Memory;
 
 /// The registers and parameters, and where each address is.
@@ -31,8 +31,7 @@ impl Entries {
     ) -> Self {
         let mut own: Vec<Entry> = Vec::new();
         for (file, Located { line, item }) in rows {
-            if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| names(other).any(|own| own == name)))
-            {
+            if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| is_called(other, name))) {
                 problems.add(file, line, format!("{twice} is there twice"));
             } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
                 let reason = format!("{} is at {address:04X}H, where {} is already", item.name, other.name);
@@ -44,8 +43,7 @@ impl Entries {
             }
         }
         let replaced = |old: &Entry| {
-            own.iter()
-                .any(|new| overlap(old, new).is_some() || names(old).any(|name| names(new).any(|own| own == name)))
+            own.iter().any(|new| overlap(old, new).is_some() || names(old).any(|name| is_called(new, name)))
         };
         let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
         list.append(&mut own);
@@ -60,7 +58,7 @@ impl Entries {
     /// Checks that the bounds of `entries` of `file`, with their lines, are parameters.
     pub(super) fn check_bounds(&self, file: &File, bounds: &[(u64, String)], problems: &mut Problems) {
         for (line, bound) in bounds {
-            let known = parse_code(bound).is_some() && self.list.iter().any(|entry| entry.name == *bound);
+            let known = self.list.iter().any(|entry| entry.kind == Kind::Parameter && entry.name == *bound);
             if !known && !self.incomplete && !problems.is_full() {
                 let closest = closest(bound, self.codes()).unwrap_or("nothing at all");
                 let reason = format!("bound \"{bound}\" is no parameter of this profile; the closest is \"{closest}\"");
@@ -109,22 +107,31 @@ impl Entries {
     pub(super) fn parameters(&self, file: &File, wanted: &[Placed<String>], problems: &mut Problems) -> Vec<String> {
         let mut found = Vec::new();
         for name in wanted {
-            let group = parse_code(&format!("{}.00", name.get_ref())).map(|(group, _)| group);
-            let Some(group) = group else {
-                found.extend(self.get(file, name, problems).map(|entry| entry.name.clone()));
-                continue;
-            };
+            let wanted = name.get_ref();
+            let numbered = |code: &str| parse_code(code).map(|(group, _)| group);
+            let number = numbered(&format!("{wanted}.00"));
             let of_group = |entry: &&Entry| {
-                entry.kind == Kind::Parameter && parse_code(&entry.name).is_some_and(|(own, _)| own == group)
+                let same_number = number.is_some() && numbered(&entry.name) == number;
+                entry.kind == Kind::Parameter && (same_number || group(&entry.name).eq_ignore_ascii_case(wanted))
             };
             let before = found.len();
             found.extend(self.list.iter().filter(of_group).map(|entry| entry.name.clone()));
-            if found.len() == before && !self.incomplete {
-                problems.add(file, line(file, name), format!("no parameter is in group {}", name.get_ref()));
+            if found.len() > before {
+                continue;
+            }
+            if number.is_none() {
+                found.extend(self.get(file, name, problems).map(|entry| entry.name.clone()));
+            } else if !self.incomplete {
+                problems.add(file, line(file, name), format!("no parameter is in group {wanted}"));
             }
         }
         found
     }
+}
+
+/// Whether one of the names of `entry` is `name`; codes are read in upper and lower case alike.
+fn is_called(entry: &Entry, name: &str) -> bool {
+    names(entry).any(|own| own.eq_ignore_ascii_case(name))
 }
 
 /// An address that both have.

@@ -131,12 +131,15 @@ pub(super) struct Requests {
 }
 
 /// How the code of a parameter becomes an address.
-#[derive(Deserialize)]
+#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-enum AddressRule {
+pub(super) enum AddressRule {
     /// The group is the high byte, the index the low byte: P05.06 is 0506H.
     #[serde(rename = "group.index")]
     GroupIndex,
+    /// It does not: each row of parameters.csv says where its parameter is, whatever its code looks like.
+    #[serde(rename = "listed")]
+    Listed,
 }
 
 /// How the code of a parameter becomes an address, and which of them are special.
@@ -144,9 +147,8 @@ enum AddressRule {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Parameters {
-    /// There is one rule so far; a family that needs another says so by its name.
-    #[serde(rename = "address")]
-    _address: AddressRule,
+    /// How the code becomes an address.
+    pub(super) address: AddressRule,
     pub(super) memory: Option<Placed<Memory>>,
     /// Groups that nobody may touch.
     pub(super) closed_groups: Option<Vec<u8>>,

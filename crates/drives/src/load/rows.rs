@@ -24,7 +24,7 @@ pub(super) fn check(files: &Files, problems: &mut Problems) {
         registers(file, problems);
     }
     if let Some(file) = &files.parameters {
-        parameters(file, problems);
+        parameters(file, false, problems);
     }
     if let Some(file) = &files.faults {
         faults(file, problems);
@@ -64,8 +64,8 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
     })
 }
 
-/// The rows of `parameters.csv`.
-pub(super) fn parameters(file: &File, problems: &mut Problems) -> Vec<Located<Entry>> {
+/// The rows of `parameters.csv`. Where the addresses are `listed`, each row has to say its own.
+pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> Vec<Located<Entry>> {
     const COLUMNS: Columns = Columns {
         required: &[
             "code",
@@ -84,12 +84,10 @@ pub(super) fn parameters(file: &File, problems: &mut Problems) -> Vec<Located<En
             "note",
             "source",
         ],
-        optional: &["name", "words"],
+        optional: &["address", "name", "words"],
     };
     table::read(file, &COLUMNS, problems, |row| {
-        let code = row.required("code")?;
-        let (group, index) =
-            parse_code(code).ok_or_else(|| row.broken(format!("code \"{code}\" must be like P05.06")))?;
+        let (code, address) = place(row, listed)?;
         let quantity = quantity(row, filled(row.text("low_from")), choices(row)?)?;
         let default = bound(row, "default", &quantity)?;
         if default.is_some_and(|default| !within(&quantity, default)) {
@@ -105,10 +103,53 @@ pub(super) fn parameters(file: &File, problems: &mut Problems) -> Vec<Located<En
             "" => None,
             name => Some(checked_name(row, name)?),
         };
-        let letter = if code.starts_with(['r', 'R']) { 'r' } else { 'P' };
-        let name = format!("{letter}{group:02}.{index:02}");
-        entry(row, Kind::Parameter, name, alias, Some(parameter_address(group, index)), quantity, default)
+        entry(row, Kind::Parameter, code, alias, Some(address), quantity, default)
     })
+}
+
+/// The code of a parameter and its address: the one that the row says, or the one that follows from the code.
+fn place(row: &Row<'_>, listed: bool) -> Result<(String, u16), ProfileError> {
+    let code = row.required("code")?;
+    let address = match row.text("address") {
+        "" if listed => {
+            let reason = format!("\"address\" is empty; with address = \"listed\" each row says where {code} is");
+            return Err(row.broken(reason));
+        }
+        "" => None,
+        text => Some(
+            parse_address(text)
+                .ok_or_else(|| row.broken(format!("address \"{text}\" must be hex such as 0x0200 or 0200H")))?,
+        ),
+    };
+    match (parse_code(code), address) {
+        (Some((group, index)), _) if !listed => {
+            let letter = if code.starts_with(['r', 'R']) { 'r' } else { 'P' };
+            let address = address.unwrap_or_else(|| parameter_address(group, index));
+            Ok((format!("{letter}{group:02}.{index:02}"), address))
+        }
+        (_, Some(address)) if is_code(code) => Ok((code.to_owned(), address)),
+        (_, Some(_)) => {
+            let letters = "2 to 16 letters and digits, with . - or _ between them, and at most one dot";
+            Err(row.broken(format!("code \"{code}\" must be {letters}, and no address")))
+        }
+        (_, None) => {
+            let reason = format!("code \"{code}\" must be like P05.06; of any other the row must say the \"address\"");
+            Err(row.broken(reason))
+        }
+    }
+}
+
+/// Whether `text` can be the code of a parameter whose address does not follow from it: `C1-01`, `22.02`, `ACC`.
+///
+/// In a backup it is a key of TOML, in which a dot divides.
+fn is_code(text: &str) -> bool {
+    let inner = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'-' | b'_');
+    let bytes = text.as_bytes();
+    (2..=16).contains(&bytes.len())
+        && bytes.iter().all(|&byte| inner(byte))
+        && [bytes.first(), bytes.last()].into_iter().flatten().all(u8::is_ascii_alphanumeric)
+        && text.matches('.').nth(1).is_none()
+        && parse_address(text).is_none()
 }
 
 /// The rows of `faults.csv`.
@@ -291,6 +332,13 @@ fn choices(row: &Row<'_>) -> Result<BTreeMap<u16, String>, ProfileError> {
         let Some((word, label)) = parsed.filter(|(_, label)| !label.is_empty()) else {
             return Err(row.broken(format!("choice \"{choice}\" must be like 2=communication")));
         };
+        if label
+            .split(',')
+            .skip(1)
+            .any(|part| part.split_once('=').is_some_and(|(word, _)| word.trim().parse::<u16>().is_ok()))
+        {
+            return Err(row.broken(format!("choice \"{choice}\" holds another one: divide choices by semicolons")));
+        }
         if choices.insert(word, label.to_owned()).is_some() {
             return Err(row.broken(format!("choice {word} is there twice")));
         }
