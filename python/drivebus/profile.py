@@ -60,7 +60,7 @@ class Profile:
         """
         if isinstance(profile, Profile):
             return profile
-        if isinstance(profile, str):
+        if isinstance(profile, str) and profile.strip():
             # A shipped name comes first: what a command means must not depend on the folder one happens to be in.
             is_folder = profile not in profiles() and (os.sep in profile or Path(profile).is_dir())
             return cls.load(profile) if is_folder else cls.builtin(profile)

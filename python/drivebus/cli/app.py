@@ -12,6 +12,7 @@ from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, 
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable
 from drivebus.cli.session import Session, exit_code, parse_format, tell
+from drivebus.cli.types import Whole
 
 __all__ = ["cli", "main"]
 
@@ -62,7 +63,7 @@ class _Commands(click.Group):
 @click.option(
     "--baud",
     "-b",
-    type=click.IntRange(1),
+    type=Whole(1),
     default=19200,
     show_default=True,
     envvar="DRIVEBUS_BAUD",
@@ -88,7 +89,7 @@ class _Commands(click.Group):
 @click.option(
     "--unit",
     "-u",
-    type=click.IntRange(1, 247),
+    type=Whole(1, 247),
     default=1,
     show_default=True,
     envvar="DRIVEBUS_UNIT",

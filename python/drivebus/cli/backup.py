@@ -15,13 +15,14 @@ import drivebus
 from drivebus.cli.names import complete_group
 from drivebus.cli.output import show
 from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.types import Place
 
 __all__ = ["COMMANDS"]
 
 _FACTORY = "factory"
 """Stands for what the factory set, where a file could."""
 
-_file = click.Path(dir_okay=False, path_type=Path)
+_file = Place(dir_okay=False, path_type=Path)
 
 
 @click.command()

@@ -12,6 +12,7 @@ from rich.status import Status
 import drivebus
 from drivebus.cli.output import Output
 from drivebus.cli.session import EXIT_CODES, Session, parse_format, pass_session
+from drivebus.cli.types import Seconds, Whole
 
 __all__ = ["COMMANDS"]
 
@@ -20,8 +21,8 @@ _SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
 
 @click.command()
 @click.argument("port", required=False)
-@click.option("--unit", "-u", type=click.IntRange(1, 247), help="Only this one.  [default: whoever answers]")
-@click.option("--baud", "-b", type=click.IntRange(1), help="Bits per second it should be.  [default: 19200]")
+@click.option("--unit", "-u", type=Whole(1, 247), help="Only this one.  [default: whoever answers]")
+@click.option("--baud", "-b", type=Whole(1), help="Bits per second it should be.  [default: 19200]")
 @click.option(
     "--format",
     "line_format",
@@ -31,7 +32,7 @@ _SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
     help="Data bits, parity and stop bits it should be.  [default: 8E1]",
 )
 @click.option("--full", is_flag=True, help="Every address, baud rate and format, and ten times the echoes; minutes.")
-@click.option("--listen", type=click.FloatRange(0), default=1.0, show_default=True, help="Seconds before asking.")
+@click.option("--listen", type=Seconds(0, 3600), default=1.0, show_default=True, help="Seconds before asking.")
 @pass_session
 @click.pass_context
 def doctor(

@@ -31,6 +31,9 @@ def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None
     unit, pdu = body[0], body[1:]
     if not 1 <= unit <= 247:
         raise click.UsageError(f"unit {unit:02X} is nobody who answers; the first byte is the unit, 01..F7")
+    if not force and len(body) > 4 and _framed(body[:-2]) == body:
+        asked = body[:-2].hex(" ").upper()
+        raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added: drivebus raw {asked}")
     with session.bus() as bus:
         if session.profile is not None:
             # From now on the bus knows what the unit is, and refuses what would be no command of its family.

@@ -11,6 +11,7 @@ import drivebus
 from drivebus.cli import names, rules
 from drivebus.cli.output import Output
 from drivebus.cli.session import Session, exit_code, pass_session, profile_of, tell
+from drivebus.cli.types import Seconds
 
 __all__ = ["COMMANDS"]
 
@@ -32,7 +33,7 @@ def ports(session: Session) -> None:
 
 @click.command()
 @click.option("--units", default="1-247", show_default=True, metavar="LIST", help="Which to ask, such as 1-31,40.")
-@click.option("--timeout", type=float, help="Seconds each is given.  [default: 0.1]")
+@click.option("--timeout", type=Seconds(0.001, 3600), help="Seconds each is given.  [default: 0.1]")
 @pass_session
 def scan(session: Session, units: str, timeout: float | None) -> None:
     """Find the drives on the line, by one read each."""

@@ -11,14 +11,15 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.output import printable
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
+from drivebus.cli.types import Hertz, Seconds
 
 __all__ = ["COMMANDS"]
 
 
 @click.command()
-@click.argument("hz", type=float, required=False)
+@click.argument("hz", type=Hertz(0), required=False)
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
-@click.option("--wait", type=names.Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
+@click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
 @force_option
 @yes_option
 @pass_session
@@ -35,7 +36,7 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 
 
 @click.command()
-@click.option("--wait", type=names.Seconds(0), metavar="SECONDS", help="Wait until it stands.")
+@click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until it stands.")
 @pass_session
 def stop(session: Session, wait: float | None) -> None:
     """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
@@ -56,7 +57,7 @@ def coast(session: Session) -> None:
 
 
 @click.command()
-@click.option("--seconds", type=names.Seconds(0, 60), default=1.0, show_default=True, help="How long.")
+@click.option("--seconds", type=Seconds(0, 60), default=1.0, show_default=True, help="How long.")
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
 @force_option
 @yes_option

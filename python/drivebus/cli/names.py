@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
-from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 import drivebus
+from drivebus.cli.types import with_a_point
 from drivebus.protocols import ProfileProtocol
 
 __all__ = [
-    "Seconds",
     "complete_assignment",
     "complete_group",
     "complete_name",
@@ -31,22 +29,15 @@ __all__ = [
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 
 
-class Seconds(click.FloatRange):
-    """A time in seconds. "nan" and "inf" are refused before anything moves: they would be neither early nor late."""
-
-    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
-        """*value* as a finite float in the range."""
-        seconds = super().convert(value, parameter, context)
-        if not math.isfinite(seconds):
-            self.fail(f"{value} is no number of seconds.", parameter, context)
-        return seconds
-
-
 def resolve(profile: ProfileProtocol, text: str) -> str | int:
     """The name that *text* stands for, or the address where the profile has no name for it.
 
     An unknown name stays what it is: the profile refuses it and names the closest.
     """
+    if not text.strip():
+        raise click.UsageError("an empty text is no name; give one such as output_current, P00.11 or 3004H")
+    if "=" in text:
+        raise click.UsageError(f"{text!r} is no name; `drivebus write {text}` gives something a value")
     match = _ADDRESS.fullmatch(text)
     if match:
         address = int(match[1] or match[2], 16)
@@ -68,6 +59,8 @@ def parse_assignment(text: str) -> tuple[str, int | float | str]:
     name, value = name.strip(), value.strip()
     if not equals or not name or not value:
         raise click.UsageError(f"{text!r} is no assignment; write NAME=VALUE, such as P00.11=5.0")
+    if with_a_point(value):
+        raise click.UsageError(f"{text!r} has a comma in its number{with_a_point(value)}")
     for kind in (lambda digits: int(digits, 0), float):
         try:
             return name, kind(value)

@@ -11,6 +11,7 @@ import drivebus
 from drivebus.cli import rules, skeleton
 from drivebus.cli.names import complete_profile
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.types import Place
 
 __all__ = ["COMMANDS"]
 
@@ -61,7 +62,7 @@ def show(session: Session, family: str) -> None:
 
 
 @profiles.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=Place(path_type=Path))
 @pass_session
 @click.pass_context
 def check(context: click.Context, session: Session, folder: Path) -> None:
@@ -91,7 +92,7 @@ def _placed(problem: dict[str, Any]) -> str:
 
 
 @profiles.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=Place(path_type=Path))
 @click.option("--like", metavar="FAMILY", shell_complete=complete_profile, help="Take over what is not said anew.")
 @click.option("--overlay", metavar="FAMILY", shell_complete=complete_profile, help="Add to a profile what you know.")
 @pass_session

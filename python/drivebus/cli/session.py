@@ -131,6 +131,8 @@ class Session:
         if self.profile is not None:
             profile = drivebus.Profile.find(self.profile)
             return profile.with_variants(self.variants) if self.variants else profile
+        if self.port is None:
+            raise click.UsageError("no drive to ask what it is: give --profile NAME (`drivebus profiles`), or --port")
         with self.drive() as drive:
             return profile_of(drive)
 

@@ -12,6 +12,7 @@ import drivebus
 from drivebus.cli import demo as demonstration
 from drivebus.cli.names import complete_units
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.types import Place, Whole
 
 __all__ = ["COMMANDS"]
 
@@ -26,14 +27,14 @@ __all__ = ["COMMANDS"]
     help=f"Such as 1=gd350,2=vfd500. There are {', '.join(drivebus.profiles())}.",
 )
 @click.option("--transport", type=click.Choice(["pty", "tcp"]), default="pty", show_default=True)
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Makes chance repeatable.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes chance repeatable.")
 @click.option(
     "--faults", type=click.FloatRange(0, 1), metavar="RATE", help="Share of answers that each kind of fault hits."
 )
 @click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind, such as late=0.02.")
 @click.option("--echo", is_flag=True, help="As an adapter that hands back what it sends.")
-@click.option("--link", type=click.Path(), help="A symbolic link to keep leading to the pseudo-terminal.")
-@click.option("--fifo", type=click.IntRange(1, 256), default=8, show_default=True, help="Characters read at once.")
+@click.option("--link", type=Place(), help="A symbolic link to keep leading to the pseudo-terminal.")
+@click.option("--fifo", type=Whole(1, 256), default=8, show_default=True, help="Characters read at once.")
 @pass_session
 def sim(
     session: Session,

@@ -15,6 +15,7 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.output import Output, printable
 from drivebus.cli.session import Session, exit_code, pass_session
+from drivebus.cli.types import Seconds, Whole
 
 __all__ = ["COMMANDS"]
 
@@ -26,12 +27,12 @@ _KEPT = 10_000
 @click.argument("wanted", metavar="[NAME]...", nargs=-1, shell_complete=names.complete_name)
 @click.option(
     "--interval",
-    type=names.Seconds(0),
+    type=Seconds(0),
     default=0.5,
     show_default=True,
     help="Seconds from one sample to the next; 0: as fast as the line.",
 )
-@click.option("--count", type=click.IntRange(1), help="Samples to take; without it, until Ctrl-C.")
+@click.option("--count", type=Whole(1), help="Samples to take; without it, until Ctrl-C.")
 @pass_session
 def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: int | None) -> None:
     """Watch registers as they change: all monitor registers, or those named.

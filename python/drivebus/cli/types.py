@@ -1,0 +1,79 @@
+"""What options and arguments take: numbers and paths, and words for whoever gives something else."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import click
+
+__all__ = ["Hertz", "Place", "Seconds", "Whole", "with_a_point"]
+
+
+class Number(click.FloatRange):
+    """A finite number of *what*. "nan" and "inf" are refused before anything moves: they are neither early nor late."""
+
+    what = "units"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as a finite float in the range."""
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is no number of {self.what}{with_a_point(value)}.", parameter, context)
+        if not math.isfinite(number):
+            self.fail(f"{value} is no number of {self.what}.", parameter, context)
+        if _is_outside(number, self.min, self.max):
+            self.fail(f"{value} is out of range; allowed is {_allowed(self.min, self.max)}.", parameter, context)
+        return number
+
+
+class Seconds(Number):
+    """A time in seconds."""
+
+    what = "seconds"
+
+
+class Hertz(Number):
+    """A frequency in Hz."""
+
+    what = "Hz"
+
+
+class Whole(click.IntRange):
+    """A whole number."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as an int in the range."""
+        allowed = _allowed(self.min, self.max)
+        try:
+            number = int(value)
+        except ValueError:
+            self.fail(f"{value!r} is no whole number; allowed is {allowed}.", parameter, context)
+        if _is_outside(number, self.min, self.max):
+            self.fail(f"{value} is out of range; allowed is {allowed}.", parameter, context)
+        return number
+
+
+class Place(click.Path):
+    """A path. An empty one, as of a variable that is not set, would be the folder one happens to be in."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as a path."""
+        if not str(value).strip():
+            self.fail("an empty text is no path.", parameter, context)
+        return super().convert(value, parameter, context)
+
+
+def with_a_point(text: str) -> str:
+    """`"; write 1.5"` for `1,5`, which half of the world writes; nothing for any other *text*."""
+    return f"; write {text.replace(',', '.')}" if re.fullmatch(r"[+-]?\d+,\d+", text) else ""
+
+
+def _is_outside(number: float, low: float | None, high: float | None) -> bool:
+    return (low is not None and number < low) or (high is not None and number > high)
+
+
+def _allowed(low: float | None, high: float | None) -> str:
+    return f"{low:g} or more" if high is None else f"{low:g} to {high:g}"

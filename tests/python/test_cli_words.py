@@ -1,0 +1,73 @@
+"""What the command line says to who typed something else: what came, what is allowed, what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+import drivebus
+from drivebus.cli import cli
+
+SIM = "sim://gd350?clock=virtual"
+
+
+def run(*words: str, port: str | None = SIM) -> Result:
+    arguments = [*(["--port", port] if port else []), *words]
+    return CliRunner().invoke(cli, arguments, prog_name="drivebus", env={"DRIVEBUS_PORT": None})
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--unit", "abc", "status"], "'abc' is no whole number; allowed is 1 to 247"),
+        (["--unit", "0", "status"], "0 is out of range; allowed is 1 to 247"),
+        (["--baud", "fast", "status"], "'fast' is no whole number; allowed is 1 or more"),
+        (["monitor", "--count", "0"], "0 is out of range; allowed is 1 or more"),
+        (["monitor", "--interval", "often"], "'often' is no number of seconds"),
+        (["monitor", "--interval", "0,5"], "'0,5' is no number of seconds; write 0.5"),
+        (["jog", "--seconds", "99", "--yes"], "99 is out of range; allowed is 0 to 60"),
+        (["run", "10,5", "--yes"], "'10,5' is no number of Hz; write 10.5"),
+        (["run", "fast", "--yes"], "'fast' is no number of Hz"),
+        (["run", "", "--yes"], "'' is no number of Hz"),
+        (["write", "P00.11=1,5"], "write 1.5"),
+        (["read", "P00.11=1"], "`drivebus write P00.11=1`"),
+        (["read", ""], "an empty text is no name"),
+        (["monitor", " "], "an empty text is no name"),
+        (["write", "=5"], "write NAME=VALUE"),
+        (["--profile", "", "status"], "profile '' is none; give a name (gd350"),
+        (["backup", ""], "an empty text is no path"),
+        (["restore", ""], "an empty text is no path"),
+        (["profiles", "new", ""], "an empty text is no path"),
+        (["profiles", "check", ""], "an empty text is no path"),
+        (["raw", "01 03 21 03 00 01 7E 36"], "it is added: drivebus raw 01 03 21 03 00 01"),
+        (["statsu"], "Did you mean 'status'?"),
+    ],
+)
+def test_what_was_typed_what_is_allowed_and_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*words)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert said in " ".join(result.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_who_has_no_drive_is_told_how_to_do_without() -> None:
+    for words in (["describe", "ramp"], ["faults", "--all"]):
+        result = run(*words, port=None)
+        assert (result.exit_code, "--profile NAME" in result.stderr) == (2, True)
+
+
+def test_a_frame_whose_end_looks_like_its_crc_can_be_forced() -> None:
+    """A GD350 refuses it for its length, so it was sent."""
+    assert run("raw", "--force", "01 03 21 03 00 01 7E 36").exit_code == 4
+
+
+def test_no_profile_is_the_folder_one_happens_to_be_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).resolve().parent.parent / "vectors/profiles/ex9")
+    assert drivebus.Profile.find(".").name == "ex9"
+    with pytest.raises(drivebus.NotAllowed, match="profile '' is none"):
+        drivebus.Profile.find("")
