@@ -355,5 +355,5 @@ def test_who_may_not_obey_is_told_a_command_that_works() -> None:
     assert [(finding.unit, "may not obey" in finding.text) for finding in findings] == [(1, False), (2, True)]
     assert [finding.advice.split("`")[1] for finding in findings] == [
         "drivebus prepare",
-        "drivebus --profile vfd500 --unverified prepare",
+        "drivebus --unit 2 --profile vfd500 --unverified prepare",
     ]

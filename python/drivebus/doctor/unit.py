@@ -300,7 +300,9 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float], is_named: bool) 
             if not item.ok
         )
         surely = any(item.actual is not None and not item.ok for item in control)
-        # Only a unit that says what it is needs no --profile, and prepare writes only what is verified without a word.
+        # Only unit 1 needs no --unit, only one that says what it is no --profile; and prepare writes without a
+        # word only what is verified.
+        others = "" if unit == 1 else f" --unit {unit}"
         name = drive.profile.name if drive.profile.name in profiles() else "FOLDER"
         given = f" --profile {name}" if is_named or drive.profile.role("identification") is None else ""
         doubtful = any(not item.ok and not item.verified for item in control)
@@ -309,6 +311,6 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float], is_named: bool) 
             "control",
             Severity.NOTE,
             f"unit {unit} answers, and {'does not obey the bus yet' if surely else 'may not obey the bus'}: {wrong}",
-            f"`drivebus{given}{' --unverified' if doubtful else ''} prepare` sets it, if that is wanted",
+            f"`drivebus{others}{given}{' --unverified' if doubtful else ''} prepare` sets it, if that is wanted",
             unit=unit,
         )
