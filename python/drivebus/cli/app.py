@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import io
+import sys
 from typing import Any
 
 import click
@@ -154,4 +156,8 @@ for module in (look, watch, explain, doctor, move, backup, frames, profiles, too
 
 def main() -> None:
     """The entry point of the command."""
+    # What a terminal, or a file on Windows, has no letter for is shown by its number: nobody is to miss the rest.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     cli(prog_name="drivebus")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 import drivebus
@@ -17,6 +19,9 @@ __all__ = ["Output", "plain", "printable", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
+
+_NO_LIMIT = 10_000
+"""Characters that no line has."""
 
 
 class Output:
@@ -40,7 +45,8 @@ class Output:
 
     def record(self, values: Mapping[str, Any]) -> None:
         """One JSON object."""
-        print(json.dumps({key: plain(value) for key, value in values.items()}, ensure_ascii=False), flush=True)
+        told = {key: plain(value) for key, value in values.items()}
+        print(json.dumps(told, ensure_ascii=not _takes_everything(sys.stdout.encoding)), flush=True)
 
     def say(self, text: str) -> None:
         """A line for people; nothing in JSON."""
@@ -69,7 +75,16 @@ class Output:
             for row in rows:
                 self.record(dict(zip(columns, row, strict=True)))
             return
-        self.console.print(self.table(columns, rows))
+        kept = list(rows)
+        table = self.table(columns, kept)
+        # A name that is cut cannot be typed, and a word broken in the middle not be read.
+        unlimited = self.console.options.update(max_width=_NO_LIMIT)
+        if kept and Measurement.get(self.console, unlimited, table).minimum > self.console.width:
+            for row in kept:
+                self.console.print()
+                self.facts(dict(zip(columns, row, strict=True)))
+            return
+        self.console.print(table)
 
     @staticmethod
     def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:
@@ -78,10 +93,15 @@ class Output:
         table = Table(box=None, header_style="bold", pad_edge=False)
         for index, name in enumerate(columns):
             numeric = bool(kept) and all(isinstance(row[index], (int, float)) for row in kept)
-            table.add_column(name.replace("_", " "), justify="right" if numeric else "left")
+            table.add_column(name.replace("_", " "), justify="right" if numeric else "left", overflow="fold")
         for row in kept:
             table.add_row(*(show(cell) for cell in row))
         return table
+
+
+def _takes_everything(encoding: str | None) -> bool:
+    """Whether text of any alphabet can be written in *encoding*."""
+    return encoding is None or encoding.lower().replace("_", "-").startswith("utf")
 
 
 def plain(value: Any) -> Any:
