@@ -71,3 +71,25 @@ def test_no_profile_is_the_folder_one_happens_to_be_in(monkeypatch: pytest.Monke
     assert drivebus.Profile.find(".").name == "ex9"
     with pytest.raises(drivebus.NotAllowed, match="profile '' is none"):
         drivebus.Profile.find("")
+
+
+@pytest.mark.parametrize("words", [["status"], ["read", "P00.03"], ["monitor", "--count", "1", "P00.03"], ["coast"]])
+def test_where_nobody_answers_the_doctor_is_named(words: list[str]) -> None:
+    before = [] if words[0] in ("status", "coast") else ["--profile", "gd350"]
+    result = run(*before, "--unit", "9", "--format", "8N1", *words)
+    assert result.exit_code == 3
+    assert result.stderr.splitlines()[-1] == f"What may be wrong: `drivebus doctor '{SIM}' --unit 9 --format 8N1`"
+
+
+def test_what_the_line_has_no_part_in_names_no_doctor() -> None:
+    for words in (["decode", "01 03 21 03 00 01 00 00"], ["read", "6300H"], ["read", "nosuch"]):
+        assert "doctor" not in run(*words).stderr
+
+
+def test_an_interrupt_has_its_own_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(drivebus.Drive, "status", interrupted)
+    result = run("status")
+    assert (result.exit_code, result.output) == (130, "Interrupted.\n")

@@ -13,7 +13,7 @@ import drivebus
 from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools, watch
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable
-from drivebus.cli.session import Session, exit_code, parse_format, tell
+from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
 from drivebus.cli.types import Whole
 
 __all__ = ["cli", "main"]
@@ -33,7 +33,13 @@ class _Commands(click.Group):
             return super().invoke(context)
         except drivebus.DrivebusError as error:
             tell(error)
+            if isinstance(context.obj, Session):
+                context.obj.advise(error)
             context.exit(exit_code(error))
+        except KeyboardInterrupt:
+            # What click makes of it, 1, would read as a difference.
+            click.echo("Interrupted.", err=True)
+            context.exit(130)
         except OSError as error:
             # A reader that has gone ends the command in silence: click sees to that.
             if error.errno == errno.EPIPE:
@@ -49,7 +55,7 @@ class _Commands(click.Group):
         "max_content_width": 100,
     },
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
-    "6 bad answer, 7 unconfirmed. "
+    "6 bad answer, 7 unconfirmed, 130 interrupted. "
     "Options before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
     "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is "
     "not a safety function: an emergency stop is a wire.",
@@ -66,7 +72,7 @@ class _Commands(click.Group):
     "--baud",
     "-b",
     type=Whole(1),
-    default=19200,
+    default=DEFAULT_BAUD,
     show_default=True,
     envvar="DRIVEBUS_BAUD",
     help="Bits per second.",
@@ -75,7 +81,7 @@ class _Commands(click.Group):
     "--format",
     "line_format",
     "-f",
-    default="8E1",
+    default="".join(DEFAULT_FORMAT),
     show_default=True,
     metavar="8E1",
     envvar="DRIVEBUS_FORMAT",

@@ -49,7 +49,7 @@ def scan(session: Session, units: str, timeout: float | None) -> None:
     if not count:
         click.echo(
             "Error: no unit answered. Check wiring (A/B), baud rate and format (factory setting of a Goodrive: "
-            "19200 8E1, unit 1).",
+            f"19200 8E1, unit 1). Or let `{session.doctor()}` look.",
             err=True,
         )
         raise click.exceptions.Exit(3)
@@ -183,6 +183,7 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
     _show_read(session.out, rows)
     for name, reason in failed:
         tell(reason, name)
+    session.advise(*(reason for _, reason in failed))
     if failed:
         raise click.exceptions.Exit(exit_code(failed[0][1]))
 

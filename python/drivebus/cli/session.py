@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ import drivebus
 from drivebus.cli.output import Output, printable
 
 __all__ = [
+    "DEFAULT_BAUD",
+    "DEFAULT_FORMAT",
     "EXIT_CODES",
     "Session",
     "exit_code",
@@ -35,6 +38,11 @@ EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
     (drivebus.Unconfirmed, 7),
 ]
 """What the process ends with, by whose fault it is; 0 is done, 1 anything else, such as differences found."""
+
+
+DEFAULT_BAUD = 19_200
+DEFAULT_FORMAT = ("8", "E", "1")
+"""As the factory sets a Goodrive."""
 
 
 class _Declined(click.ClickException):
@@ -135,6 +143,24 @@ class Session:
             raise click.UsageError("no drive to ask what it is: give --profile NAME (`drivebus profiles`), or --port")
         with self.drive() as drive:
             return profile_of(drive)
+
+    def advise(self, *errors: drivebus.DrivebusError) -> None:
+        """Names who finds out what is wrong, where one of *errors* is that a unit did not answer, or not well."""
+        silent = next((each for each in errors if isinstance(each, (drivebus.NoAnswer, drivebus.BadAnswer))), None)
+        # A frame that is only taken apart came from nobody.
+        if silent is not None and silent.unit and self.port is not None:
+            click.echo(f"What may be wrong: `{self.doctor(silent.unit)}`", err=True)
+
+    def doctor(self, unit: int | None = None) -> str:
+        """The command that looks at the same line, and at *unit*."""
+        words = ["drivebus", "doctor", shlex.quote(str(self.port))]
+        if unit is not None:
+            words.append(f"--unit {unit}")
+        if self.baud != DEFAULT_BAUD:
+            words.append(f"--baud {self.baud}")
+        if self.line_format != DEFAULT_FORMAT:
+            words.append(f"--format {''.join(self.line_format)}")
+        return " ".join(words)
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
         """As `ask`, but only where the motor turns, or may: what stands still is not moved by *what*."""

@@ -63,6 +63,7 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
     for text in seen.told(poll, interval):
         click.echo(text, err=True)
     if seen.last is not None and seen.missing == seen.count:
+        session.advise(seen.last)
         raise click.exceptions.Exit(exit_code(seen.last))
     # Without --count it is how this ends.
     if interrupted and count is not None:
