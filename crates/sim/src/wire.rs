@@ -264,6 +264,9 @@ impl Wire {
     /// there are before a pause.
     #[cfg(unix)]
     pub(crate) fn next_lump(&self, count: usize) -> Option<Wakeup> {
+        // Of two that may speak at once, each character counts: both fill one FIFO.
+        let both = !self.echoes.is_empty() && (self.talking.is_some() || !self.waiting.is_empty());
+        let count = if both { 1 } else { count };
         let answer = match (&self.talking, self.waiting.front()) {
             (Some(talking), _) => {
                 let upto = talking.until().min(talking.delivered + count);

@@ -343,6 +343,13 @@ mod tests {
         prop::sample::select(&FaultKind::ALL[..16])
     }
 
+    #[test]
+    fn a_late_answer_that_meets_an_echo_fills_the_same_fifo() {
+        let faults = [(3, FaultKind::Late), (1, FaultKind::Long), (1, FaultKind::Delay)];
+        let lumps = handed_over(2, &faults, true, &[1, 1, 2, 1]);
+        assert!(lumps.iter().all(|(_, lump)| lump.len() <= 2), "{lumps:02X?}");
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(256))]
 
