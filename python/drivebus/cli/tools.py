@@ -67,16 +67,17 @@ def sim(
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     with simulator:
-        if session.out.as_json:
-            session.out.record({"port": simulator.port, "seed": seed, "faults": simulator.line.faults})
-        else:
-            session.out.say(simulator.port)
-            if simulator.line.faults:
-                rates = ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items())
-                session.out.say(f"Faults: {rates}")
-            session.out.say(f"Seed: {seed}")
-            session.out.say(f"Try: drivebus --port {simulator.port} info     Ctrl-C ends it.")
         try:
+            # Whoever reads the port may end it at once.
+            if session.out.as_json:
+                session.out.record({"port": simulator.port, "seed": seed, "faults": simulator.line.faults})
+            else:
+                session.out.say(simulator.port)
+                if simulator.line.faults:
+                    rates = ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items())
+                    session.out.say(f"Faults: {rates}")
+                session.out.say(f"Seed: {seed}")
+                session.out.say(f"Try: drivebus --port {simulator.port} info     Ctrl-C ends it.")
             threading.Event().wait()
         except KeyboardInterrupt:
             session.out.say("")
