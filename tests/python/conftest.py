@@ -31,6 +31,8 @@ for name in ("SIGHUP", "SIGTERM"):
         signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 TRANSPORTS = ["process", pytest.param("pty", marks=pytest.mark.skipif(os.name == "nt", reason="no pty")), "tcp"]
+# Seconds for an answer. Behind a port a thread of the simulator has to run for it; on a busy machine that takes long.
+IN_PROCESS, BEHIND_A_PORT = 0.25, 0.5
 RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
 
 
@@ -42,8 +44,14 @@ def simulator(request: pytest.FixtureRequest) -> Iterator[drivebus.Simulator]:
 
 
 @pytest.fixture
-def bus(simulator: drivebus.Simulator) -> Iterator[drivebus.Bus]:
-    with drivebus.Bus(simulator, timeout=0.25) as bus:
+def timeout(simulator: drivebus.Simulator) -> float:
+    """What `bus` waits for an answer."""
+    return IN_PROCESS if simulator.transport == "process" else BEHIND_A_PORT
+
+
+@pytest.fixture
+def bus(simulator: drivebus.Simulator, timeout: float) -> Iterator[drivebus.Bus]:
+    with drivebus.Bus(simulator, timeout=timeout) as bus:
         yield bus
 
 

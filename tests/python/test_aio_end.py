@@ -32,7 +32,7 @@ PROGRAM = """
 import asyncio, os, signal, sys, drivebus.aio
 
 async def main():
-    bus = await drivebus.aio.Bus(sys.argv[1])
+    bus = await drivebus.aio.Bus(sys.argv[1], timeout=2.0)
     drive = await bus.drive(1)
     async with drive.running(10.0):
         print("running", flush=True)
@@ -55,7 +55,7 @@ def run(simulator: Simulator, inside: str, loop: str) -> subprocess.CompletedPro
     """Runs the program to its end."""
     program = PROGRAM.format(inside=inside, run=LOOPS[loop])
     return subprocess.run(
-        [sys.executable, "-c", program, simulator.port], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-c", program, simulator.port], capture_output=True, text=True, timeout=100, check=False
     )
 
 

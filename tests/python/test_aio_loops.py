@@ -243,7 +243,7 @@ async def forever():
 {DYING[how]}
 print("end", flush=True)
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=False)
     assert (done.stdout, done.returncode) == ("end\n", 0), done.stderr
 
 
@@ -270,6 +270,6 @@ def await_child(bus):
 asyncio.run(main())
 """
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=100, check=False
     )
     assert (done.stdout, done.returncode) == ("7 [3]\n", 0), done.stderr

@@ -35,17 +35,17 @@ class TestWhoIsThere:
         assert drive.profile.name == "gd350"
         assert drive.read("identification_code") == 0x01A0
 
-    def test_a_scan_finds_those_that_answer(self, bus: Bus) -> None:
-        found = list(bus.scan(range(1, 5), timeout=0.1))
+    def test_a_scan_finds_those_that_answer(self, bus: Bus, timeout: float) -> None:
+        found = list(bus.scan(range(1, 5), timeout=timeout))
         assert [(each.unit, each.profile, each.identification) for each in found] == [
             (1, "gd350", 0x01A0),
             (2, "gd350", 0x01A0),
         ]
-        assert all(0 < each.round_trip < 0.1 for each in found)
+        assert all(0 < each.round_trip < timeout for each in found)
 
     def test_an_echo_comes_back(self, bus: Bus) -> None:
-        assert 0 < bus.echo(1, 0x12AB) < 0.25
-        assert 0 < bus.echo(2) < 0.25
+        assert bus.echo(1, 0x12AB) > 0
+        assert bus.echo(2) > 0
 
     def test_any_pdu_travels(self, bus: Bus) -> None:
         assert bus.transact(1, bytes.fromhex("03 21 03 00 01")) == bytes.fromhex("03 02 01 A0")

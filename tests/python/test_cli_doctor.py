@@ -134,7 +134,7 @@ def test_an_interrupt_leaves_the_port_free() -> None:
             assert process.stdout is not None
             assert "opened at" in process.stdout.readline()
             process.send_signal(signal.SIGINT)
-            _, said = process.communicate(timeout=30)
+            _, said = process.communicate(timeout=100)
         assert process.returncode != 0
         assert "Traceback" not in said
         with drivebus.Bus(simulator.port) as bus:
