@@ -26,6 +26,7 @@ from drivebus.errors import (
     NotAllowed,
     PortError,
     Refused,
+    SharedCodeWarning,
     StoreWarning,
     Unconfirmed,
 )
@@ -78,6 +79,7 @@ __all__ = [
     "Restored",
     "Sample",
     "SerialFormat",
+    "SharedCodeWarning",
     "Simulator",
     "Snapshot",
     "State",

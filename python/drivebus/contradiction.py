@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from drivebus.identify import code_registers, codes
+from drivebus.identify import code_registers, codes, one_of
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import ProfileProtocol
 
@@ -58,15 +58,15 @@ def _by_code(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
     families = list(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
     if not families or set(families) & set(profile.reports_as()):
         return None
-    titles = " or ".join(dict.fromkeys(f"{row['title']} ({row['family']})" for row in rows))
+    titles = [f"{row['title']} ({row['family']})" for row in rows]
     also = [name for name in families if name not in [row["family"] for row in rows]]
     known = _shipped(families)
     if known:
-        then = " or ".join(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in known)
+        then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in known)
         then = f"ask for it as that: {then}"
     else:
         then = "there is no profile of it yet"
-    return f"it says {answer.word:04X}H, which is a {' or '.join([titles, *also])}: {then}"
+    return f"it says {answer.word:04X}H, which is a {one_of([*titles, *also])}: {then}"
 
 
 def _listed(profile: ProfileProtocol, answer: Answer) -> list[dict[str, Any]]:

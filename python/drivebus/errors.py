@@ -8,6 +8,7 @@ This module uses nothing of the package; the compiled core imports it and raises
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "NotAllowed",
     "PortError",
     "Refused",
+    "SharedCodeWarning",
     "StoreWarning",
     "Unconfirmed",
 ]
@@ -139,6 +141,18 @@ class DrivebusWarning(UserWarning):
 
 class StoreWarning(DrivebusWarning):
     """The same parameter is stored in EEPROM again and again; its write life is limited. Write to RAM instead."""
+
+
+class SharedCodeWarning(DrivebusWarning):
+    """A drive is taken for the one family with a profile among several that report its code. Name it by `profile`."""
+
+
+def level_of_the_program() -> int:
+    """Where the program stands above the caller, for `warnings.warn`: how deep depends on who carries the work out."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "drivebus":
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _rebuild(cls: type[DrivebusError], message: str, state: dict[str, Any]) -> DrivebusError:

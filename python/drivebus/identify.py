@@ -7,14 +7,14 @@ other people's programs alone.
 from __future__ import annotations
 
 import functools
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
 from drivebus.profile import Profile, profiles
 
-__all__ = ["LOCKED", "code_registers", "codes", "identify", "usable"]
+__all__ = ["LOCKED", "code_registers", "codes", "identify", "one_of", "usable"]
 
 LOCKED = 0x09
 """The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
@@ -55,7 +55,7 @@ async def identify(read: Read, unit: int) -> Identification:
         candidates,
         candidates[0] if len(candidates) == 1 else None,
         code,
-        " or ".join(Profile.builtin(name).title for name in candidates),
+        one_of(Profile.builtin(name).title for name in candidates),
         "by answers",
         f"it gives no code that is known, and answers as such a unit does: {seen}",
     )
@@ -68,16 +68,27 @@ def usable(found: Identification, unverified: bool) -> str | None:
     return shipped[0] if sure and len(shipped) == 1 else None
 
 
+def one_of(names: Iterable[str]) -> str:
+    """What may be one or the other, for people: "A, B or C"."""
+    return _joined(names, "or")
+
+
+def _joined(names: Iterable[str], word: str) -> str:
+    *others, last = dict.fromkeys(names)
+    return f"{', '.join(others)} {word} {last}" if others else last
+
+
 def _by_code(unit: int, code: int) -> Identification:
     rows = codes()[code]
     families = tuple(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
-    title = " or ".join(dict.fromkeys(row["title"] for row in rows))
+    titles = [name for row in rows for name in (row["title"], *(row.get("shared") or ()))]
+    title = one_of(titles)
     printed = next((row for row in rows if row["verified"]), None)
     says = f"it says {code:04X}H"
     if printed is None:
         certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0]['source']}"
     elif len(families) > 1:
-        certainty, reason = "shared", f"{says}, which {' and '.join(families)} report alike"
+        certainty, reason = "shared", f"{says}, which {_joined(families, 'and')} report alike"
     else:
         certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
     return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)

@@ -7,13 +7,12 @@ them.
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, overload
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, StoreWarning
+from drivebus.errors import DrivebusError, NotAllowed, StoreWarning, level_of_the_program
 from drivebus.looking import Looks
 from drivebus.protocols import ProfileProtocol
 from drivebus.values import Description, Value
@@ -243,18 +242,10 @@ class Parameters(Looks):
                 f"{name} of unit {self.unit} was stored in EEPROM {times} times by this program; "
                 "its write life is limited: write to RAM (store=False) in a loop",
                 StoreWarning,
-                stacklevel=_level_of_the_program(),
+                stacklevel=level_of_the_program(),
             )
 
 
 def _key(known: Description) -> str:
     """One name for a parameter that has two."""
     return known.code or known.name
-
-
-def _level_of_the_program() -> int:
-    """Where the program stands above the caller, for `warnings.warn`: how deep depends on who carries the work out."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "drivebus":
-        level, frame = level + 1, frame.f_back
-    return level

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, SharedCodeWarning, level_of_the_program
 from drivebus.found import Found, Identification
-from drivebus.identify import identify, usable
+from drivebus.identify import identify, one_of, usable
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import AwaitableBus
 
@@ -77,6 +78,13 @@ async def profile_of(
         if name is None:
             raise _not_sure(found)
         known = Profile.builtin(name)
+        if found.certainty == "shared":
+            warnings.warn(
+                f"unit {unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If it is "
+                f'one, say so: bus.drive({unit}, profile="{name}") (`--profile {name}`)',
+                SharedCodeWarning,
+                stacklevel=level_of_the_program(),
+            )
     else:
         known = Profile.find(profile)
     return known if variants is None else known.with_variants(variants), code
@@ -87,7 +95,7 @@ def _not_sure(found: Identification) -> NotAllowed:
     if found.candidates and not shipped:
         known = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
     elif found.candidates:
-        known = f"it may be {' or '.join(found.candidates)}"
+        known = f"it may be {one_of(found.candidates)}"
     else:
         known = "what it is, is not known"
     with_one = (

@@ -285,6 +285,18 @@ class TestSureness:
         assert "by answers" in result.stdout
         assert "vfd500" in result.stderr
 
+    def test_a_code_that_several_report_is_said_by_every_command(self) -> None:
+        """GD300L manual, p. 130; GD310-UL manual, p. 211."""
+        others = "Goodrive300L lift drive", "Goodrive310-UL"
+        for command in ("info", "status", "faults"):
+            result = at("gd300", command)
+            assert result.exit_code == 0
+            [warning] = result.stderr.splitlines()
+            assert warning.startswith("Warning: unit 1 is taken for a gd300, the only one of them with a profile")
+            assert all(other in warning for other in (*others, "--profile gd300"))
+            assert at("gd300", "--profile", "gd300", command).stderr == ""
+        assert f"unit 1: gd300 (or {' or '.join(others)}), identification 0x010a, shared" in at("gd300", "scan").stdout
+
     def test_info_of_a_drive_that_is_taken_for_another(self) -> None:
         result = at("gd35", "--profile", "gd350", "info")
         assert (result.exit_code, "named gd350 (INVT Goodrive350), and it says 0108H" in result.stderr) == (0, True)

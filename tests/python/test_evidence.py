@@ -273,7 +273,7 @@ class TestRules:
     def test_a_memory_that_is_taken_over(self) -> None:
         """GD300: that 800BH is RAM is printed for the GD350 only. 000BH, EEPROM, is the parameter's own address."""
         with Simulator({1: "gd300"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
-            drive = bus.drive(1)
+            drive = bus.drive(1, "gd300")
             with pytest.raises(NotAllowed, match=f"keeps a parameter in RAM is not verified.*{HOW}"):
                 drive.write("P00.11", 3.0)
             drive.write("P00.11", 3.0, store=True)

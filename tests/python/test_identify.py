@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import warnings
 from collections.abc import Iterator
 
 import pytest
@@ -90,7 +91,8 @@ def test_a_code_that_nobody_knows_does_not_fall_to_another_family(simulator: Sim
 
 def test_a_drive_is_taken_only_if_that_is_sure(bus: Bus) -> None:
     assert bus.drive(1).profile.name == "gd350"
-    assert bus.drive(2).profile.name == "gd300"  # the only one of those that report 010AH which has a profile
+    with pytest.warns(drivebus.SharedCodeWarning):
+        assert bus.drive(2).profile.name == "gd300"  # the only one of those that report 010AH which has a profile
     with pytest.raises(NotAllowed, match=r"may be vfd500 \(by answers.*profile=….*unverified=True"):
         bus.drive(3)
     assert bus.drive(3, unverified=True).profile.name == "vfd500"
@@ -99,6 +101,46 @@ def test_a_drive_is_taken_only_if_that_is_sure(bus: Bus) -> None:
             bus.drive(4, unverified=unverified)
         assert "unverified=True" not in str(refused.value)
     assert bus.drive(4, "gd600").profile.name == "gd600"
+
+
+GD300_OR_ELSE = "gd300, Goodrive300L lift drive and Goodrive310-UL"
+
+
+def test_a_code_that_three_report_names_all_three(bus: Bus) -> None:
+    """GD300L manual, p. 130; GD310-UL manual, p. 211."""
+    found = bus.identify(2)
+    assert found.reason == f"it says 010AH, which {GD300_OR_ELSE} report alike"
+    assert found.title == "Goodrive300 vector, Goodrive300L lift drive or Goodrive310-UL"
+
+
+def test_a_drive_that_is_taken_for_one_of_several_says_so(bus: Bus) -> None:
+    taken = rf"unit 2 is taken for a gd300.*010AH, which {GD300_OR_ELSE} report alike.*profile=\"gd300\""
+    with pytest.warns(drivebus.SharedCodeWarning, match=taken) as told:
+        bus.drive(2)
+    assert [each.filename for each in told] == [__file__]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bus.drive(2, "gd300")
+        bus.drive(1)
+
+
+@pytest.mark.parametrize("names", [("gd300", "gd35"), ("gd300", "gd35", "gd600"), ("gd300", "gd35", "gd600", "gd9000")])
+def test_a_code_of_several_families_with_profiles_is_not_enough(
+    bus: Bus, monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...]
+) -> None:
+    rows = [
+        {"code": 0x010A, "family": name, "title": name.upper(), "shared": [], "verified": True, "source": "a manual"}
+        for name in names
+    ]
+    monkeypatch.setattr("drivebus.identify.codes", lambda: {0x010A: rows})
+    found = bus.identify(2)
+    assert (found.certainty, found.candidates, found.family) == ("shared", names, None)
+    all_but_last = ", ".join(names[:-1])
+    assert found.reason == f"it says 010AH, which {all_but_last} and {names[-1]} report alike"
+    for unverified in (False, True):
+        with pytest.raises(NotAllowed, match=rf"may be {all_but_last} or {names[-1]} \(shared.*give profile=") as told:
+            bus.drive(2, unverified=unverified)
+        assert "unverified=True" not in str(told.value)
 
 
 def test_who_stays_silent_is_silent(bus: Bus) -> None:

@@ -174,7 +174,7 @@ WRITES: list[Callable[[Drive], Any]] = [
 def test_nothing_that_moves_or_changes_anything_goes_out(write: Callable[[Drive], Any]) -> None:
     """A GD300 that obeys the bus, and is named GD350: their commands are the same, and still it is not asked to run."""
     with line_with("gd300") as simulator, Bus(simulator) as bus:
-        bus.drive(1, unverified=True).prepare_control()
+        bus.drive(1, "gd300", unverified=True).prepare_control()
         before = len(written(simulator))
         with pytest.raises(NotAllowed, match="says 010AH"):
             write(bus.drive(1, "gd350", unverified=True))
@@ -193,7 +193,7 @@ def test_what_ends_a_motion_asks_nothing_and_is_not_refused(gd300: tuple[Simulat
 
 def test_a_fault_is_reset_all_the_same(gd300: tuple[Simulator, Bus]) -> None:
     simulator, bus = gd300
-    bus.drive(1, unverified=True).prepare_control()
+    bus.drive(1, "gd300", unverified=True).prepare_control()
     simulator.drive(1).trip(4)
     before = len(written(simulator))
     drive = bus.drive(1, "gd350")

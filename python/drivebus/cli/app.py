@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import io
 import sys
+import warnings
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -24,13 +26,23 @@ __all__ = ["cli", "main"]
 # for one drive, it would be believed of the next.
 
 
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning is one line as well: where in this program it came from helps nobody."""
+    # Whoever has gone and reads it no more must not keep a stop from being sent.
+    with suppress(OSError):
+        click.echo(printable(f"Warning: {message}"), err=True)
+
+
 class _Commands(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
 
     def invoke(self, context: click.Context) -> Any:
         """Runs the command."""
         try:
-            return super().invoke(context)
+            with warnings.catch_warnings():
+                warnings.simplefilter("always", drivebus.DrivebusWarning)
+                warnings.showwarning = _warn
+                return super().invoke(context)
         except drivebus.DrivebusError as error:
             tell(error)
             if isinstance(context.obj, Session):

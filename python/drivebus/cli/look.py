@@ -60,6 +60,9 @@ def _show_found(session: Session, found: drivebus.Found) -> None:
         session.out.record(vars(found))
         return
     family = found.profile or " or ".join(found.candidates) or "unknown family"
+    if found.certainty == "shared" and found.profile is not None:
+        others = (name for name in found.candidates if name != found.profile)
+        family += f" (or {' or '.join(others)})"
     code = "" if found.identification is None else f", identification {found.identification:#06x}"
     sure = "" if found.certainty in ("certain", "unknown") else f", {found.certainty}"
     problem = f" ({found.problem})" if found.problem else ""
