@@ -257,10 +257,8 @@ class Motion(Commanding):
         fall = Fall(drive.bus.now(), confirm)
 
         async def shows(seen: Seen) -> bool:
-            if seen.state is State.UNKNOWN:
-                return False
             if not seen.state.running:
-                return True
+                return seen.state.at_rest
             frequency, setpoint = await drive._frequencies(urgent=not fall.is_overdue(drive.bus.now()))
             if frequency is None:
                 # No ramp can be seen, so the drive's confirmation is all there is; but what coasts does not run.

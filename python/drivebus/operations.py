@@ -213,9 +213,8 @@ class Operations(Keeping, Terminals):
         """
 
         def stopped(status: Status) -> bool:
-            known = status.state is not State.UNKNOWN
-            turns = status.state.running or (status.frequency is not None and status.frequency > _STANDSTILL)
-            return known and not turns
+            turns = status.frequency is not None and status.frequency > _STANDSTILL
+            return status.state.at_rest and not turns
 
         drive = self.trusting(unverified)
         drive._check_told("waiting for the standstill")

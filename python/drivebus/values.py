@@ -71,6 +71,11 @@ class State(Enum):
         """Whether the drive feeds the motor with the aim of turning it."""
         return self in (State.FORWARD, State.REVERSE)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the drive feeds the motor nothing. One that magnetises it, before a start, neither rests nor runs."""
+        return self in (State.STOPPED, State.FAULT, State.POWER_OFF)
+
     def __str__(self) -> str:
         return self.value.replace("_", " ")
 

@@ -20,14 +20,12 @@ from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
 from drivebus.evidence import not_verified
 from drivebus.falling import PATIENCE
 from drivebus.motion import Motion
-from drivebus.values import State, Value
+from drivebus.values import Value
 
 __all__ = ["Settings", "Watchdog"]
 
 _READS_PER_TIMEOUT = 4
 """How often the drive is asked within its time-out: three answers may be lost before it acts."""
-
-_AT_REST = (State.STOPPED, State.FAULT, State.POWER_OFF)
 
 
 class Settings:
@@ -128,7 +126,7 @@ class Settings:
         """Whether the motor is stopped, once it no longer slows down."""
         bus = self._drive.bus
         lowest, deadline = math.inf, bus.now()
-        while await self._drive.state() not in _AT_REST:
+        while not (await self._drive.state()).at_rest:
             frequency = await self._drive.output_frequency()
             now = bus.now()
             if frequency is not None and frequency < lowest:

@@ -196,6 +196,35 @@ class TestWhatGoesFirst:
         assert not any(how["urgent"] for _, _, how in bus.asked)
 
 
+class TestADriveThatMagnetisesTheMotor:
+    """State 6, pre-exciting, comes before a start: nothing turns yet, and nothing has stopped. GD350 manual, 9.4.5."""
+
+    PRE_EXCITING = 6
+
+    @pytest.mark.parametrize("command", ["stop", "coast", "jog_stop"])
+    def test_it_has_not_stopped(
+        self, bus: StandIn, drive: Drive, monkeypatch: pytest.MonkeyPatch, command: str
+    ) -> None:
+        read = bus.read
+        state = {STATE: self.PRE_EXCITING}
+
+        def shown(unit: int, address: int, count: int = 1, /, **how: bool) -> list[int]:
+            bus.words.update(state)
+            return read(unit, address, count, **how)
+
+        monkeypatch.setattr(bus, "read", shown)
+        with pytest.raises(drivebus.Unconfirmed, match=rf"{command} was sent.*pre exciting"):
+            getattr(drive, command)()
+        assert len(bus.calls("write")) == 1
+        state[STATE] = STOPPED
+        getattr(drive, command)()
+
+    def test_it_is_waited_for(self, bus: StandIn, drive: Drive) -> None:
+        bus.words[STATE] = self.PRE_EXCITING
+        with pytest.raises(drivebus.Unconfirmed, match="did not stop"):
+            drive.wait_until_stopped(timeout=0.5)
+
+
 class TestReadingTwice:
     def test_each_request_of_the_plan(self, bus: StandIn, drive: Drive) -> None:
         bus.words[FREQUENCY] = 1000

@@ -169,7 +169,7 @@ class Session:
         except drivebus.NotAllowed:
             self.ask(f"Whether the motor turns is not known; {what}", yes)
             return
-        if state.running or state is drivebus.State.UNKNOWN:
+        if not state.at_rest:
             self.ask(f"The motor turns; {what}", yes)
 
     def ask(self, what: str, yes: bool, unit: int | None = None) -> None:
