@@ -260,8 +260,7 @@ impl Wire {
         !self.echoes.is_empty() || self.talking.as_ref().is_some_and(|talking| talking.delivered > talking.from)
     }
 
-    /// When to call [`step`](Self::step) next, if it is enough to have `count` more characters at once, or as many as
-    /// there are before a pause.
+    /// When to call [`step`](Self::step) next, if `count` more characters at once are enough, or all before a pause.
     #[cfg(unix)]
     pub(crate) fn next_lump(&self, count: usize) -> Option<Wakeup> {
         // Of two that may speak at once, each character counts: both fill one FIFO.
