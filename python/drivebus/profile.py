@@ -148,11 +148,7 @@ class Profile:
         return list(self._names)
 
     def search(self, text: str, limit: int = 20) -> list[str]:
-        """Names and codes in which all words of *text* occur, or in what is known of them; the best first.
-
-        Also what the field calls so (`"ramp"`: acceleration times), a code as people type it (`"P00-11"`), and for a
-        word that occurs nowhere the nearest that does.
-        """
+        """Names and codes in which all words of *text* occur, or what the field calls so (`"ramp"`); the best first."""
         return self._native.search(text, checks.whole("limit", limit, 0, 10_000))
 
     def role(self, role: str, /) -> str | None:

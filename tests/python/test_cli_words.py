@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,6 +87,29 @@ def test_where_nobody_answers_the_doctor_is_named(words: list[str]) -> None:
 def test_what_the_line_has_no_part_in_names_no_doctor() -> None:
     for words in (["decode", "01 03 21 03 00 01 00 00"], ["read", "6300H"], ["read", "nosuch"]):
         assert "doctor" not in run(*words).stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX closes it")
+def test_who_has_no_standard_input_is_not_asked() -> None:
+    done = subprocess.run(
+        ["sh", "-c", 'exec "$0" "$@" <&-', sys.executable, "-m", "drivebus", "--port", SIM, "reset"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (
+        2,
+        "Error: without a terminal this needs --yes; nothing was written",
+    )
+
+
+@pytest.mark.parametrize("answer", ["", "n\n", "\n"])
+def test_no_answer_is_no(monkeypatch: pytest.MonkeyPatch, answer: str) -> None:
+    """The end of the input too, Ctrl-D on a terminal."""
+    monkeypatch.setattr("click.testing._NamedTextIOWrapper.isatty", lambda _: True, raising=False)
+    result = CliRunner().invoke(cli, ["--port", SIM, "reset"], input=answer)
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, "Error: nothing was written")
 
 
 def test_an_interrupt_has_its_own_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -177,9 +177,15 @@ class Session:
         click.echo(f"{what} (unit {unit or self.unit} on {self.port}).", err=True)
         if yes:
             return
-        if not sys.stdin.isatty():
+        # Who closed standard input has none at all.
+        if sys.stdin is None or not sys.stdin.isatty():
             raise _Declined("without a terminal this needs --yes; nothing was written")
-        if not click.confirm("Is the machine clear, and shall it be done?", err=True):
+        try:
+            wanted = click.confirm("Is the machine clear, and shall it be done?", err=True)
+        except click.Abort:
+            click.echo(err=True)
+            wanted = False
+        if not wanted:
             raise _Declined("nothing was written")
 
 
