@@ -10,6 +10,11 @@ LOCKED := --locked
 # PyO3 asks this interpreter; one answer for every cargo command keeps what is built in use.
 export PYO3_PYTHON := $(abspath $(BIN)/python)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# A download that breaks off says nothing about the code.
+export PIP_RETRIES := 10
+export CARGO_NET_RETRY := 10
+# Property tests make up the same cases each time; what nobody changed does not fail. Others: make rust-test PROPTEST_RNG_SEED=7
+export PROPTEST_RNG_SEED ?= 1
 
 RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.json' -o -name '*.md' \))
 PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f \( -name '*.py' -o -name '*.pyi' -o -name py.typed \))
@@ -90,9 +95,9 @@ types: $(VENV)/.dev $(VENV)/.wheel
 
 rust-test: $(VENV)/.created
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-	    set -x; $(CARGO) nextest run $(LOCKED) $(RUST_TESTED) && $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED) --doc; \
+	    set -x; $(CARGO) nextest run $(LOCKED) --no-fail-fast $(RUST_TESTED) && $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED) --doc; \
 	else \
-	    set -x; $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED); \
+	    set -x; $(CARGO) test $(LOCKED) --quiet --no-fail-fast $(RUST_TESTED); \
 	fi
 
 # What does not depend on the machine's mood: instructions of the hot path, counted by valgrind.

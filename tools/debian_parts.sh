@@ -34,7 +34,7 @@ command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking
 mkdir -p "$tools/apt/lists/partial" "$tools/apt/cache/archives/partial" "$tools/apt/debs"
 cd "$tools/apt/debs" || exit 1
 # apt drops root for a user who cannot write here.
-as_is="-q -o APT::Sandbox::User=root"
+as_is="-q -o APT::Sandbox::User=root -o Acquire::Retries=5"
 # Where the system's package lists are empty or old: lists of our own.
 own="$as_is -o Dir::State::lists=$tools/apt/lists -o Dir::Cache=$tools/apt/cache"
 # shellcheck disable=SC2086  # options, to be split
