@@ -89,6 +89,18 @@ def test_what_the_line_has_no_part_in_names_no_doctor() -> None:
         assert "doctor" not in run(*words).stderr
 
 
+def test_a_profile_with_several_mistakes_says_how_to_see_them_all(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    run("profiles", "new", str(folder), port=None)
+    assert run("--profile", str(folder), "describe", "example_frequency", port=None).exit_code == 0
+    with (folder / "profile.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[nonsense]\n")
+    (folder / "faults.csv").write_text("one\n", encoding="utf-8")
+    result = run("--profile", str(folder), "status")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1] == f"All 2: `drivebus profiles check {folder}`"
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX closes it")
 def test_who_has_no_standard_input_is_not_asked() -> None:
     done = subprocess.run(

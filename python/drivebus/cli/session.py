@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, cast
 
 import click
@@ -145,11 +146,16 @@ class Session:
             return profile_of(drive)
 
     def advise(self, *errors: drivebus.DrivebusError) -> None:
-        """Names who finds out what is wrong, where one of *errors* is that a unit did not answer, or not well."""
+        """Names who finds out what else is wrong after *errors*: with a line that answers badly, with a profile."""
         silent = next((each for each in errors if isinstance(each, (drivebus.NoAnswer, drivebus.BadAnswer))), None)
         # A frame that is only taken apart came from nobody.
         if silent is not None and silent.unit and self.port is not None:
             click.echo(f"What may be wrong: `{self.doctor(silent.unit)}`", err=True)
+
+        if self.profile and Path(self.profile).is_dir():
+            problems = len(drivebus.Profile.check(self.profile))
+            if problems > 1:
+                click.echo(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`", err=True)
 
     def doctor(self, unit: int | None = None) -> str:
         """The command that looks at the same line, and at *unit*."""

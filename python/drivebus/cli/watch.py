@@ -106,7 +106,8 @@ class _Seen:
         """What is to be said of *poll* when it is over."""
         if self.missing:
             yield f"{self.missing} of {self.count} samples {'is' if self.missing == 1 else 'are'} missing."
-        if poll.late:
+        # What waits for an answer that does not come is late too, and no interval helps against that.
+        if poll.late and not self.missing:
             yield f"{poll.late} times the line was not free in time for the next sample: {interval:g} s is too short."
         if poll.dropped and self.live is None:
             yield f"{poll.dropped} samples came faster than they were taken, and are left out."
