@@ -1,4 +1,4 @@
-"""Commands that write: what was done is said to be done, also where the drive says nothing any more afterwards."""
+"""Commands that write: values as they are typed, and what is said of what was done where the drive falls silent."""
 
 from __future__ import annotations
 
@@ -16,6 +16,26 @@ SIM = "sim://gd350?clock=virtual"
 
 def run(*words: str) -> Result:
     return CliRunner().invoke(cli, ["--port", SIM, "--profile", "gd350", *words], prog_name="drivebus")
+
+
+@pytest.mark.parametrize("typed", ["5s", "5 s", "5.0s", "5.0"])
+def test_a_value_may_have_its_unit(typed: str) -> None:
+    result = run("--json", "write", f"P00.11={typed}")
+    assert json.loads(result.stdout)["value"] == 5.0
+
+
+@pytest.mark.parametrize(
+    ("typed", "reason"),
+    [
+        ("P00.11=5Hz", "5Hz: not a number of s"),
+        ("P00.11=5ms", "5ms: not a number of s"),
+        ("P00.11=s", "s: not a number of s"),
+    ],
+)
+def test_another_unit_is_refused(typed: str, reason: str) -> None:
+    result = run("write", typed)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert reason in result.stderr
 
 
 def silence(monkeypatch: pytest.MonkeyPatch, method: str) -> None:

@@ -41,6 +41,25 @@ const REGISTERS: &str = "address,name,label,unit,scale,signed,low,high,high_from
 const FAULTS: &str = "code,mnemonic,label,cause,remedy,verified,note,source\n";
 
 #[test]
+fn a_bit_without_values_is_off_or_on_and_several_are_a_number() {
+    let bits = "[bits]\nstatus_word_1 = [{ name = \"mode\", bits = [1, 0] }, { name = \"lamp\", bits = [2, 2] }]\n";
+    let toml = format!("name = \"x\"\nsource = \"Plant 7\"\n[overlay]\nprofile = \"gd350\"\n{bits}");
+    let folder = Folder::new("bits", &[("profile.toml", &toml)]);
+    let profile = folder.load().unwrap();
+    let told = |word| {
+        profile
+            .find("status_word_1")
+            .unwrap()
+            .bits()
+            .iter()
+            .map(|field| field.meaning(word).into_owned())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(told(0b001), ["1", "off"]);
+    assert_eq!(told(0b111), ["3", "on"]);
+}
+
+#[test]
 fn an_overlay_adds_and_replaces_and_leaves_the_rest_as_it_is() {
     let base = Profile::builtin("gd350").unwrap();
     let rows = format!(

@@ -126,7 +126,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
             known = drive.describe(place)
             if known.name in wanted:
                 raise drivebus.NotAllowed(f"{known.code or known.name} is given twice; nothing was sent")
-            wanted[known.name] = value
+            wanted[known.name] = names.without_unit(value, known.unit)
         if words:
             session.ask(f"This writes {', '.join(assignments)}, not knowing what that does", yes)
         else:

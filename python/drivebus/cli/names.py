@@ -24,6 +24,7 @@ __all__ = [
     "parse_units",
     "parse_variants",
     "resolve",
+    "without_unit",
 ]
 
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
@@ -67,6 +68,16 @@ def parse_assignment(text: str) -> tuple[str, int | float | str]:
         except ValueError:
             continue
     return name, value
+
+
+def without_unit(value: int | float | str, unit: str) -> int | float | str:
+    """*value* as a number, where it was typed with its own unit: `5s`, `12.5 Hz`."""
+    if isinstance(value, str) and unit and value.endswith(unit):
+        try:
+            return float(value.removesuffix(unit))
+        except ValueError:
+            return value
+    return value
 
 
 def parse_hex(parts: tuple[str, ...]) -> bytes:

@@ -151,6 +151,8 @@ def _state_lines(profile: drivebus.Profile) -> list[str]:
     for what, means in _states(profile).items():
         if isinstance(means, str):
             lines.append(f"{what:>3} {means.replace('_', ' ')}")
+        elif not means:
+            lines.append(f"{what}: a number")
         else:
             lines.append(f"{what}: {', '.join(f'{value} = {label}' for value, label in means.items())}")
     return lines

@@ -273,7 +273,8 @@ fn bit_field(row: &Field) -> Result<BitField, String> {
         verified: row.verified,
     };
     match &row.values {
-        None => field.values.extend([(0, "off".to_owned()), (1, "on".to_owned())]),
+        None if high == low => field.values.extend([(0, "off".to_owned()), (1, "on".to_owned())]),
+        None => {}
         Some(values) => {
             for (key, label) in values {
                 let value: u16 = key.parse().map_err(|_| format!("value \"{key}\" must be a number"))?;
