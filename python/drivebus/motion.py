@@ -227,6 +227,8 @@ class Motion(Commanding):
         frequency = await self.output_frequency() if turning_round else None
         # Who started it so must not be kept from stopping it.
         self._ventured.update([command] if self.unverified else [])
+        # Before it is sent: whoever is interrupted from here on has to end it.
+        self._starts[0] += 1
         jog = command.startswith("jog")
         # Of a jog that is not looked at, nobody knows whether it caught a motor that turned faster.
         self._jogged_from[:] = [math.inf] if jog else []
@@ -283,6 +285,8 @@ class Motion(Commanding):
         known = {role: name for role, name in names.items() if name and self._evidence.unreadable(name) is None}
         if "frequency" not in known:
             return None, math.inf
+        if len({self.profile.describe(name).unit for name in known.values()}) > 1:
+            del known["setpoint"]  # in percent, or rpm
         plan = self.profile.compile(list(known.values()))
         words = [await self.read_words(address, count, urgent=urgent) for address, count in plan.reads]
         told = {role: abs(float(value)) for role, value in zip(known, plan.values(words), strict=True)}

@@ -35,6 +35,7 @@ class Moving:
         self._elsewhere = drive.over(drive.bus.blocking())
         self._guard = Guard(self._end_at_once)
         self._started = False
+        self._starts_before = drive._starts[0]
 
     async def begin(self) -> None:
         """Starts the motor."""
@@ -49,8 +50,10 @@ class Moving:
             self._leave()
             return
         with self._drive.bus.undisturbed() as bus:
-            # Of this package's errors, only Unconfirmed comes from a start once its command was sent.
-            if self._started or isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError):
+            # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
+            # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
+            may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
+            if self._started or (may_turn and self._drive._starts[0] > self._starts_before):
                 failure = await self._stop(bus)
                 if failure is not None and hasattr(reason, "add_note"):
                     reason.add_note(f"and unit {self._drive.unit} could not be stopped: {failure}")

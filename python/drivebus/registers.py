@@ -67,6 +67,7 @@ class Registers:
         self._stored: dict[str, int] = {}
         self._ventured: set[str] = set()
         self._jogged_from: list[float] = []
+        self._starts = [0]
         self._know(profile, checks.flag("unverified", unverified))
 
     def _know(self, profile: ProfileProtocol, unverified: bool) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -81,6 +82,24 @@ class TestTheUsualCase:
     def test_a_stop_of_what_stands(self, simulator: Simulator, drive: Drive) -> None:
         drive.stop()
         assert asked_after(simulator, STOP) == [STATE]
+
+    def test_where_the_setpoint_in_force_is_in_percent(self, simulator: Simulator, tmp_path: Path) -> None:
+        """It says nothing of a frequency then."""
+        (tmp_path / "profile.toml").write_text(
+            'name = "ours"\nsource = "Ours"\n[overlay]\nprofile = "gd350"\n', encoding="utf-8"
+        )
+        (tmp_path / "registers.csv").write_text(
+            "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source\n"
+            "0x3001,set_frequency_actual,Setpoint in force,%,1000,no,0.000,60.000,,ro,yes,,Ours\n",
+            encoding="utf-8",
+        )
+        with Bus(simulator, timeout=0.25) as bus:
+            drive = bus.drive(1, tmp_path)
+            drive.prepare_control()
+            drive.run(50.0)
+            drive.wait_for_speed(50.0, timeout=30)
+            drive.stop()
+            assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
 
 
 class TestAFallThatProvesNothing:
@@ -185,3 +204,62 @@ class TestAStopThatWorksMeanwhile:
         drive.stop()
         with Simulator({1: "gd350"}, transport="process", clock="virtual") as other:
             assert asyncio.run(main(other)) == asked_after(simulator, STOP)
+
+
+class TestABlockThatDidNotStartTheMotor:
+    """What somebody else runs is not stopped by a block that ended before its own start was sent."""
+
+    @pytest.mark.parametrize("reason", [KeyboardInterrupt, SystemExit, drivebus.NoAnswer])
+    @pytest.mark.parametrize("block", ["running", "jogging"])
+    def test_it_goes_on(
+        self,
+        simulator: Simulator,
+        drive: Drive,
+        monkeypatch: pytest.MonkeyPatch,
+        reason: type[BaseException],
+        block: str,
+    ) -> None:
+        at_speed(drive, 10.0)
+
+        def interrupted(*_: object, **__: object) -> None:
+            raise reason("while it is looked at")
+
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(drive.bus, "read_stamped", interrupted)
+            with pytest.raises(reason), getattr(drive, block)():
+                pytest.fail("it was not started")
+        assert [word for word in commands(simulator) if word in (STOP, COAST, 8)] == []
+        assert drive.state() is State.FORWARD
+
+    def test_what_may_have_been_sent_is_ended(
+        self, simulator: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        write = drive.bus.write
+
+        def interrupted(*what: Any, **how: Any) -> None:
+            write(*what, **how)
+            if what[1] == COMMAND and what[2] == 1:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(drive.bus, "write", interrupted)
+        with pytest.raises(KeyboardInterrupt), drive.running():
+            pytest.fail("it was not started")
+        assert commands(simulator)[-1] == STOP
+
+    def test_the_same_where_it_is_awaited(self, simulator: Simulator, drive: Drive) -> None:
+        async def main() -> None:
+            async with drivebus.aio.Bus(simulator, timeout=0.25) as bus:
+                other = await bus.drive(1)
+                task = asyncio.ensure_future(block(other))
+                await asyncio.sleep(0)  # it has asked its first question, and waits for the answer
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
+                assert task.cancelled()
+
+        async def block(other: drivebus.aio.Drive) -> None:
+            async with other.running(20.0):
+                pytest.fail("it was not started")
+
+        at_speed(drive, 10.0)
+        asyncio.run(main())
+        assert [word for word in commands(simulator) if word in (STOP, COAST)] == []
