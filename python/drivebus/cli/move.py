@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +17,19 @@ from drivebus.cli.types import Hertz, Seconds
 __all__ = ["COMMANDS"]
 
 
-@click.command()
+class _Run(click.Command):
+    """Takes `-5` for a speed, which it is not allowed to be, and not for an option."""
+
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        for before, word in zip(["", *args], args, strict=False):
+            if before != "--wait" and re.fullmatch(r"-\d+(\.\d*)?", word):
+                raise click.UsageError(
+                    f"{word} Hz is no speed; `drivebus run {word[1:]} --reverse` turns the other way", context
+                )
+        return super().parse_args(context, args)
+
+
+@click.command(cls=_Run)
 @click.argument("hz", type=Hertz(0), required=False)
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
 @click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
