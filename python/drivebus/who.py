@@ -103,9 +103,10 @@ def _not_sure(found: Identification) -> NotAllowed:
         if len(found.candidates) == len(shipped) == 1
         else ""
     )
+    like = shipped[0] if len(shipped) == 1 else f"one of {', '.join(shipped or profiles())}"
     return NotAllowed(
         f"unit {found.unit} is not surely of one family: {known} ({found.certainty}: {found.reason}). The registers "
-        "and command codes of another family may differ; if you know that it behaves like one of "
-        f"{', '.join(shipped or profiles())}, give profile=… (`--profile`){with_one}",
+        f"and command codes of another family may differ; if you know that it behaves like {like}, "
+        f"give profile=… (`--profile`){with_one}",
         unit=found.unit,
     )
