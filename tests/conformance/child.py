@@ -13,6 +13,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 START = 30.0  # seconds for an interpreter and its imports
+BOUND = 5.0  # seconds for a call
 
 
 class Missing(Exception):
@@ -37,7 +38,7 @@ class Outcome:
 class Child:
     """One library in a process of its own. `bound` is what a call may take at most, in seconds."""
 
-    def __init__(self, library: str, bound: float = 5.0) -> None:
+    def __init__(self, library: str, bound: float = BOUND) -> None:
         self.bound = bound
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.conformance.worker", library],

@@ -6,7 +6,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from .child import Child
+from .child import BOUND, Child
 from .rows import Row
 from .slave import Slave
 from .verdict import ERROR, Recovery, Verdict, recovery
@@ -20,12 +20,12 @@ class Result:
     recovery: Recovery
 
 
-def play(row: Row, library: str, *, mute: bool = False, timeout: float = 0.2) -> Result:
-    """Runs one row. `mute`: the unit does not answer 08H."""
+def play(row: Row, library: str, *, mute: bool = False, timeout: float = 0.2, bound: float = BOUND) -> Result:
+    """Runs one row. `mute`: the unit does not answer 08H. `bound`: what a call may take."""
     with (
         tempfile.TemporaryDirectory() as folder,
         Slave(Path(folder), row.behaviour, mute=mute, echo=row.echo) as slave,
-        Child(library) as child,
+        Child(library, bound) as child,
     ):
         opened = child.open(slave.port, timeout=timeout, retries=row.retries)
         if not opened.returned:
