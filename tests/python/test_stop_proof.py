@@ -155,6 +155,21 @@ class TestAFallThatProvesNothing:
         with pytest.raises(Unconfirmed, match="with commands from the keypad"):
             drive.stop()
 
+    def test_a_coast_that_is_not_obeyed_while_a_stop_ends(self, drive: Drive) -> None:
+        """Below its setpoint too: what falls is the ramp of the stop, and the motor is fed until that has ended."""
+        at_speed(drive, 20.0)
+        drive.stop()
+        drive.write(OTHER_BUS, unverified=True)
+        drive.coast()
+        assert drive.state() is State.STOPPED
+
+    def test_what_somebody_at_the_keypad_slows_down(self, drive: Drive) -> None:
+        at_speed(drive, 20.0)
+        drive.stop()
+        drive.write("P00.01", 0, unverified=True)
+        drive.stop()
+        assert drive.state() is State.STOPPED
+
 
 class TestAStopThatWorksMeanwhile:
     """It passes, only later: where the fall has two reasons, it is looked at until one is left."""

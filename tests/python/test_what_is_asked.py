@@ -189,6 +189,25 @@ class TestWhatGoesFirst:
         assert {address for address, _ in bus.calls("read")} == {STATE, FREQUENCY}
         assert all(how["urgent"] for _, _, how in bus.asked)
 
+    def test_looks_beyond_their_time_do_not(self, bus: StandIn, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A fall that is looked at for long, because a lower setpoint explains it too, lets others have the line."""
+        take = bus._take
+
+        def slow_down(what: str, address: int, **how: object) -> None:
+            take(what, address, **how)
+            bus.words |= {STATE: FORWARD, FREQUENCY: bus.words[FREQUENCY] - 10, FREQUENCY + 1: 1000}
+
+        bus.words[FREQUENCY] = 5000
+        monkeypatch.setattr(bus, "_take", slow_down)
+        sent = bus.clock
+        drive.stop(confirm=0.5)
+        assert bus.clock > sent + 1.0
+        urgent = [how["urgent"] for _, how in bus.calls("read")]
+        assert urgent == sorted(urgent, reverse=True)
+        # One look every 20 ms.
+        assert urgent.count(True) == pytest.approx(2 * 0.5 / 0.02, abs=4)
+        assert urgent.count(False) > 50
+
     def test_what_starts_or_looks_does_not(self, bus: StandIn, drive: Drive) -> None:
         drive.run(10.0)
         drive.status()
