@@ -3,7 +3,7 @@
 //! [`Bus`] drives the state machines of `drivebus-rtu` over any [`Line`]: a serial port, a serial server, a Modbus TCP
 //! gateway, or the simulated line of `drivebus-sim`. It is safe from any thread. One caller at a time owns the line; the
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
-//! over at its last byte.
+//! over at its last byte. The documentation of `drivebus-sim` opens one and asks something.
 
 mod attempt;
 mod backoff;

@@ -35,6 +35,30 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A [`Bus`](drivebus_line::Bus) over it asks as it does over a serial port: it keeps the silence, repeats reads, and takes
+//! no late answer. What the words mean says a `Profile` of `drivebus-drives`.
+//!
+//! ```
+//! use drivebus_line::{Bus, BusOptions, CallOptions};
+//! use drivebus_rtu::{Answer, Destination, Request, SerialFormat, UnitAddress};
+//! use drivebus_sim::{Options, Simulator};
+//!
+//! let simulator = Simulator::new([(1, "gd350"), (2, "vfd500")], Options::default())?;
+//! let opener = move || Ok(Box::new(simulator.open_line()?) as _);
+//! let bus = Bus::open(Box::new(opener), BusOptions::new(SerialFormat::default()), &mut || false)?;
+//!
+//! let unit = Destination::Unit(UnitAddress::new(1)?);
+//! let mut words = Vec::new();
+//! let mut take = |answer: Answer<'_>| {
+//!     if let Answer::Read { words: read, .. } = answer {
+//!         words.extend(read.iter());
+//!     }
+//! };
+//! bus.call(unit, &Request::read(0x2103, 1)?, CallOptions::default(), &mut || false, &mut take)?;
+//! assert_eq!(words, [0x01A0]); // a Goodrive350
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Where it differs from hardware
 //!
 //! - Assumption: a unit takes a request as it is after exactly 3.5 characters of silence. A gap of more than 1.5
