@@ -265,6 +265,20 @@ def test_a_file_of_a_profile_of_somebodys_own_says_so(virtual_bus: Bus, tmp_path
         Backup.load(file)
 
 
+@pytest.mark.parametrize("code", ["utf-16-le", "utf-16-be"])
+def test_a_file_in_two_bytes_a_letter_says_so(file: Path, code: str) -> None:
+    """As Windows' own editors and shells may save it."""
+    file.write_bytes(("\ufeff" + HEAD).encode(code))
+    with pytest.raises(NotAllowed, match="was saved as UTF-16, and a backup is UTF-8") as caught:
+        Backup.load(file)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_of_a_text_that_is_no_backup_a_few_lines_are_told(file: Path) -> None:
+    assert len(wrong(file, "one line of many\n" * 80)) == 21
+    assert len(wrong(file, HEAD + "one line of many\n" * 80)) == 80
+
+
 def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(NotAllowed, match="file"):

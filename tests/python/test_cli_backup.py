@@ -157,15 +157,42 @@ def test_the_factory_is_a_side(simulator: drivebus.Simulator, file: Path) -> Non
     assert run(None, "diff", file, "factory").exit_code == 2
 
 
-def test_an_interrupted_diff_is_no_difference(
-    simulator: drivebus.Simulator, file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
+NOTES = pytest.mark.skipif(sys.version_info < (3, 11), reason="errors have no notes")
 
+
+def interrupt(patch: pytest.MonkeyPatch, what: str, first: int) -> None:
+    """Ctrl-C when *what*, `"read"` or `"write"`, is asked for at the address *first*."""
+    request = getattr(drivebus.Bus, what)
+
+    def interrupted(bus: drivebus.Bus, unit: int, address: int, *args: Any, **how: Any) -> Any:
+        if address == first:
+            raise KeyboardInterrupt
+        return request(bus, unit, address, *args, **how)
+
+    patch.setattr(drivebus.Bus, what, interrupted)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["diff"], "Interrupted."),
+        pytest.param(["backup", "--force"], "16 of 52 parameters are in ", marks=NOTES),
+        pytest.param(["restore", "--yes"], "restored before it: P00.11; restored again", marks=NOTES),
+    ],
+)
+def test_who_interrupts_is_told_what_was_done(
+    simulator: drivebus.Simulator, file: Path, monkeypatch: pytest.MonkeyPatch, command: list[str], said: str
+) -> None:
     run(simulator, "backup", file)
-    monkeypatch.setattr(drivebus.Drive, "diff", interrupted)
-    assert run(simulator, "diff", file).exit_code == 130
+    store(simulator, "P00.11=3.0", "P00.12=4.0")
+    with monkeypatch.context() as patch:
+        if command[0] == "restore":
+            interrupt(patch, "write", 0x000C)
+        else:
+            interrupt(patch, "read", 0x0206)
+        result = run(simulator, *command, file)
+    assert (result.exit_code, said in result.stderr) == (130, True)
+    assert run(simulator, *command, file).exit_code == (1 if command[0] == "diff" else 0)
 
 
 def test_going_on_is_said(simulator: drivebus.Simulator, file: Path) -> None:

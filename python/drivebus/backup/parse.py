@@ -31,6 +31,8 @@ _LONGEST = 1000
 """Characters a line may have."""
 _SHOWN = 100
 """Wrong lines that a message names; the rest is counted."""
+_SHOWN_OF_NO_BACKUP = 20
+"""The same where no line says that it is one: it may be anything."""
 
 _TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
 _DRIVE: dict[str, tuple[type, str]] = {
@@ -82,9 +84,10 @@ class _File:
         """The error that names each wrong line; *profile* is what they were checked against."""
         self.wrong.sort()
         # What cannot be printed would do something to the terminal that shows it.
-        lines = [f"{self.path}:{line}: {printable(reason)}" for line, reason in self.wrong[:_SHOWN]]
-        if len(self.wrong) > _SHOWN:
-            lines.append(f"and {len(self.wrong) - _SHOWN} more")
+        most = _SHOWN if {"format", "family"} & self.tried else _SHOWN_OF_NO_BACKUP
+        lines = [f"{self.path}:{line}: {printable(reason)}" for line, reason in self.wrong[:most]]
+        if len(self.wrong) > most:
+            lines.append(f"and {len(self.wrong) - most} more")
         read_with = self.drive.get("profile")
         if profile is not None and read_with not in (None, profile.name):
             lines.append(
@@ -106,6 +109,8 @@ def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], Pr
     Raises:
         NotAllowed: It is no backup, or lines are wrong; the message names all of them.
     """
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise NotAllowed(f"{path} was saved as UTF-16, and a backup is UTF-8: save it as that; nothing was sent")
     file = _File(path)
     for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), 1):
         try:

@@ -18,7 +18,7 @@ from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
-from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, Refused
+from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
 
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping
@@ -50,6 +50,14 @@ class Restore:
 
     async def run(self, *, groups: Sequence[str] | None, serial: bool, motor: bool, force: bool) -> Restoration:
         """See `Drive.restore`."""
+        try:
+            return await self._run(groups=groups, serial=serial, motor=motor, force=force)
+        except (*LINE_ERRORS, KeyboardInterrupt) as error:
+            if not self._dry_run:
+                self._note(error)
+            raise
+
+    async def _run(self, *, groups: Sequence[str] | None, serial: bool, motor: bool, force: bool) -> Restoration:
         chosen = self._rules.selected(self._backup, groups)
         wanted = [code for code in chosen if not self._leave(code)]
         asked = [code for code in wanted if self._rules.unasked(code, serial=serial, motor=motor) is None]
@@ -173,8 +181,8 @@ class Restore:
             else:
                 order.cannot(step)
             return
-        except (*LINE_ERRORS, NotAllowed) as error:
-            _note(error, [code for code, (result, _) in self._results.items() if result == "restored"])
+        except NotAllowed as error:
+            self._note(error)
             raise
         order.wrote(step, float(self._profile.decode(code, shown)))
 
@@ -254,6 +262,13 @@ class Restore:
             if words.raw.get(code) != self._backup.raw[code]:
                 self._results[code] = ("differs", "it was restored, and another parameter changed it afterwards")
 
+    def _note(self, error: BaseException) -> None:
+        """Has *error* say what was restored before it."""
+        restored = [code for code, (result, _) in self._results.items() if result == "restored"]
+        if hasattr(error, "add_note"):
+            done = f"restored before it: {', '.join(restored)}" if restored else "nothing was restored before it"
+            error.add_note(f"{done}; restored again, the drive is given only what it still lacks")
+
     def _item(self, code: str) -> Restored:
         result, reason = self._results[code]
         if code not in self._backup:
@@ -283,9 +298,3 @@ def _unproved(reason: str) -> str:
         f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With unverified=True "
         "(`--unverified`) it is written all the same"
     )
-
-
-def _note(error: DrivebusError, restored: Sequence[str]) -> None:
-    if hasattr(error, "add_note"):
-        done = f"restored before it: {', '.join(restored)}" if restored else "nothing was restored before it"
-        error.add_note(f"{done}; restored again, the drive is given only what it still lacks")

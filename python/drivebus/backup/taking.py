@@ -120,8 +120,10 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
             if progress is not None and (words.raw or words.unread):
                 done += len(words.raw) + len(words.unread)
                 progress(done, total)
-    except BaseException:
+    except BaseException as error:
         keep()
+        if path is not None and hasattr(error, "add_note"):
+            error.add_note(f"{len(raw)} of {total} parameters are in {disk.part_of(path)}; the rest follows")
         raise
     backup = taken(complete=True)
     if path is not None:

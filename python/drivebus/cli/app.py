@@ -48,9 +48,10 @@ class _Commands(click.Group):
             if isinstance(context.obj, Session):
                 context.obj.advise(error)
             context.exit(exit_code(error))
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
             # What click makes of it, 1, would read as a difference.
-            click.echo("Interrupted.", err=True)
+            for line in ("Interrupted.", *getattr(error, "__notes__", ())):
+                click.echo(printable(line), err=True)
             context.exit(130)
         except OSError as error:
             # A reader that has gone ends the command in silence: click sees to that.
