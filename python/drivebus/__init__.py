@@ -30,6 +30,7 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
+from drivebus.figures import Link, Stats
 from drivebus.found import Found, Identification
 from drivebus.poll import Poll
 from drivebus.polling import Batch, Sample
@@ -42,10 +43,8 @@ from drivebus.values import (
     ControlSource,
     Description,
     Fault,
-    Link,
     Snapshot,
     State,
-    Stats,
     Status,
 )
 

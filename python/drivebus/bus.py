@@ -16,12 +16,12 @@ from drivebus._native import SerialFormat
 from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
+from drivebus.figures import Link
 from drivebus.found import Found, Identification
 from drivebus.opening import BusFace, Opening
 from drivebus.poll import Poll
 from drivebus.polling import Sample
 from drivebus.profile import Profile
-from drivebus.values import Link
 
 __all__ = ["Bus"]
 

@@ -8,9 +8,9 @@ from typing import Any, Generic, Protocol, TypeVar
 from drivebus import checks, ports
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
+from drivebus.figures import Stats
 from drivebus.known import KnownUnits
 from drivebus.sim import Simulator
-from drivebus.values import Stats
 
 __all__ = ["BusFace", "Opening"]
 

@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
-from drivebus.values import Description, Fault, Link, Value, WatchdogSettings
+from drivebus.figures import Link
+from drivebus.values import Description, Fault, Value, WatchdogSettings
 
 __all__ = ["AwaitableBus", "BusProtocol", "PlanProtocol", "ProfileProtocol"]
 

@@ -17,10 +17,8 @@ __all__ = [
     "ControlSource",
     "Description",
     "Fault",
-    "Link",
     "Snapshot",
     "State",
-    "Stats",
     "Status",
     "Value",
     "WatchdogSettings",
@@ -281,25 +279,6 @@ class Description:
 
 
 @dataclass(frozen=True)
-class Link:
-    """How well one unit could be reached: its last exchanges, ten at most.
-
-    Attributes: *good*, how many of them brought an answer (a refusal is one), and *asked*, how many there were.
-    """
-
-    good: int
-    asked: int
-
-    @property
-    def failed(self) -> int:
-        """How many of them brought no answer, or a damaged one."""
-        return self.asked - self.good
-
-    def __str__(self) -> str:
-        return f"{self.good} of the last {self.asked} exchanges brought an answer"
-
-
-@dataclass(frozen=True)
 class WatchdogSettings:
     """Which parameters make a drive act by itself when its bus falls silent.
 
@@ -360,48 +339,3 @@ class Snapshot(Mapping[str, Value]):
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value} {self.units[name]}".rstrip() for name, value in self._values.items())
         return f"Snapshot({shown})"
-
-
-class Stats(Mapping[str, Any]):
-    """Counters and latencies: a mapping whose names are attributes too, nested where it is per unit.
-
-    Counters are ints, latencies seconds. `stats.answers`, `stats.units[1].timeouts`.
-    """
-
-    __slots__ = ("_values",)
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values: dict[str, Any] = {
-            key: Stats.nested(value) if isinstance(value, Mapping) else value for key, value in values.items()
-        }
-
-    @staticmethod
-    def nested(values: Mapping[Any, Any]) -> Any:
-        """A mapping by name becomes `Stats`; one by unit stays a dict of `Stats`."""
-        if all(isinstance(key, str) for key in values) and values:
-            return Stats(values)
-        return {key: Stats(value) if isinstance(value, Mapping) else value for key, value in values.items()}
-
-    def __getitem__(self, name: str) -> Any:
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            raise AttributeError(f"no such figure: {name!r}; there are {', '.join(self._values)}") from None
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._values]
-
-    def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={value!r}" for name, value in self._values.items())
-        return f"Stats({shown})"

@@ -17,10 +17,10 @@ from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
+from drivebus.figures import Link
 from drivebus.found import Found, Identification
 from drivebus.opening import BusFace, Opening
 from drivebus.profile import Profile
-from drivebus.values import Link
 
 __all__ = ["Bus"]
 

@@ -1,0 +1,246 @@
+//! Who comes next, on paper: priorities, units that take turns, and who was overtaken long enough.
+
+use proptest::prelude::*;
+
+use super::*;
+
+use Priority::{Poll, Read, Stop, Write};
+
+fn unit(raw: u8) -> Option<UnitAddress> {
+    UnitAddress::new(raw).ok()
+}
+
+/// Comes and waits; what is kept about it is its name.
+fn come(order: &mut Order<u32>, priority: Priority, raw: u8, name: u32) -> Ticket {
+    let ticket = order.ticket(priority, unit(raw));
+    order.wait(ticket, name);
+    ticket
+}
+
+/// Gives the next one its turn.
+fn serve(order: &mut Order<u32>) -> u32 {
+    let ticket = order.waiting[order.next_index().unwrap()].ticket;
+    order.take(ticket).unwrap()
+}
+
+fn serve_all(order: &mut Order<u32>) -> Vec<u32> {
+    (0..order.waiting.len()).map(|_| serve(order)).collect()
+}
+
+#[test]
+fn stops_come_first_then_writes_reads_and_polling() {
+    let mut order = Order::default();
+    for (name, priority) in (0..).zip([Poll, Read, Write, Stop, Poll, Read, Write, Stop]) {
+        come(&mut order, priority, 1, name);
+    }
+    assert_eq!(order.next_ticket().map(|ticket| ticket.is_stop()), Some(true));
+    assert_eq!(serve_all(&mut order), [3, 7, 2, 6, 1, 5, 0, 4]);
+}
+
+#[test]
+fn only_the_next_one_can_take_the_turn() {
+    let mut order = Order::default();
+    let read = come(&mut order, Read, 1, 1);
+    let write = come(&mut order, Write, 1, 2);
+    assert_eq!(order.take(read), None);
+    assert_eq!(order.take(write), Some(2));
+    assert_eq!(order.take(write), None);
+    assert_eq!(order.take(read), Some(1));
+    assert_eq!(order.next(), None);
+}
+
+#[test]
+fn units_take_turns_however_many_ask_for_one_of_them() {
+    let mut order = Order::default();
+    for (name, raw) in [(10, 1), (11, 1), (12, 1), (13, 1), (20, 2), (21, 2), (30, 3), (0, 0), (1, 0)] {
+        come(&mut order, Read, raw, name);
+    }
+    assert_eq!(serve_all(&mut order), [10, 20, 30, 0, 11, 21, 1, 12, 13]);
+    // Unit 3 waited longest for its last turn, though it asks last now.
+    for (name, raw) in [(14, 1), (22, 2), (31, 3)] {
+        come(&mut order, Read, raw, name);
+    }
+    assert_eq!(serve_all(&mut order), [31, 22, 14]);
+}
+
+#[test]
+fn stops_and_writes_take_nothing_from_the_reads_of_their_unit() {
+    let mut order = Order::default();
+    come(&mut order, Read, 2, 20);
+    serve_all(&mut order);
+    for name in 0..3 {
+        come(&mut order, Stop, 1, name);
+        come(&mut order, Write, 1, name);
+    }
+    serve_all(&mut order);
+    come(&mut order, Read, 2, 21);
+    come(&mut order, Read, 1, 10);
+    assert_eq!(serve_all(&mut order), [10, 21]);
+}
+
+#[test]
+fn who_was_overtaken_thirty_two_times_is_next() {
+    let mut order = Order::default();
+    come(&mut order, Poll, 1, 1);
+    come(&mut order, Read, 2, 2);
+    for turn in 0..100 {
+        come(&mut order, Write, 3, 1000 + turn);
+        // The one that came first after 32 turns, the other after 32 more.
+        let expected = match turn {
+            32 => 1,
+            65 => 2,
+            turn => 1000 + turn - u32::from(turn > 32) - u32::from(turn > 65),
+        };
+        assert_eq!(serve(&mut order), expected, "turn {turn}");
+    }
+}
+
+#[test]
+fn who_is_dismissed_waits_no_longer() {
+    let mut order = Order::default();
+    for name in 0..6 {
+        come(&mut order, Read, 1, name);
+    }
+    assert_eq!(order.dismiss(|name| name % 2 == 0), [0, 2, 4]);
+    assert_eq!(serve_all(&mut order), [1, 3, 5]);
+    assert_eq!(order.next_ticket(), None);
+}
+
+#[test]
+fn a_stop_is_never_held_back() {
+    let mut order = Order::default();
+    come(&mut order, Read, 1, 99);
+    for name in 0..100 {
+        come(&mut order, Stop, 2, name);
+        assert_eq!(serve(&mut order), name);
+    }
+    // Nor do stops count as overtaking: a write still goes first.
+    come(&mut order, Write, 2, 100);
+    assert_eq!(serve_all(&mut order), [100, 99]);
+}
+
+#[test]
+fn who_steps_aside_stays_ahead_of_all_but_stops() {
+    let mut order = Order::default();
+    let poll = come(&mut order, Poll, 1, 1);
+    assert_eq!(order.take(poll), Some(1));
+    come(&mut order, Write, 2, 2);
+    come(&mut order, Stop, 3, 3);
+    assert!(order.has_stop());
+    order.step_aside(poll, 1);
+    come(&mut order, Stop, 4, 4);
+    assert_eq!(serve_all(&mut order), [3, 4, 1, 2]);
+    assert!(!order.has_stop());
+}
+
+/// One of the callers of the model.
+#[derive(Debug, Clone)]
+struct Caller {
+    arrival: usize,
+    class: u8,
+    unit: u8,
+    overtaken: u32,
+}
+
+/// The rule as a sort over the whole history: `past` holds the class and unit of every turn there was.
+fn sorted(callers: &mut [Caller], past: &[(u8, u8)]) {
+    callers.sort_by_key(|caller| {
+        let kin = (caller.class, caller.unit);
+        let last_turn = past.iter().rposition(|&turn| turn == kin).map_or(0, |index| index + 1);
+        let late = caller.overtaken >= 32;
+        match caller.class {
+            0 => (0, 0, 0, caller.arrival),
+            _ if late => (1, 0, 0, caller.arrival),
+            class => (2, class, last_turn, caller.arrival),
+        }
+    });
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Come { class: u8, unit: u8 },
+    Serve,
+    Leave(prop::sample::Index),
+}
+
+/// Some steps in any order, or a rush of writes that overtake whoever waits.
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let step = prop_oneof![
+        3 => (0u8..4, 0u8..4).prop_map(|(class, unit)| Step::Come { class, unit }),
+        2 => Just(Step::Serve),
+        1 => any::<prop::sample::Index>().prop_map(Step::Leave),
+    ];
+    let rush =
+        (10usize..40, 0u8..4).prop_map(|(count, unit)| [Step::Come { class: 1, unit }, Step::Serve].repeat(count));
+    prop_oneof![prop::collection::vec(step, 1..12), rush]
+}
+
+proptest! {
+    #[test]
+    fn the_order_is_that_of_the_model(steps in prop::collection::vec(steps(), 0..20)) {
+        let mut order = Order::default();
+        let mut callers: Vec<Caller> = Vec::new();
+        let mut past = Vec::new();
+        let mut tickets = Vec::new();
+        for step in steps.into_iter().flatten() {
+            match step {
+                Step::Come { class, unit: raw } => {
+                    let arrival = tickets.len();
+                    let priority = [Stop, Write, Read, Poll][usize::from(class)];
+                    tickets.push(come(&mut order, priority, raw, u32::try_from(arrival).unwrap()));
+                    callers.push(Caller { arrival, class, unit: raw, overtaken: 0 });
+                }
+                Step::Leave(index) if !callers.is_empty() => {
+                    let gone = callers.remove(index.index(callers.len()));
+                    order.leave(tickets[gone.arrival]);
+                }
+                Step::Serve if !callers.is_empty() => {
+                    sorted(&mut callers, &past);
+                    let first = callers.remove(0);
+                    past.push((first.class, first.unit));
+                    for other in &mut callers {
+                        if first.overtaken >= 32 && other.arrival > first.arrival {
+                            other.overtaken = 0;
+                        } else if (1..other.class).contains(&first.class) && first.arrival > other.arrival {
+                            other.overtaken += 1;
+                        }
+                    }
+                    prop_assert_eq!(serve(&mut order), u32::try_from(first.arrival).unwrap());
+                }
+                Step::Leave(_) | Step::Serve => {}
+            }
+            prop_assert_eq!(order.is_empty(), callers.is_empty());
+        }
+    }
+
+    /// Whatever comes later, who waits is served after at most 32 overtaking turns for itself and each who was there.
+    #[test]
+    fn nobody_starves(
+        before in prop::collection::vec((0u8..4, 0u8..4), 0..6),
+        class in 1u8..4,
+        later in prop::collection::vec((1u8..4, 0u8..4), 600),
+    ) {
+        let priorities = [Stop, Write, Read, Poll];
+        let mut order = Order::default();
+        for &(class, raw) in &before {
+            come(&mut order, priorities[usize::from(class)], raw, 0);
+        }
+        come(&mut order, priorities[usize::from(class)], 1, 1);
+        let mut overtaken = 0;
+        let mut served = false;
+        for (other, raw) in later {
+            let name = 2 + u32::from(other);
+            come(&mut order, priorities[usize::from(other)], raw, name);
+            match serve(&mut order) {
+                1 => {
+                    served = true;
+                    break;
+                }
+                name if name >= 2 && name - 2 < u32::from(class) => overtaken += 1,
+                _ => {}
+            }
+        }
+        prop_assert!(served);
+        prop_assert!(overtaken <= 32 * (before.len() + 1), "overtaken {} times", overtaken);
+    }
+}
