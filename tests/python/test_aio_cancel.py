@@ -7,7 +7,8 @@ import gc
 import random
 import sys
 from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -35,6 +36,16 @@ def requests(simulator: Simulator) -> list[bytes]:
 
 def line(**options: Any) -> Simulator:
     return Simulator({1: "gd350", 2: "gd350"}, transport="process", **options)
+
+
+@asynccontextmanager
+async def obedient(**options: Any) -> AsyncIterator[tuple[Simulator, drivebus.aio.Drive]]:
+    """A line, and a drive on it that obeys the bus."""
+    with line(**options) as simulator:
+        async with drivebus.aio.Bus(simulator) as bus:
+            drive = await bus.drive(1)
+            await drive.prepare_control()
+            yield simulator, drive
 
 
 async def until(true: Callable[[], bool]) -> None:
@@ -158,103 +169,91 @@ class TestMotor:
 
     def test_it_is_stopped_where_its_task_is_cancelled(self, run: Run) -> None:
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
-                    inside = asyncio.Event()
+            async with obedient(clock="virtual") as (simulator, drive):
+                inside = asyncio.Event()
 
-                    async def work() -> None:
-                        async with drive.running(10.0):
-                            inside.set()
-                            await asyncio.Event().wait()
+                async def work() -> None:
+                    async with drive.running(10.0):
+                        inside.set()
+                        await asyncio.Event().wait()
 
-                    task = asyncio.create_task(work())
-                    await inside.wait()
-                    task.cancel()
-                    with pytest.raises(asyncio.CancelledError):
-                        await task
-                    assert commands(simulator) == [FORWARD, STOP]
-                    assert (await drive.wait_until_stopped()).state is State.STOPPED
+                task = asyncio.create_task(work())
+                await inside.wait()
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                assert commands(simulator) == [FORWARD, STOP]
+                assert (await drive.wait_until_stopped()).state is State.STOPPED
 
         run(main())
 
     def test_however_often_it_is_cancelled_while_it_stops(self, run: Run) -> None:
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
-                    inside = asyncio.Event()
+            async with obedient(clock="virtual") as (simulator, drive):
+                inside = asyncio.Event()
 
-                    async def work() -> None:
-                        async with drive.running(10.0):
-                            inside.set()
-                            # The stop, the retries of the stop, and the coast: all but the last are lost.
-                            simulator.line.drop_answers(20)
-                            await asyncio.Event().wait()
+                async def work() -> None:
+                    async with drive.running(10.0):
+                        inside.set()
+                        # The stop, the retries of the stop, and the coast: all but the last are lost.
+                        simulator.line.drop_answers(20)
+                        await asyncio.Event().wait()
 
-                    task = asyncio.create_task(work())
-                    await inside.wait()
-                    while not task.done():
-                        task.cancel()
-                        await asyncio.sleep(0)
-                    assert task.cancelled()
-                    assert commands(simulator)[0] == FORWARD
-                    assert set(commands(simulator)[1:]) <= {STOP, COAST}
-                    assert (await drive.wait_until_stopped()).state is State.STOPPED
+                task = asyncio.create_task(work())
+                await inside.wait()
+                while not task.done():
+                    task.cancel()
+                    await asyncio.sleep(0)
+                assert task.cancelled()
+                assert commands(simulator)[0] == FORWARD
+                assert set(commands(simulator)[1:]) <= {STOP, COAST}
+                assert (await drive.wait_until_stopped()).state is State.STOPPED
 
         run(main())
 
     @pytest.mark.parametrize("steps", range(0, 40, 3))
     def test_wherever_its_start_is_cancelled(self, steps: int) -> None:
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
+            async with obedient(clock="virtual") as (simulator, drive):
 
-                    async def work() -> None:
-                        async with drive.running(10.0):
-                            await asyncio.Event().wait()
+                async def work() -> None:
+                    async with drive.running(10.0):
+                        await asyncio.Event().wait()
 
-                    task = asyncio.create_task(work())
-                    for _ in range(steps):
-                        await asyncio.sleep(0.0001 if steps % 2 else 0)
-                    task.cancel()
-                    with pytest.raises(asyncio.CancelledError):
-                        await task
-                    sent = commands(simulator)
-                    assert sent in ([], [STOP], [FORWARD, STOP])
-                    assert not (await drive.state()).running or sent[-1] == STOP
+                task = asyncio.create_task(work())
+                for _ in range(steps):
+                    await asyncio.sleep(0.0001 if steps % 2 else 0)
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                sent = commands(simulator)
+                assert sent in ([], [STOP], [FORWARD, STOP])
+                assert not (await drive.state()).running or sent[-1] == STOP
 
         asyncio.run(main())
 
     def test_an_error_from_inside_comes_through_and_a_cancellation_meanwhile_is_not_lost(self) -> None:
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
-                    with pytest.raises(ValueError, match="inside"):
-                        async with drive.running(10.0):
-                            raise ValueError("inside")
-                    assert commands(simulator) == [FORWARD, STOP]
+            async with obedient(clock="virtual") as (simulator, drive):
+                with pytest.raises(ValueError, match="inside"):
+                    async with drive.running(10.0):
+                        raise ValueError("inside")
+                assert commands(simulator) == [FORWARD, STOP]
 
-                    async def work() -> None:
-                        async with drive.running(10.0):
-                            asyncio.get_running_loop().call_soon(task.cancel)
-                            raise ValueError("inside")
+                async def work() -> None:
+                    async with drive.running(10.0):
+                        asyncio.get_running_loop().call_soon(task.cancel)
+                        raise ValueError("inside")
 
-                    task = asyncio.create_task(work())
-                    with pytest.raises(asyncio.CancelledError) as raised:
-                        await task
-                    # CPython 3.10 raises a cancellation of its own around the one that was raised.
-                    inner = raised.value.__context__
-                    while isinstance(inner, asyncio.CancelledError):
-                        inner = inner.__context__
-                    assert isinstance(inner, ValueError)
-                    assert commands(simulator)[2:] == [FORWARD, STOP]
+                task = asyncio.create_task(work())
+                with pytest.raises(asyncio.CancelledError) as raised:
+                    await task
+                # CPython 3.10 raises a cancellation of its own around the one that was raised.
+                inner = raised.value.__context__
+                while isinstance(inner, asyncio.CancelledError):
+                    inner = inner.__context__
+                assert isinstance(inner, ValueError)
+                assert commands(simulator)[2:] == [FORWARD, STOP]
 
         asyncio.run(main())
 
@@ -262,19 +261,16 @@ class TestMotor:
         loop = Ahead()
 
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
+            async with obedient(clock="virtual") as (simulator, drive):
 
-                    async def work() -> None:
-                        async with drive.running(10.0):
-                            loop.ahead = 3600.0
-                            await asyncio.Event().wait()
+                async def work() -> None:
+                    async with drive.running(10.0):
+                        loop.ahead = 3600.0
+                        await asyncio.Event().wait()
 
-                    with pytest.raises(asyncio.TimeoutError):
-                        await asyncio.wait_for(work(), 1800.0)
-                    assert commands(simulator) == [FORWARD, STOP]
+                with pytest.raises(asyncio.TimeoutError):
+                    await asyncio.wait_for(work(), 1800.0)
+                assert commands(simulator) == [FORWARD, STOP]
 
         try:
             loop.run_until_complete(main())
@@ -318,26 +314,23 @@ class TestMotor:
 
     def test_a_cancelled_watchdog_gives_back_what_the_drive_had(self) -> None:
         async def main() -> None:
-            with line(clock="virtual") as simulator:
-                async with drivebus.aio.Bus(simulator) as bus:
-                    drive = await bus.drive(1)
-                    await drive.prepare_control()
-                    async with drive.watchdog(30.0, "stop", unverified=True) as watchdog:
-                        assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (True, 300)
-                    assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (False, 0)
+            async with obedient(clock="virtual") as (simulator, drive):
+                async with drive.watchdog(30.0, "stop", unverified=True) as watchdog:
+                    assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (True, 300)
+                assert (watchdog.armed, simulator.drive(1).register(0x0E04)) == (False, 0)
 
-                    async def work() -> None:
-                        async with drive.watchdog(30.0, unverified=True):
-                            inside.set()
-                            await asyncio.Event().wait()
+                async def work() -> None:
+                    async with drive.watchdog(30.0, unverified=True):
+                        inside.set()
+                        await asyncio.Event().wait()
 
-                    inside = asyncio.Event()
-                    task = asyncio.create_task(work())
-                    await inside.wait()
-                    task.cancel()
-                    with pytest.raises(asyncio.CancelledError):
-                        await task
-                    assert simulator.drive(1).register(0x0E04) == 0
-                    assert "watchdog" not in " ".join(task.get_name() for task in asyncio.all_tasks())
+                inside = asyncio.Event()
+                task = asyncio.create_task(work())
+                await inside.wait()
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                assert simulator.drive(1).register(0x0E04) == 0
+                assert "watchdog" not in " ".join(task.get_name() for task in asyncio.all_tasks())
 
         asyncio.run(main())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,20 +12,12 @@ import drivebus
 import drivebus.aio
 from drivebus import Backup, Bus, Drive, NotAllowed, Simulator
 
-Store = Callable[[Drive, Mapping[str, object]], None]
-RAM = 0x8000
-OTHER = {"P00.03": 60.0, "P00.04": 55.0, "P00.11": 3.0, "P00.12": 4.0, "P01.20": 1.5, "P09.01": -12.5}
-"""Values that are not those of the factory."""
+from .kept import OTHER, Store
 
 
 @pytest.fixture
 def drive(virtual_bus: Bus) -> Drive:
     return virtual_bus.drive(1, "gd350")
-
-
-def stored(simulator: Simulator) -> list[int]:
-    """The addresses of EEPROM that were written since it was asked last."""
-    return [address for _, address, _ in simulator.drive(1).take_writes() if not address & RAM]
 
 
 def test_every_parameter_is_read_in_the_fewest_reads(virtual: Simulator, drive: Drive) -> None:

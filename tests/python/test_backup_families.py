@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
@@ -12,6 +11,8 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, NotAllowed, Refused, Simulator
+
+from .kept import once, times_stored
 
 DiesAt = Callable[[int, bool], AbstractContextManager[None]]
 
@@ -72,8 +73,7 @@ def test_there_and_back_again(family: str, unverified: bool, tmp_path: Path) -> 
 
         report = drive.restore(path, motor=True, serial=True)
         assert (report.ok, {item.code for item in report.having("restored")}) == (True, {*changed})
-        times = Counter(address for _, address, _ in machine.take_writes())
-        assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
+        assert times_stored(simulator) == once(drive, changed)
         machine.power_cycle()
         assert not drive.diff(path)
 
@@ -97,8 +97,7 @@ def test_cut_off_at_any_moment_no_memory_is_written_twice(family: str, dies_at: 
                 drive = bus.drive(1, family)
                 assert drive.restore(kept, serial=True, motor=True).ok
                 assert not drive.diff(kept)
-            times = Counter(address for _, address, _ in machine.take_writes())
-            assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
+            assert times_stored(simulator) == once(drive, changed)
             assert machine.eeprom_writes - before == len(changed)
 
 
@@ -123,8 +122,7 @@ def test_over_a_bad_line_no_memory_is_written_twice(family: str, seed: int) -> N
             drive = bus.drive(1, family)
             assert drive.restore(kept, motor=True, serial=True).ok
             assert not drive.diff(kept)
-        times = Counter(address for _, address, _ in machine.take_writes())
-        assert times == dict.fromkeys((drive.profile.address(code, store=True) for code in changed), 1)
+        assert times_stored(simulator) == once(drive, changed)
 
 
 def test_some_are_changed() -> None:

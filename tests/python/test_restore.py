@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +10,12 @@ import pytest
 
 from drivebus import Backup, Bus, Drive, NoAnswer, NotAllowed, Simulator
 
-Store = Callable[[Drive, Mapping[str, object]], None]
-RAM = 0x8000
-OTHER = {"P00.03": 60.0, "P00.04": 55.0, "P00.11": 3.0, "P00.12": 4.0, "P01.20": 1.5, "P09.01": -12.5}
-"""Values that are not those of the factory."""
+from .kept import OTHER, RAM, Store, stored
 
 
 @pytest.fixture
 def drive(virtual_bus: Bus) -> Drive:
     return virtual_bus.drive(1, "gd350")
-
-
-def stored(simulator: Simulator) -> list[int]:
-    """The addresses of EEPROM that were written since it was asked last."""
-    return [address for _, address, _ in simulator.drive(1).take_writes() if not address & RAM]
 
 
 @pytest.mark.parametrize("up", [True, False])

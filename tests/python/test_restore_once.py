@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from drivebus import Backup, Bus, Drive, Profile, Simulator
 
+from .kept import Store
 from .limited import accepts, in_any_order, in_any_way
 
-Store = Callable[[Drive, Mapping[str, object]], None]
 MEMORY = 0x8000
 """The bit of an address that says to which memory a value goes."""
 BEYOND = {"P00.03": 50.0, "P00.04": 80.0}
