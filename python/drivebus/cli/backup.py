@@ -106,8 +106,8 @@ def restore(
             _show_report(session, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
     if not plan.ok:
         failed = sum(item.failed for item in plan)
-        what = "parameter was" if failed == 1 else "parameters were"
-        click.echo(f"{failed} {what} not restored{', and cannot be' if plan.dry_run else ''}: see above.", err=True)
+        were = "would not be" if dry_run else "was not" if failed == 1 else "were not"
+        click.echo(f"{failed} parameter{'' if failed == 1 else 's'} {were} restored: see above.", err=True)
         raise click.exceptions.Exit(1)
 
 
