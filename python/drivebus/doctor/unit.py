@@ -66,7 +66,8 @@ def unit_findings(
     yield from _answers(unit, tally, found)
     if tally.answered:
         yield _turnaround(unit, tally.turnarounds)
-    if not tally.answered:
+    # To refuse an echo is an answer too.
+    if not tally.answered and tally.refused is None:
         return
     tell(f"reading the settings of unit {unit}")
     try:
@@ -248,10 +249,10 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float], is_named: bool) 
     known = set(profile.names())
     if "P14.03" in known:
         delay = float(drive.read("P14.03")) / 1e3
-        took = f"{median(turnarounds) * 1e3:.1f} ms"
-        text = f"unit {unit}: its response delay (P14.03) is {delay * 1e3:g} ms, and it took {took}"
+        took = f", and it took {median(turnarounds) * 1e3:.1f} ms" if turnarounds else ""
+        text = f"unit {unit}: its response delay (P14.03) is {delay * 1e3:g} ms{took}"
         values = {"response_delay": delay, "timeout": bus.timeout}
-        if max(delay, *turnarounds) > _SPARE * bus.timeout:
+        if max([delay, *turnarounds]) > _SPARE * bus.timeout:
             yield Finding(
                 "unit",
                 "timeout",
