@@ -289,7 +289,7 @@ def _settings(drive: Drive, bus: Bus, turnarounds: list[float], is_named: bool) 
         )
     control = drive.check_control()
     if not len(control):
-        text = f"what makes unit {unit}, a {profile.title}, obey the bus is not known"
+        text = f"what makes unit {unit} obey the bus is not known of {profile.title}"
         yield Finding("unit", "control", Severity.NOTE, text, unit=unit)
     elif control:
         yield Finding("unit", "control", Severity.OK, f"unit {unit} is set to obey the bus", unit=unit)
