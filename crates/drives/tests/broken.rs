@@ -69,6 +69,7 @@ fn every_mistake_names_file_line_and_reason() {
         ("profile.toml", "max_words = 16", "max_words = ", "string"),
         ("profile.toml", "address = \"group.index\"", "address = \"linear\"", "linear"),
         ("profile.toml", "jog_stop = 8", "jump = 8", "jump"),
+        ("profile.toml", "jog_stop = 8", "jog_stop = \"8H\"", "string \"8H\", expected a number, 0 to 65535"),
         ("profile.toml", "pre_exciting = 6", "dreaming = 6", "dreaming"),
         ("profile.toml", "pre_exciting = 6", "unknown = 6", "unknown"),
         // What profile.toml says by itself.

@@ -93,6 +93,11 @@ fn in_words(message: &str) -> String {
         }
         Some(key) if said("missing field") => missing(&format!("\"{key}\"")),
         Some("\"") if said("invalid basic string") => "text has no closing \" in its line".to_owned(),
-        _ => message.to_owned(),
+        _ => [("u8", "a number, 0 to 255"), ("u16", "a number, 0 to 65535"), ("u32", "a number from 0")]
+            .iter()
+            .find_map(|(kind, plain)| {
+                Some(format!("{}expected {plain}", message.strip_suffix(&format!("expected {kind}"))?))
+            })
+            .unwrap_or_else(|| message.to_owned()),
     }
 }
