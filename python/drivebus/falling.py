@@ -19,6 +19,11 @@ _LONGEST = 60.0
 """Seconds for which a fall is looked at that another reason may have."""
 
 
+_WOBBLE = 0.1
+"""Hertz by which the output frequency of a motor at its speed goes up and down where the drive controls torque or flux:
+a fall by less proves nothing."""
+
+
 class Fall:
     """What was seen of one.
 
@@ -56,5 +61,5 @@ class Fall:
         self._lowest = min(self._lowest, hz)
 
     def proves(self, held: float) -> bool:
-        """Whether it fell, and below *held*, at which a motor that is not stopped would stay."""
-        return self._first is not None and self._lowest < min(self._first, held)
+        """Whether it fell, and well below *held*, at which a motor that is not stopped would stay."""
+        return self._first is not None and self._lowest < min(self._first, held) - _WOBBLE

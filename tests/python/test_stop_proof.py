@@ -8,6 +8,7 @@ that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz.
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -146,6 +147,20 @@ class TestAFallThatProvesNothing:
         drive.write(OTHER_BUS, unverified=True)
         with pytest.raises(Unconfirmed, match=r"coast was sent.*may still be fed.*forward, at 10 Hz"):
             drive.coast()
+
+    def test_a_speed_that_wobbles(self, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
+        """As under vector control: some hundredths of a hertz up and down, at each look."""
+        at_speed(drive)
+        drive.write(OTHER_BUS, unverified=True)
+        read, wobble = drive.bus.read, itertools.cycle([3, -2, 2, -3])
+
+        def wobbling(unit: int, address: int, *rest: int, **how: bool) -> list[int]:
+            words = read(unit, address, *rest, **how)
+            return [words[0] + next(wobble), *words[1:]] if address == FREQUENCY else words
+
+        monkeypatch.setattr(drive.bus, "read", wobbling)
+        with pytest.raises(Unconfirmed, match=r"the motor may still turn.*forward, at \d+(\.\d+)? Hz"):
+            drive.stop()
 
     def test_a_drive_that_obeys_its_keypad(self, drive: Drive) -> None:
         """Its speed then comes from there: whoever stands at it may slow it down."""
