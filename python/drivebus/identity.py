@@ -15,11 +15,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivebus.contradiction import Answer, contradiction, signature_of
-from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
 from drivebus.identify import LOCKED, code_registers
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
+
+_PASSING = (0x06, LOCKED, 0x0A, 0x0B)
+"""Exceptions that say nothing of a unit, for they pass: it is busy or got a damaged request, a password locks it, or a
+gateway does not reach it."""
+
+_DAMAGED = "frame_error"
+"""What profiles call an exception by which a unit says that the request came damaged, whatever its code."""
 
 
 class Identity:
@@ -53,54 +60,70 @@ class Identity:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
-        are one that a password locks and one that contradicts its profile. Whether it does that is looked at only where
-        it is to be *judged*.
+        are one that refuses for the moment only, as where a password locks it or a gateway does not reach it, and one
+        that contradicts its profile. Whether it does that is looked at only where it is to be *judged*.
 
         Returns:
             The connection for which that holds: what is sent on it goes to the unit that was asked.
 
         Raises:
-            NotAllowed: What it says speaks against the profile, or another unit answers at this address now.
+            NotAllowed: What it says speaks against the profile, or another unit answers at this address now, or it was
+                asked again and refused for the moment.
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
         opened = bus.reconnects
         if self._known is not None and opened == self._opened:
             return opened
+        answers: list[Answer] = []
+        failure: NoAnswer | BadAnswer | PortError | None = None
         try:
-            answers = await self._ask(bus)
+            await self._ask(bus, answers)
         except LINE_ERRORS as error:
-            if self._known is None:
-                return opened
-            # `started` stays None: of what was to follow, nothing left.
-            raise type(error)(
-                f"the port was opened again, and unit {self._unit} did not say what it is before anything is written "
-                f"to it ({error}); nothing was written",
-                unit=self._unit,
-                raw=error.raw,
-            ) from error
-        told = self._told(answers)
+            failure = error
         if self._known is None:
-            against = None if self._trusted else contradiction(self._profile, self._unit, answers)
-            if against is None and not any(answer.exception == LOCKED for answer in answers):
-                self._known = told
-            elif against is not None and judged:
-                raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
-        elif told != self._known:
-            raise NotAllowed(
-                f"another drive answers as unit {self._unit} since the port was opened again: its identification was "
-                f"{self._known}, and is {told} now; nothing was sent. If that is right, ask for the drive anew: "
-                f"bus.drive({self._unit})",
-                unit=self._unit,
-            )
+            self._judge(answers, failure is None, judged)
+        else:
+            self._compare(answers, failure, self._known)
         self._opened = opened
         return opened
 
+    def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool) -> None:
+        """Takes what a unit said that was not known; what came before a failure of the line was said all the same."""
+        against = None if self._trusted else contradiction(self._profile, self._unit, answers)
+        if against is not None and judged:
+            raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
+        if against is None and complete and not any(map(self._passes, answers)):
+            self._known = self._told(answers)
+
+    def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
+        """Raises where the unit does not say what is *known* of it any more."""
+        unsaid = f"the port was opened again, and unit {self._unit} did not say what it is before anything is written"
+        if failure is not None:
+            # `started` stays None: of what was to follow, nothing left.
+            raise type(failure)(
+                f"{unsaid} to it ({failure}); nothing was written", unit=self._unit, raw=failure.raw
+            ) from failure
+        told = self._told(answers)
+        if any(map(self._passes, answers)):
+            raise NotAllowed(f"{unsaid} to it ({told}); nothing was written", unit=self._unit)
+        if told != known:
+            raise NotAllowed(
+                f"another drive answers as unit {self._unit} since the port was opened again: its identification was "
+                f"{known}, and is {told} now; nothing was sent. If that is right, ask for the drive anew: "
+                f"bus.drive({self._unit})",
+                unit=self._unit,
+            )
+
     async def contradiction(self, bus: AwaitableBus) -> str | None:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
-        return contradiction(self._profile, self._unit, await self._ask(bus))
+        answers: list[Answer] = []
+        await self._ask(bus, answers)
+        return contradiction(self._profile, self._unit, answers)
 
-    async def _ask(self, bus: AwaitableBus) -> list[Answer]:
-        return [await self._answer(bus, address) for address in (*self._words, *self._probes)]
+    async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:
+        """Adds to *answers* as they come: what came before a failure of the line was said all the same."""
+        for address in (*self._words, *self._probes):
+            answers += [await self._answer(bus, address)]
 
     async def _answer(self, bus: AwaitableBus, address: int) -> Answer:
         try:
@@ -108,6 +131,11 @@ class Identity:
         except Refused as error:
             return Answer(address, None, error.code)
         return Answer(address, word, None)
+
+    def _passes(self, answer: Answer) -> bool:
+        """Whether it is a refusal that says nothing of the unit."""
+        code = answer.exception
+        return code is not None and (code in _PASSING or self._profile.exception(code)[0] == _DAMAGED)
 
     def _told(self, answers: Sequence[Answer]) -> str:
         """What is compared with what it says later: of a probe that it answered, and not what."""

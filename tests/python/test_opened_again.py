@@ -46,6 +46,22 @@ def test_another_drive_is_not(
     assert line.drive(1).writes() == []
 
 
+@pytest.mark.parametrize("exception", [0x06, 0x09, 0x0A, 0x0B])
+def test_a_refusal_that_passes_makes_it_no_other_drive(
+    line: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive, exception: int
+) -> None:
+    """A gateway that does not reach it, a password that locks it again: nothing is written, and it is asked anew."""
+    virtual_bus.echo(1)
+    assert virtual_bus.reconnects == 1
+    refusal = bytes([1, 0x83, exception])
+    line.line.answer_with(refusal + drivebus.crc16(refusal).to_bytes(2, "little"))
+    with pytest.raises(drivebus.NotAllowed, match=rf"did not say what it is.*refused with exception {exception:02X}H"):
+        virtual_drive.write("P00.11", 2.0)
+    assert line.drive(1).writes() == []
+    virtual_drive.write("P00.11", 2.0)
+    assert [address for _, address, _ in line.drive(1).writes()] == [RAM | ACCELERATION]
+
+
 @pytest.mark.parametrize(
     ("family", "code"), [("gd600", "P10.00"), ("gd3000", "P01.21"), ("gd3000-rectifier", "P11.05")]
 )

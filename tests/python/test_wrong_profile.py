@@ -259,6 +259,36 @@ class TestWhatTellsNothing:
             drive.write_words(0x000B, 30)
         assert len(written(simulator)) == 1
 
+    @pytest.mark.parametrize("exception", [0x06, 0x09, 0x0A, 0x0B])
+    def test_a_refusal_that_passes_is_not_the_last_word(self, gd300: tuple[Simulator, Bus], exception: int) -> None:
+        """06H: it was busy, or the request came damaged; 0AH and 0BH come from a gateway. Modbus V1.1b3, section 7."""
+        simulator, bus = gd300
+        drive = bus.drive(1, "gd350")
+        refuse(simulator, exception)
+        drive.write_words(0x000B, 20)
+        with pytest.raises(NotAllowed, match="says 010AH"):
+            drive.write_words(0x000B, 30)
+        assert len(written(simulator)) == 1
+
+    def test_a_damaged_request_is_not_the_last_word_of_a_vfd500(self, vfd500: tuple[Simulator, Bus]) -> None:
+        """03H is a frame error there. VFD500 manual, p. 133."""
+        simulator, bus = vfd500
+        drive = bus.drive(1, "vfd500")
+        refuse(simulator, 0x03)
+        drive.torque = 10.0
+        before = len(asked(simulator))
+        drive.torque = 20.0
+        assert len(asked(simulator)) == before + 4, "three questions, and the write"
+
+    def test_what_was_said_before_silence_counts(self, gd300: tuple[Simulator, Bus]) -> None:
+        """It refuses r25.00, which each VFD500 has, and falls silent on the next question."""
+        simulator, bus = gd300
+        drive = bus.drive(1, "vfd500")
+        simulator.line.script([(2, "silence")])
+        with pytest.raises(NotAllowed, match="refuses 1900H"):
+            drive.torque = 10.0
+        assert written(simulator) == []
+
     @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05])
     def test_the_same_of_a_vfd500(self, vfd500: tuple[Simulator, Bus], exception: int) -> None:
         """05H: reading is refused, as a parameter may be. VFD500 manual, p. 133."""
