@@ -190,9 +190,11 @@ def test_the_thread_says_what_went_wrong_and_goes_on() -> None:
 def test_the_thread_ends_with_its_bus() -> None:
     with Simulator({1: "gd350"}, transport="process") as simulator:
         bus = Bus(simulator)
-        watchdog = bus.drive(1).watchdog(0.4, unverified=True)
+        drive = bus.drive(1)
+        others = set(threading.enumerate())
+        watchdog = drive.watchdog(0.4, unverified=True)
+        [thread] = (thread for thread in threading.enumerate() if "watchdog" in thread.name and thread not in others)
         bus.close()
-        thread = next(thread for thread in threading.enumerate() if "watchdog" in thread.name)
         thread.join()
         assert isinstance(watchdog.error, drivebus.PortError)
         watchdog.close()
