@@ -254,10 +254,13 @@ def test_one_the_drive_does_not_have_is_missing(drive: Drive, without: Callable[
     assert (differs.code, differs.left, differs.right) == ("P00.12", 10.0, None)
 
 
-def test_one_that_another_changes_is_told(drive: Drive, monkeypatch: pytest.MonkeyPatch, store: Store) -> None:
-    """A drive that forgets P00.11 when P00.12 is written."""
+@pytest.mark.parametrize("differed", [{"P00.11": 3.0, "P00.12": 4.0}, {"P00.12": 4.0}])
+def test_one_that_another_changes_is_told(
+    drive: Drive, monkeypatch: pytest.MonkeyPatch, store: Store, differed: dict[str, float]
+) -> None:
+    """A drive that forgets P00.11 when P00.12 is written, whether P00.11 was restored or as in the backup before."""
     kept = drive.backup()
-    store(drive, {"P00.11": 3.0, "P00.12": 4.0})
+    store(drive, differed)
     write = Bus.write
 
     def forgetful(bus: Bus, unit: int, address: int, value: Any, /, **how: Any) -> None:
@@ -269,6 +272,7 @@ def test_one_that_another_changes_is_told(drive: Drive, monkeypatch: pytest.Monk
     report = drive.restore(kept)
     [item] = report.having("differs")
     assert (item.code, item.after, report.ok) == ("P00.11", 7.7, False)
+    assert "another parameter changed it" in item.reason
 
 
 @pytest.mark.parametrize("lost", ["request", "answer"])

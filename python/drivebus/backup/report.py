@@ -18,7 +18,7 @@ RESULTS = {
     "skipped": "left alone",
     "refused": "the drive would not take it",
     "blocked": "not sent: the drive would not take it",
-    "differs": "written, and the drive shows another value",
+    "differs": "the drive shows another value, after it was written or another parameter was",
     "missing": "the drive does not have it",
 }
 """What can become of a parameter."""

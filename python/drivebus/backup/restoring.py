@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Restore"]
 
+_MOVED = {
+    "restored": "it was restored, and another parameter changed it afterwards",
+    "same": "the drive had it, and another parameter changed it since",
+}
+"""What is said where a parameter does not stay as it was restored, or as it was before."""
+
 
 class Restore:
     """One restore of one drive."""
@@ -254,13 +260,15 @@ class Restore:
         return amount(self._profile, code, worded(self._profile, code, self._has[code]))
 
     async def _look_again(self) -> None:
-        """Reads what was restored once more: one parameter may have moved another."""
-        restored = [code for code, (result, _) in self._results.items() if result == "restored"]
-        words = await Reader(self._drive, sorted(restored, key=self._rules.place)).rest()
+        """Reads once more what the drive is to have now: one parameter may have moved another."""
+        if not self._order:
+            return
+        had = {code: result for code, (result, _) in self._results.items() if result in _MOVED}
+        words = await Reader(self._drive, sorted(had, key=self._rules.place)).rest()
         self._has.update(words.raw)
-        for code in restored:
+        for code, result in had.items():
             if words.raw.get(code) != self._backup.raw[code]:
-                self._results[code] = ("differs", "it was restored, and another parameter changed it afterwards")
+                self._results[code] = ("differs", _MOVED[result])
 
     def _note(self, error: BaseException) -> None:
         """Has *error* say what was restored before it."""
