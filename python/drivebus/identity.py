@@ -54,14 +54,15 @@ class Identity:
         self._trusted = trusted
         self._words, self._probes = _questions(profile)
         self._known = None if code is None else _named(code)
+        self._contradicts = False
         self._opened = bus.reconnects
 
     async def check(self, bus: AwaitableBus, *, judged: bool = True) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
-        are one that refuses for the moment only, as where a password locks it or a gateway does not reach it, and one
-        that contradicts its profile. Whether it does that is looked at only where it is to be *judged*.
+        is one that refuses for the moment only, as where a password locks it or a gateway does not reach it. Whether it
+        contradicts its profile is looked at only where it is to be *judged*; where it does, it is asked each time.
 
         Returns:
             The connection for which that holds: what is sent on it goes to the unit that was asked.
@@ -72,7 +73,9 @@ class Identity:
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
         opened = bus.reconnects
-        if self._known is not None and opened == self._opened:
+        # What spoke against the profile may have been put right meanwhile.
+        anew = self._known is None or (judged and self._contradicts)
+        if not anew and opened == self._opened:
             return opened
         answers: list[Answer] = []
         failure: NoAnswer | BadAnswer | PortError | None = None
@@ -80,7 +83,7 @@ class Identity:
             await self._ask(bus, answers)
         except LINE_ERRORS as error:
             failure = error
-        if self._known is None:
+        if anew or self._known is None:
             self._judge(answers, failure is None, judged)
         else:
             self._compare(answers, failure, self._known)
@@ -90,10 +93,10 @@ class Identity:
     def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool) -> None:
         """Takes what a unit said that was not known; what came before a failure of the line was said all the same."""
         against = None if self._trusted else contradiction(self._profile, self._unit, answers)
+        self._contradicts = against is not None
+        self._known = self._told(answers) if complete and not any(map(self._passes, answers)) else None
         if against is not None and judged:
             raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
-        if against is None and complete and not any(map(self._passes, answers)):
-            self._known = self._told(answers)
 
     def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
         """Raises where the unit does not say what is *known* of it any more."""

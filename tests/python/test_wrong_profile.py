@@ -212,6 +212,8 @@ def test_reads_are_not_held_up(gd300: tuple[Simulator, Bus]) -> None:
     drive.read("P00.11")
     assert not [frame for frame in asked(simulator) if frame[2:4] == b"\x21\x03"]
     assert len(drive.backup()) > 0
+    # Once for the head of the file, and once to see whether it stays the same drive.
+    assert len([frame for frame in asked(simulator) if frame[2:4] == b"\x21\x03"]) == 2
 
 
 def test_it_is_asked_once(gd300: tuple[Simulator, Bus]) -> None:
