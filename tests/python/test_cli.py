@@ -413,8 +413,10 @@ def test_the_demonstration_holds() -> None:
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="only Linux has it")
-def test_a_full_disk_behind_standard_output_is_said() -> None:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_behind_standard_output_is_said(unbuffered: str) -> None:
     with FULL.open("w") as full:
         words = [sys.executable, "-m", "drivebus", "profiles"]
-        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+        env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False, env=env)
     assert (done.returncode, done.stderr) == (1, "Error: what was done cannot be shown: No space left on device\n")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import io
+import os
 import sys
 import warnings
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import click
@@ -31,6 +33,12 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
     # Whoever has gone and reads it no more must not keep a stop from being sent.
     with suppress(OSError):
         click.echo(printable(f"Warning: {message}"), err=True)
+
+
+def _forget_what_is_not_shown() -> None:
+    """Or the interpreter would try once more to write it when it ends, and say so in its own words."""
+    with suppress(OSError), Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 class _Commands(click.Group):
@@ -58,6 +66,7 @@ class _Commands(click.Group):
             if error.errno == errno.EPIPE:
                 raise
             click.echo(printable(f"Error: what was done cannot be shown: {error.strerror or error}"), err=True)
+            _forget_what_is_not_shown()
             context.exit(1)
 
 
