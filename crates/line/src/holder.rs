@@ -60,6 +60,7 @@ pub(crate) fn holders(_path: &Path) -> Vec<Holder> {
 #[cfg(target_os = "linux")]
 mod linux {
     use std::fs::{self, Metadata};
+    use std::io::Read;
     use std::os::unix::fs::{FileTypeExt, MetadataExt};
 
     use rustix::fs::{major, minor};
@@ -75,7 +76,22 @@ mod linux {
     /// `1: FLOCK  ADVISORY  WRITE 4711 00:1a:3 0 EOF`: process, then file system in hexadecimal and file in decimal.
     pub(super) fn lockers(file: &Metadata) -> Vec<u32> {
         let place = format!("{:02x}:{:02x}:{}", major(file.dev()), minor(file.dev()), file.ino());
-        let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
+        // A list that comes in pieces may pass one over while other programs let go of theirs.
+        (0..3).map(|_| of_locks(&place, &locks())).find(|found| !found.is_empty()).unwrap_or_default()
+    }
+
+    /// What the system says of all locks. Read in large pieces: each is true for itself, not two of them together.
+    fn locks() -> String {
+        let (mut text, mut piece) = (Vec::new(), vec![0; 65_536]);
+        if let Ok(mut file) = fs::File::open("/proc/locks") {
+            while let Ok(count @ 1..) = file.read(&mut piece) {
+                text.extend_from_slice(&piece[..count]);
+            }
+        }
+        String::from_utf8_lossy(&text).into_owned()
+    }
+
+    fn of_locks(place: &str, locks: &str) -> Vec<u32> {
         locks
             .lines()
             .filter_map(|line| match line.split_ascii_whitespace().collect::<Vec<_>>()[..] {
