@@ -66,6 +66,8 @@ def _by_code(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
         then = f"ask for it as that: {then}"
     else:
         then = "there is no profile of it yet"
+    if profile.name not in profiles():
+        then += f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
     return f"it says {answer.word:04X}H, which is a {one_of([*titles, *also])}: {then}"
 
 

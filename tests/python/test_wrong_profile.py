@@ -400,6 +400,24 @@ class TestProfilesOfOnesOwn:
         assert "says 010AH" in str(self.contradiction("gd300", folder))
         assert "refuses 2103H" in str(self.contradiction("gd600", folder))
 
+    @pytest.mark.parametrize("options", [("--like", "gd350"), ("--overlay", "gd350")])
+    def test_one_for_units_of_which_none_is_shipped_says_how_they_are_let_in(
+        self, tmp_path: Path, gd300: tuple[Simulator, Bus], options: tuple[str, str]
+    ) -> None:
+        """0106H is a Goodrive20, whose manual nobody has made a profile from yet."""
+        simulator, bus = gd300
+        folder = self.new(tmp_path / "ours", *options)
+        answer(simulator, 0x0106)
+        told = str(bus.drive(1, folder).contradiction())
+        assert "there is no profile of it yet. If ours is meant for such units, list that code under" in told
+        with (folder / "profile.toml").open("a", encoding="utf-8") as file:
+            file.write(
+                f'\n[[identification.codes]]\ncode = 0x0106\nfamily = "{Profile.load(folder).family}"\n'
+                'title = "Ours"\nverified = true\nsource = "Our manual"\n'
+            )
+        answer(simulator, 0x0106)
+        assert bus.drive(1, folder).contradiction() is None
+
     def test_an_overlay_on_one_without_a_code_has_its_signature(self, tmp_path: Path) -> None:
         folder = self.new(tmp_path / "ours", "--overlay", "vfd500")
         assert self.contradiction("vfd500", folder) is None
