@@ -14,10 +14,13 @@ from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
 from drivebus.profile import Profile, profiles
 
-__all__ = ["LOCKED", "code_registers", "codes", "identify", "one_of", "usable"]
+__all__ = ["LOCKED", "UNREACHED", "code_registers", "codes", "identify", "one_of", "usable"]
 
 LOCKED = 0x09
 """The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
+
+UNREACHED = (0x0A, 0x0B)
+"""Exceptions by which a gateway says that the unit behind it is silent or out of reach. Modbus V1.1b3, section 7."""
 
 _PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
 
@@ -37,6 +40,8 @@ async def identify(read: Read, unit: int) -> Identification:
         try:
             [code] = await read(unit, address)
         except Refused as error:
+            if error.code in UNREACHED:
+                raise NoAnswer(f"no answer, says a gateway: {error}", unit=unit, raw=error.raw) from error
             answered[address] = False
             why = _PASSWORD if error.code == LOCKED else ""
             told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")

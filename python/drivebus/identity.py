@@ -16,12 +16,12 @@ from collections.abc import Sequence
 
 from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.identify import LOCKED, code_registers
+from drivebus.identify import LOCKED, UNREACHED, code_registers
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
 
-_PASSING = (0x06, LOCKED, 0x0A, 0x0B)
+_PASSING = (0x06, LOCKED, *UNREACHED)
 """Exceptions that say nothing of a unit, for they pass: it is busy or got a damaged request, a password locks it, or a
 gateway does not reach it."""
 
