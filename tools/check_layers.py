@@ -91,7 +91,7 @@ PYTHON: dict[str, set[str]] = {
     "poll": {"_native", "errors", "polling"},
     "opening": {"_native", "checks", "errors", "figures", "known", "ports", "sim"},
     "found": set(),
-    "identify": {"errors", "found", "profile"},
+    "identify": {"errors", "found", "profile", "protocols"},
     "who": {"checks", "errors", "found", "identify", "profile", "protocols"},
     "bus": {
         "_native",

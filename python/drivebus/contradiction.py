@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from drivebus.identify import code_registers, codes, one_of
+from drivebus.identify import code_registers, codes, no_such_address, one_of
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import ProfileProtocol
 
 __all__ = ["Answer", "contradiction", "signature_of"]
-
-_ILLEGAL_ADDRESS = 0x02
-"""In the Modbus specification, and under this name in the profiles that list their exceptions."""
 
 
 class Answer(NamedTuple):
@@ -83,8 +80,7 @@ def _listed(profile: ProfileProtocol, answer: Answer) -> list[dict[str, Any]]:
 def _by_refusal(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
     if answer.exception is None or answer.address not in _must_have(profile):
         return None
-    name, _ = profile.exception(answer.exception)
-    if answer.exception != _ILLEGAL_ADDRESS and name != "illegal_address":
+    if not no_such_address(profile, answer.exception):
         return None
     return (
         f"it refuses {answer.address:04X}H (exception {answer.exception:02X}H: there is no such address), which each "

@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
 from drivebus.profile import Profile, profiles
+from drivebus.protocols import ProfileProtocol
 
-__all__ = ["LOCKED", "UNREACHED", "code_registers", "codes", "identify", "one_of", "usable"]
+__all__ = ["LOCKED", "UNREACHED", "code_registers", "codes", "identify", "no_such_address", "one_of", "usable"]
+
+_ILLEGAL_ADDRESS = 0x02
+"""In the Modbus specification, and under this name in the profiles that list their exceptions."""
 
 LOCKED = 0x09
 """The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
@@ -48,7 +53,7 @@ async def identify(read: Read, unit: int) -> Identification:
             continue
         answered[address] = True
         if code in codes():
-            return _by_code(unit, code)
+            return await _as_it_behaves(read, _by_code(unit, code), address)
         told.append(f"it says {code:04X}H, which no list names")
     candidates = await _by_answers(read, unit, answered)
     if not candidates:
@@ -71,6 +76,12 @@ def usable(found: Identification, unverified: bool) -> str | None:
     shipped = [name for name in found.candidates if name in profiles()]
     sure = found.certainty in ("certain", "shared") or (unverified and len(found.candidates) == 1)
     return shipped[0] if sure and len(shipped) == 1 else None
+
+
+def no_such_address(profile: ProfileProtocol, exception: int) -> bool:
+    """Whether a unit of *profile* says by *exception* that it has no such address."""
+    name, _ = profile.exception(exception)
+    return exception == _ILLEGAL_ADDRESS or name == "illegal_address"
 
 
 def one_of(names: Iterable[str]) -> str:
@@ -97,6 +108,35 @@ def _by_code(unit: int, code: int) -> Identification:
     else:
         certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
     return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
+
+
+async def _as_it_behaves(read: Read, found: Identification, place: int) -> Identification:
+    """*found*, and no more than likely if the unit is in no state of such a drive.
+
+    One word is no proof: another maker's drive may keep its speed at *place*, and turn at just that.
+    """
+    known = next((Profile.builtin(name) for name in found.candidates if name in profiles()), None)
+    register = None if known is None else known.role("state")
+    about = None if known is None or register is None else known.describe(register)
+    if known is None or about is None or about.address is None or about.evidence == "assumed":
+        return found
+    try:
+        [word] = await read(found.unit, about.address)
+    except Refused as error:
+        if not no_such_address(known, error.code):
+            return found
+        against = "refuses"
+    except (NoAnswer, BadAnswer):
+        return found
+    else:
+        if known.state(word) != "unknown":
+            return found
+        against = f"says {word} at"
+    reason = (
+        f"{found.reason}; but it {against} {about.address:04X}H, where each of those tells its state: "
+        f"something else may stand at {place:04X}H"
+    )
+    return replace(found, certainty="unverified", reason=reason)
 
 
 async def _by_answers(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import pytest
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Identification, NotAllowed, Simulator
+from drivebus.identify import identify
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
@@ -32,6 +33,10 @@ def answer(simulator: Simulator, unit: int, *words: int) -> None:
     """The next answer on the line."""
     body = bytes([unit, 3, 2 * len(words), *b"".join(word.to_bytes(2, "big") for word in words)])
     simulator.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+
+
+def refusal(code: int) -> drivebus.Refused:
+    return drivebus.Refused("no", unit=1, code=code, name="", meaning="")
 
 
 @pytest.mark.parametrize(
@@ -101,6 +106,46 @@ def test_a_drive_is_taken_only_if_that_is_sure(bus: Bus) -> None:
             bus.drive(4, unverified=unverified)
         assert "unverified=True" not in str(refused.value)
     assert bus.drive(4, "gd600").profile.name == "gd600"
+
+
+class TestTheStateBesideTheCode:
+    """A Delta VFD-F has its output frequency at 2103H (manual, p. 5-58), in 0.01 Hz: at 4.16 Hz that is 01A0H."""
+
+    @staticmethod
+    def of(code: int, state: int | Exception) -> Identification:
+        """What a unit is taken for that has *code* at 2103H and *state* at 2100H, or refuses that."""
+
+        async def read(_unit: int, address: int) -> list[int]:
+            told = {CODE: code, 0x2100: state}[address]
+            if isinstance(told, Exception):
+                raise told
+            return [told]
+
+        return asyncio.run(identify(read, 1))
+
+    @pytest.mark.parametrize("state", [1, 2, 3, 4, 5, 6])
+    def test_in_each_state_of_such_a_drive_it_is_one(self, state: int) -> None:
+        assert self.of(0x01A0, state).certainty == "certain"
+
+    @pytest.mark.parametrize(
+        ("state", "says"), [(0, "says 0 at 2100H"), (7, "says 7 at 2100H"), (refusal(0x02), "refuses 2100H")]
+    )
+    @pytest.mark.parametrize(("code", "family"), [(0x01A0, "gd350"), (0x010A, None)])
+    def test_in_none_it_is_not_sure(self, state: int | Exception, says: str, code: int, family: str | None) -> None:
+        found = self.of(code, state)
+        assert (found.certainty, found.family, found.code) == ("unverified", family, code)
+        assert says in found.reason
+
+    @pytest.mark.parametrize("state", [refusal(0x09), refusal(0x06), drivebus.NoAnswer("nothing")])
+    def test_who_does_not_tell_says_nothing_against_it(self, state: Exception) -> None:
+        """09H: a password locks it."""
+        assert self.of(0x01A0, state).certainty == "certain"
+
+    def test_nothing_is_commanded_on_such_a_word(self, simulator: Simulator, bus: Bus) -> None:
+        bus.read(3, FAULT_500)  # first contact is over
+        answer(simulator, 3, 0x01A0)
+        with pytest.raises(NotAllowed, match=r"may be gd350 \(unverified.*refuses 2100H"):
+            bus.drive(3)
 
 
 GD300_OR_ELSE = "gd300, Goodrive300L lift drive and Goodrive310-UL"
