@@ -197,16 +197,17 @@ def test_who_stays_silent_is_silent(bus: Bus) -> None:
 
 
 @pytest.mark.parametrize("exception", [0x0A, 0x0B])
-def test_who_is_silent_behind_a_gateway_is_silent(simulator: Simulator, bus: Bus, exception: int) -> None:
+def test_who_is_silent_behind_a_gateway_is_silent(simulator: Simulator, exception: int) -> None:
     """A gateway answers for the unit: it has no path to it, or heard nothing. Modbus V1.1b3, section 7."""
-    bus.echo(1)
     body = bytes([1, 0x83, exception])
     refusal = body + drivebus.crc16(body).to_bytes(2, "little")
-    simulator.line.answer_with(refusal)
-    with pytest.raises(drivebus.NoAnswer, match=rf"says a gateway.*exception {exception:02X}H"):
-        bus.identify(1)
-    simulator.line.answer_with(refusal)
-    assert [found.unit for found in bus.scan([1, 2])] == [2]
+    with Bus(simulator, timeout=0.25, retries=0) as bus:
+        bus.echo(1)
+        simulator.line.answer_with(refusal)
+        with pytest.raises(drivebus.NoAnswer, match=rf"no answer, says .*gateway.*exception {exception:02X}H"):
+            bus.identify(1)
+        simulator.line.answer_with(refusal)
+        assert [found.unit for found in bus.scan([1, 2])] == [2]
 
 
 def test_a_scan_tells_how_sure_it_is(simulator: Simulator, bus: Bus) -> None:

@@ -5,6 +5,9 @@ Faults by rate are in test_faults.py; here each one is ordered, and what comes o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import pytest
 
 import drivebus
@@ -89,3 +92,52 @@ def test_statistics_say_what_noise_means(simulator: Simulator, bus: Bus) -> None
     [hint] = bus.stats().hints
     assert hint.startswith("line: ")
     assert "bias" in hint
+
+
+class TestBehindAGateway:
+    """0BH: it passed the request on, and heard no answer. The unit may have acted. Modbus V1.1b3, section 7."""
+
+    @staticmethod
+    def loses(simulator: Simulator, monkeypatch: pytest.MonkeyPatch, address: int) -> None:
+        """From now on the gateway hears no answer to a write to *address*."""
+        write = Bus.write
+
+        def unheard(bus: Bus, unit: int, place: int, value: int | Sequence[int], /, **how: Any) -> None:
+            if place == address:
+                body = bytes([unit, 0x86 if isinstance(value, int) else 0x90, 0x0B])
+                simulator.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+            write(bus, unit, place, value, **how)
+
+        monkeypatch.setattr(Bus, "write", unheard)
+
+    def test_a_start_is_not_refused_and_its_block_stops_the_motor(
+        self, virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.loses(virtual, monkeypatch, CONTROL)
+        with (
+            pytest.raises(
+                Unconfirmed, match=r"run_forward was sent.*the motor may turn.*State seen afterwards: forward"
+            ),
+            virtual_drive.running(5.0),
+        ):
+            raise AssertionError("the block is not entered")
+        # Each stop was heard as well, and its answer lost: nobody knows before the state shows it.
+        assert commands(virtual)[:2] == [FORWARD, STOP]
+        assert not virtual_drive.state().running
+
+    def test_a_value_is_cleared_up_by_reading(
+        self, virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        virtual_drive.write("P00.12", 2.0)
+        virtual.drive(1).take_writes()
+        self.loses(virtual, monkeypatch, RAM | ACCELERATION)
+        virtual_drive.write("P00.11", 2.0)
+        assert [address for _, address, _ in virtual.drive(1).writes()] == [RAM | ACCELERATION]
+
+    def test_a_read_is_asked_again(self, virtual: Simulator, virtual_bus: Bus) -> None:
+        virtual_bus.echo(1)
+        body = bytes([1, 0x83, 0x0B])
+        virtual.line.answer_with(body + drivebus.crc16(body).to_bytes(2, "little"))
+        assert virtual_bus.read(1, 0x2103) == [0x01A0]
+        assert virtual_bus.stats().timeouts == 1
+        assert virtual_bus.link(1).failed == 1

@@ -106,7 +106,7 @@ fn is_passing(failure: &Failure) -> bool {
 
 /// Whether the request went out, and no right answer came.
 pub(crate) fn is_unanswered(failure: &Failure) -> bool {
-    matches!(failure, Failure::NoAnswer { .. }) || is_damaged(failure)
+    matches!(failure, Failure::NoAnswer { .. } | Failure::Unreached) || is_damaged(failure)
 }
 
 /// Whether an answer came that was none.

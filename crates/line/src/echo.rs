@@ -108,7 +108,7 @@ impl Owner {
             && match result {
                 Ok(_) => true,
                 Err(error) => match error.failure {
-                    Failure::Refused { .. } => true,
+                    Failure::Refused { .. } | Failure::Unreached => true,
                     Failure::NoAnswer { .. } => error.raw.is_empty(),
                     _ => false,
                 },

@@ -123,6 +123,9 @@ pub enum Failure {
         /// How often it was tried.
         attempts: u32,
     },
+    /// The unit stayed silent, as the gateway before it says: it may have heard the request all the same.
+    #[error("no answer, says the gateway before it (exception 0BH)")]
+    Unreached,
     /// The unit may still answer an earlier request, and gave no sign that it does not. Nothing was sent.
     #[error(
         "the unit may still answer an earlier request, and neither an echo nor a read of another length settled it"

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Event, Instant, Master, Request};
+use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Master, Request};
 
 use crate::Line;
 use crate::error::{CallError, Failure};
@@ -167,7 +167,11 @@ fn conclude(
                 Destination::Broadcast => None,
             };
             let raw = came.as_ref().map_or(&[][..], Adu::as_bytes);
-            return Err(ask.failed(Failure::Refused { function, code }, sent, ended, raw));
+            let failure = match code {
+                ExceptionCode::GATEWAY_TARGET_SILENT => Failure::Unreached,
+                _ => Failure::Refused { function, code },
+            };
+            return Err(ask.failed(failure, sent, ended, raw));
         }
         (Event::Answer(answer), Some(sent)) => {
             take(answer);

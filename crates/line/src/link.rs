@@ -68,7 +68,7 @@ impl Ring {
 fn good(failure: &Failure) -> Option<bool> {
     match failure {
         Failure::Refused { .. } => Some(true),
-        Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_) => Some(false),
+        Failure::NoAnswer { .. } | Failure::Unreached | Failure::Wrong(_) | Failure::Corrupt(_) => Some(false),
         Failure::Port(error) => (error.kind == PortErrorKind::Lost).then_some(false),
         _ => None,
     }

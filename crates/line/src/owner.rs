@@ -293,7 +293,7 @@ impl Owner {
                     counters.answered(done.ended.saturating_duration_since(done.sent), delay.unwrap_or_default());
                 }
                 Err(error) => match error.failure {
-                    Failure::NoAnswer { .. } => counters.timeouts += 1,
+                    Failure::NoAnswer { .. } | Failure::Unreached => counters.timeouts += 1,
                     Failure::Corrupt(_) => counters.crc_errors += 1,
                     Failure::Wrong(_) => counters.bad_answers += 1,
                     Failure::Refused { .. } => counters.refusals += 1,
@@ -335,5 +335,6 @@ impl Owner {
 
 /// Whether `failure` is of a kind that another request over the same line may not have.
 pub(crate) fn is_line_trouble(failure: &Failure) -> bool {
-    matches!(failure, Failure::NoAnswer { .. } | Failure::Corrupt(_) | Failure::Wrong(_) | Failure::Refused { .. })
+    use Failure::{Corrupt, NoAnswer, Refused, Unreached, Wrong};
+    matches!(failure, NoAnswer { .. } | Unreached | Corrupt(_) | Wrong(_) | Refused { .. })
 }

@@ -116,7 +116,7 @@ pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) ->
     match error.failure {
         Failure::Port(_) | Failure::Reopened | Failure::Forked | Failure::Closed => Class::Port.raise(message, details),
         Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
-        Failure::Doubtful | Failure::NotAsked { .. } => Class::NoAnswer.raise(message, details),
+        Failure::Doubtful | Failure::NotAsked { .. } | Failure::Unreached => Class::NoAnswer.raise(message, details),
         Failure::NotTaken { .. } => Class::Unconfirmed.raise(message, details),
         Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),
         Failure::Corrupt(FrameError::Crc { .. }) => Class::Crc.raise(message, details),

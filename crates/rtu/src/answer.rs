@@ -20,6 +20,8 @@ impl ExceptionCode {
     pub const ILLEGAL_VALUE: Self = Self(0x03);
     /// 04H: the unit could not do it.
     pub const DEVICE_FAILURE: Self = Self(0x04);
+    /// 0BH: a gateway passed the request on, and heard no answer of the unit.
+    pub const GATEWAY_TARGET_SILENT: Self = Self(0x0B);
 
     /// What the specification calls the code; a family of drives may mean something else by it.
     ///
