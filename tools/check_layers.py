@@ -48,8 +48,9 @@ UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
 # What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
 PYTHON: dict[str, set[str]] = {
     "errors": set(),
-    "values": set(),
-    "figures": set(),
+    "named": set(),
+    "values": {"named"},
+    "figures": {"named"},
     "checks": {"errors"},
     "protocols": {"figures", "values"},
     "rtu": {"_native", "errors"},

@@ -5,9 +5,11 @@ Plain data: nothing here reads from a line.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from drivebus.named import Named
 
 __all__ = ["Link", "Stats"]
 
@@ -31,18 +33,18 @@ class Link:
         return f"{self.good} of the last {self.asked} exchanges brought an answer"
 
 
-class Stats(Mapping[str, Any]):
+class Stats(Named[Any]):
     """Counters and latencies: a mapping whose names are attributes too, nested where it is per unit.
 
     Counters are ints, latencies seconds. `stats.answers`, `stats.units[1].timeouts`.
     """
 
-    __slots__ = ("_values",)
+    __slots__ = ()
 
     def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values: dict[str, Any] = {
-            key: Stats.nested(value) if isinstance(value, Mapping) else value for key, value in values.items()
-        }
+        super().__init__(
+            {key: Stats.nested(value) if isinstance(value, Mapping) else value for key, value in values.items()}
+        )
 
     @staticmethod
     def nested(values: Mapping[Any, Any]) -> Any:
@@ -50,26 +52,6 @@ class Stats(Mapping[str, Any]):
         if all(isinstance(key, str) for key in values) and values:
             return Stats(values)
         return {key: Stats(value) if isinstance(value, Mapping) else value for key, value in values.items()}
-
-    def __getitem__(self, name: str) -> Any:
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            raise AttributeError(f"no such figure: {name!r}; there are {', '.join(self._values)}") from None
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._values]
 
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value!r}" for name, value in self._values.items())

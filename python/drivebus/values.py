@@ -5,10 +5,12 @@ Plain data: nothing here reads from a drive or knows how its words are laid out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
+
+from drivebus.named import Named
 
 __all__ = [
     "Choice",
@@ -299,7 +301,7 @@ class WatchdogSettings:
     note: str = ""
 
 
-class Snapshot(Mapping[str, Value]):
+class Snapshot(Named[Value]):
     """Values read together: a mapping whose names are attributes too.
 
     Attributes:
@@ -308,33 +310,13 @@ class Snapshot(Mapping[str, Value]):
         units: Engineering unit of each name.
     """
 
-    __slots__ = ("_values", "duration", "time", "units")
+    __slots__ = ("duration", "time", "units")
 
     def __init__(self, values: Mapping[str, Value], units: Mapping[str, str], time: float, duration: float) -> None:
-        self._values = dict(values)
+        super().__init__(values)
         self.units = dict(units)
         self.time = time
         self.duration = duration
-
-    def __getitem__(self, name: str) -> Value:
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __getattr__(self, name: str) -> Value:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            raise AttributeError(f"this snapshot holds no {name!r}, only {', '.join(self._values)}") from None
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._values]
 
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value} {self.units[name]}".rstrip() for name, value in self._values.items())

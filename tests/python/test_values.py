@@ -38,7 +38,7 @@ def test_statistics_nest() -> None:
     assert stats.requests == stats["requests"] == 3
     assert stats.units[1].requests == 2
     assert repr(stats) == "Stats(requests=3, units={1: Stats(requests=2)})"
-    with pytest.raises(AttributeError, match="no such figure: 'answers'"):
+    with pytest.raises(AttributeError, match="holds no 'answers', only requests, units"):
         _ = stats.answers
 
 
