@@ -87,6 +87,8 @@ fn every_mistake_names_file_line_and_reason() {
         ("profile.toml", "status_word_2 = [", "status_word_9 = [", "status_word_"),
         ("profile.toml", "bits = [11, 10]", "bits = [10, 11]", "highest and the lowest"),
         ("profile.toml", "bits = [11, 10]", "bits = [11, 9]", "position_control"),
+        ("profile.toml", "bits = [11, 10]", "bits = [11, 10, 9]", "the highest and the lowest bit"),
+        ("profile.toml", "bits = [11, 10]", "bits = [11]", "the highest and the lowest bit"),
         ("profile.toml", "3 = \"SVPWM\"", "4 = \"SVPWM\"", "does not fit"),
         ("profile.toml", "3 = \"SVPWM\"", "three = \"SVPWM\"", "three"),
         ("profile.toml", "acts = [\"P00.15\"", "acts = [\"P00.99\"", "P00.99"),

@@ -7,7 +7,8 @@ mod schema;
 use std::collections::BTreeMap;
 
 pub(super) use motion::{Commands, Control, SetpointRole, States, Variant, VariantChoice, Watchdog};
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 
 use super::placed::Placed;
 use super::{File, ProfileError, line_of, shape};
@@ -292,6 +293,7 @@ pub(super) struct Field {
     /// One word.
     pub(super) name: String,
     /// The highest and the lowest bit.
+    #[serde(deserialize_with = "two")]
     pub(super) bits: [u8; 2],
     /// What they mean, by their value; without it a bit is off or on.
     pub(super) values: Option<BTreeMap<String, String>>,
@@ -302,6 +304,13 @@ pub(super) struct Field {
 
 fn yes() -> bool {
     true
+}
+
+/// Two numbers and no more: the parser of TOML lets a longer list pass for a shorter one.
+fn two<'de, D: Deserializer<'de>>(list: D) -> Result<[u8; 2], D::Error> {
+    let numbers = Vec::deserialize(list)?;
+    <[u8; 2]>::try_from(numbers)
+        .map_err(|other| D::Error::invalid_length(other.len(), &"the highest and the lowest bit"))
 }
 
 /// Reads `profile.toml`, or says all that is wrong with its shape.
