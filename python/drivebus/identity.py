@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.identify import LOCKED, UNREACHED, code_registers
+from drivebus.identify import LOCKED, UNREACHED, code_registers, codes
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
@@ -150,7 +150,9 @@ class Identity:
     def _shown(self, answer: Answer) -> str:
         if answer.word is None:
             return f"refused with exception {answer.exception:02X}H"
-        return _named(answer.word) if answer.address in self._words else "answered"
+        # Elsewhere any word may change, but for a code that gives another drive away.
+        code = answer.address in code_registers() and answer.word in codes()
+        return _named(answer.word) if code or answer.address in self._words else "answered"
 
 
 def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
@@ -165,7 +167,9 @@ def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
     # Whether it has the words that are always asked of its family is better than nothing.
     known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
     asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
-    return code_registers(), asked
+    # What the profile has there itself is no code.
+    others = [address for address in code_registers() if profile.name_at(address) is None]
+    return (), (*others, *asked)
 
 
 def _named(code: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -236,6 +237,9 @@ def test_both_faces_ask_and_tell_the_same(bus: Bus) -> None:
     assert asyncio.run(main()) == [bus.identify(unit) for unit in UNITS]
 
 
+SPEED_ROW = "0x2103,output_frequency,Output frequency,Hz,100,no,,,,ro,yes,,a manual\n"
+
+
 class TestAfterThePortWasOpenedAgain:
     """Another drive may answer there; a family without a code is known by what it answers and refuses."""
 
@@ -253,16 +257,16 @@ class TestAfterThePortWasOpenedAgain:
         drive.torque = 20.0
         assert [value for _, _, value in simulator.drive(3).writes()] == [1000, 2000]
 
-    @pytest.mark.parametrize(("address", "word"), [(CODE, 0x01A0), (CODE, 0)])
+    @pytest.mark.parametrize(("word", "says"), [(0x01A0, "01A0H"), (0, "answered")])
     def test_another_one_is_not(
-        self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, address: int, word: int
+        self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, word: int, says: str
     ) -> None:
         drive = bus.drive(3, "vfd500")
         drive.torque = 10.0
         self.reopen(simulator, bus)
         read = bus.read
-        monkeypatch.setattr(bus, "read", lambda *what, **how: [word] if what[1] == address else read(*what, **how))
-        with pytest.raises(NotAllowed, match=r"another drive answers as unit 3.*2103H refused.*2103H answered"):
+        monkeypatch.setattr(bus, "read", lambda *what, **how: [word] if what[1] == CODE else read(*what, **how))
+        with pytest.raises(NotAllowed, match=rf"another drive answers as unit 3.*2103H refused.*2103H {says} now"):
             drive.torque = 20.0
         assert [value for _, _, value in simulator.drive(3).writes()] == [1000]
 
@@ -282,6 +286,51 @@ class TestAfterThePortWasOpenedAgain:
         monkeypatch.setattr(bus, "read", other)
         with pytest.raises(NotAllowed, match="another drive answers as unit 4"):
             drive.write("P01.20", 6.0, store=True)
+
+    @pytest.mark.parametrize(("row", "turning"), [("", 5_000), (SPEED_ROW, 5_000), (SPEED_ROW, 0x01A0)])
+    def test_what_a_drive_of_ones_own_has_where_others_have_a_code_may_change(
+        self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, row: str, turning: int
+    ) -> None:
+        """A Delta VFD-F has its output frequency at 2103H: manual, p. 5-58."""
+        own(tmp_path, row)
+        frequency = [0]
+        read = bus.read
+        monkeypatch.setattr(bus, "read", lambda *what, **how: frequency if what[1] == CODE else read(*what, **how))
+        drive = bus.drive(4, tmp_path)
+        drive.write("setting", 1)
+        self.reopen(simulator, bus)
+        frequency[0] = turning
+        drive.write("setting", 2)
+        assert [value for _, _, value in simulator.drive(4).writes()] == [1, 2]
+
+
+def own(folder: Path, row: str) -> None:
+    """A profile of one's own that does not say how its units are known."""
+    (folder / "profile.toml").write_text(
+        """
+name = "own"
+title = "Our drive"
+kind = "inverter"
+version = 1
+source = "a manual"
+[requests]
+functions = [3, 6]
+max_words = 1
+source = "a manual"
+[parameters]
+address = "group.index"
+source = "a manual"
+""",
+        encoding="utf-8",
+    )
+    head = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source\n"
+    setting = "0x2001,setting,Setting,,1,no,,,,rw,yes,,a manual\n"
+    (folder / "registers.csv").write_text(head + setting + row, encoding="utf-8")
+    (folder / "parameters.csv").write_text(
+        "code,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n",
+        "utf-8",
+    )
+    (folder / "faults.csv").write_text("code,mnemonic,label,cause,remedy,verified,note,source\n", encoding="utf-8")
 
 
 def test_one_that_a_password_locks_says_what_to_do(bus: Bus) -> None:
