@@ -24,6 +24,7 @@ __all__ = [
     "Status",
     "Value",
     "WatchdogSettings",
+    "group_of",
 ]
 
 
@@ -278,6 +279,16 @@ class Description:
     def writable(self) -> bool:
         """Whether a write makes sense at all."""
         return self.access != "ro"
+
+    @property
+    def group(self) -> str:
+        """The group of a parameter, as its code says it; empty for a register."""
+        return group_of(self.code or "")
+
+
+def group_of(code: str) -> str:
+    """The group that the code of a parameter names: `P05` of P05.06, `C1` of C1-01, `ACC` of ACC."""
+    return code.replace("-", ".").partition(".")[0]
 
 
 @dataclass(frozen=True)

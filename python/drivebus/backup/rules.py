@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from drivebus import checks
 from drivebus.errors import NotAllowed
 from drivebus.protocols import ProfileProtocol
+from drivebus.values import group_of
 
 __all__ = ["Rules"]
 
@@ -84,7 +85,7 @@ class Rules:
         if isinstance(groups, str) or not all(isinstance(group, str) for group in groups):
             raise NotAllowed(f'groups {groups!r} are no list of groups; give one such as ["P00", "P09"]')
         every = self.codes()
-        known = {_group(code) for code in every} | set(every)
+        known = {group_of(code) for code in every} | set(every)
         for group in groups:
             if group not in known:
                 near = checks.closest(group, known)
@@ -117,9 +118,4 @@ class Rules:
 
 def _among(code: str, listed: frozenset[str]) -> bool:
     """Whether *listed* has *code* or its whole group."""
-    return code in listed or _group(code) in listed
-
-
-def _group(code: str) -> str:
-    """The group that a code names: `P05` of P05.06, `C1` of C1-01, `ACC` of ACC."""
-    return code.replace("-", ".").partition(".")[0]
+    return code in listed or group_of(code) in listed

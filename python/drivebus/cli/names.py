@@ -144,9 +144,9 @@ def complete_assignment(context: click.Context, parameter: click.Parameter, inco
 
 def complete_group(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Groups of the profile that is given, or of all; behind the dot codes."""
-    known = (profile.describe(name).code for profile in _profiles(context) for name in profile.names())
-    codes = [code for code in known if code is not None]
-    texts = codes if {".", "-"} & set(incomplete) else [code.replace("-", ".").partition(".")[0] for code in codes]
+    known = (profile.describe(name) for profile in _profiles(context) for name in profile.names())
+    codes = {".", "-"} & set(incomplete)
+    texts = [row.code if codes else row.group for row in known if row.code is not None]
     return [CompletionItem(text) for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower())]
 
 
