@@ -2,14 +2,40 @@
 
 use drivebus_rtu::{Instant, PATIENCE};
 
+use crate::oracle::{self, Asked, Verdict};
+
 /// So many echoes left open, and a unit that returned some counts as one that returns none.
 const MUTE: usize = 5;
+
+/// A request that was left open.
+#[derive(Debug, Clone)]
+pub(crate) struct Open {
+    pub(crate) asked: Asked,
+    given_up: Instant,
+    /// How many bytes had come on the line by then.
+    place: usize,
+}
+
+impl Open {
+    pub(crate) fn is_echo(&self) -> bool {
+        self.asked.pdu[0] == 8
+    }
+
+    /// Whether its answer may have come from `unit` since, by what came on the line.
+    fn may_have_come(&self, unit: u8, stream: &[u8]) -> bool {
+        let frames = (self.place..stream.len()).filter(|&from| stream[from] == unit);
+        frames.into_iter().any(|from| {
+            let whole = (from + 4..=stream.len().min(from + 256)).filter_map(|to| oracle::frame(&stream[from..to]));
+            whole.into_iter().any(|(_, pdu)| self.asked.judge(pdu) == Verdict::Right)
+        })
+    }
+}
 
 /// What the model knows of one unit.
 #[derive(Debug, Default)]
 pub(crate) struct Known {
-    /// PDUs of requests that it left open, and when each was given up.
-    pub(crate) open: Vec<(Vec<u8>, Instant)>,
+    /// Requests that it left open.
+    pub(crate) open: Vec<Open>,
     /// It has returned an echo, and did not leave [`MUTE`] open since.
     pub(crate) echoed: bool,
     /// Until when another program's question may be answered.
@@ -23,24 +49,33 @@ impl Known {
 
     /// Whether nobody who knows all this would ask it as if nothing were open.
     pub(crate) fn is_doubtful(&self, now: Instant) -> bool {
-        let owed = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && (self.echoed || now < *given_up + PATIENCE);
+        let owed = |open: &Open| !open.is_echo() && (self.echoed || now < open.given_up + PATIENCE);
         self.is_strange(now) || self.open.iter().any(owed)
     }
 
     /// Whether what it left open keeps it in quarantine: for good where it is known to return echoes.
     pub(crate) fn holds(&self, now: Instant) -> bool {
-        let recent = |(pdu, given_up): &(Vec<u8>, Instant)| pdu[0] != 8 && now < *given_up + PATIENCE;
+        let recent = |open: &Open| !open.is_echo() && now < open.given_up + PATIENCE;
         !self.open.is_empty() && (self.echoed || self.open.iter().any(recent))
     }
 
-    /// It left `pdu` open, which was given up at `now`.
-    pub(crate) fn leave_open(&mut self, pdu: Vec<u8>, now: Instant) {
-        let is_echo = pdu[0] == 8;
-        self.open.push((pdu, now));
-        let echoes = self.open.iter().filter(|(pdu, _)| pdu[0] == 8);
-        if is_echo && echoes.count() >= MUTE {
+    /// It left `asked` open, which was given up at `now`, when so many bytes had come on the line.
+    pub(crate) fn leave_open(&mut self, asked: Asked, now: Instant, place: usize) {
+        self.open.push(Open { asked, given_up: now, place });
+        let is_echo = self.open.last().is_some_and(Open::is_echo);
+        if is_echo && self.open.iter().filter(|open| open.is_echo()).count() >= MUTE {
             self.echoed = false;
         }
+    }
+
+    /// The master takes number `unit` for one that owes nothing: true only where all that it owed may have come. That is
+    /// open no more.
+    pub(crate) fn may_be_free(&mut self, unit: u8, stream: &[u8]) -> bool {
+        let all = self.open.iter().all(|open| open.is_echo() || open.may_have_come(unit, stream));
+        if all {
+            self.open.retain(Open::is_echo);
+        }
+        all
     }
 
     pub(crate) fn settle(&mut self) {
@@ -50,10 +85,19 @@ impl Known {
 
     /// Whether a read like `pdu` is open, so that its answer looks the same.
     pub(crate) fn has_read_like(&self, pdu: &[u8]) -> bool {
-        self.open.iter().any(|(open, _)| open[0] == 3 && open[3..5] == pdu[3..5])
+        self.reads_like(pdu).next().is_some()
+    }
+
+    /// Whether the answer to a read like `pdu` cannot have come from number `unit` yet.
+    pub(crate) fn owes_read_like(&self, pdu: &[u8], unit: u8, stream: &[u8]) -> bool {
+        self.reads_like(pdu).any(|open| !open.may_have_come(unit, stream))
+    }
+
+    fn reads_like(&self, pdu: &[u8]) -> impl Iterator<Item = &Open> {
+        self.open.iter().filter(move |open| open.asked.pdu[0] == 3 && open.asked.pdu[3..5] == pdu[3..5])
     }
 
     pub(crate) fn has_open_echo(&self, now: Instant) -> bool {
-        self.open.iter().any(|(open, given_up)| open[0] == 8 && now < *given_up + PATIENCE)
+        self.open.iter().any(|open| open.is_echo() && now < open.given_up + PATIENCE)
     }
 }

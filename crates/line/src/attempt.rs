@@ -3,10 +3,10 @@
 
 use std::sync::MutexGuard;
 
-use drivebus_rtu::{Agreement, Answer, Attribution, Request, UnitAddress};
+use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request, UnitAddress};
 
 use crate::call::{Call, is_silence};
-use crate::course::Course;
+use crate::course::{Course, Form};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
 use crate::owner::{Asked, Next, Owner};
@@ -16,9 +16,13 @@ use crate::resync::Tried;
 /// How the question may be put.
 enum Question {
     /// As it was put before: all that the unit owes is the answer to it.
-    Same,
-    /// Anew, with what its answer will be worth.
+    Same(Form),
+    /// As a read of so many words, which nothing that the unit owes could pass for.
+    Apart(u16),
+    /// As it is, with what its answer will be worth.
     New(Attribution),
+    /// As it is, although it may be another one that is confirmed: whether it was taken is looked up afterwards.
+    Unproven,
 }
 
 /// A question that is put until the answers agree.
@@ -43,14 +47,38 @@ impl<'b> Call<'b, '_> {
     ) -> Result<Done, Box<CallError>> {
         let mut tried = Tried::default();
         let mut hearing = None;
+        // Whatever else is repeated would be done twice, and what is verified is asked as it is.
+        let mut apart = !self.verify;
         loop {
-            let (mut owner, question) = self.until_sure(turn, course, &mut tried, give_up)?;
-            let Question::New(attribution) = question else {
-                return course.ask(&mut owner, &Ask { in_doubt: true, ..self.ask }, give_up, take);
+            let (mut owner, question) = self.until_sure(turn, course, &mut tried, apart, give_up)?;
+            let attribution = match question {
+                Question::Same(Form::Plain) => {
+                    let ask = Ask { in_doubt: true, ..self.ask };
+                    return course.ask(&mut owner, &ask, Form::Plain, give_up, take);
+                }
+                Question::Same(Form::Apart(count)) | Question::Apart(count) => {
+                    let again = matches!(question, Question::Same(_));
+                    match self.ask_apart(course, &mut owner, count, again, give_up, take) {
+                        Err(error) if is_refusal(&error.failure) => {
+                            // It may be meant for something else that was asked, or for the words that nobody asked for.
+                            apart = false;
+                            course.asks_otherwise();
+                            continue;
+                        }
+                        result => return result,
+                    }
+                }
+                Question::Unproven => {
+                    course.is_unproven();
+                    let ask = Ask { in_doubt: true, ..self.ask };
+                    let result = course.ask(&mut owner, &ask, Form::Plain, give_up, &mut |_| ());
+                    return owner.unless_echoed(&self.ask, result, give_up);
+                }
+                Question::New(attribution) => attribution,
             };
             let hearing = self.hearing(&mut hearing, &owner, attribution);
             let Some(unit) = self.unit.filter(|_| !hearing.agreement.is_immediate()) else {
-                let result = course.ask(&mut owner, &self.ask, give_up, take);
+                let result = course.ask(&mut owner, &self.ask, Form::Plain, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);
             };
             if hearing.asked == 0 {
@@ -68,6 +96,7 @@ impl<'b> Call<'b, '_> {
         turn: &mut Turn<'b>,
         course: &mut Course,
         tried: &mut Tried,
+        apart: bool,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(MutexGuard<'b, Owner>, Question), Box<CallError>> {
         loop {
@@ -86,11 +115,15 @@ impl<'b> Call<'b, '_> {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
             let in_time = course.is_in_time(self.bus.now_of(&owner));
-            if self.unit.is_some_and(|unit| course.owes_only_this(&owner, unit)) {
-                return Ok((owner, Question::Same));
+            if !course.sends() {
+                return Err(self.none_settled(tried, &owner));
             }
-            match owner.next(&self.ask, tried, in_time) {
+            if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(&owner, unit)) {
+                return Ok((owner, Question::Same(form)));
+            }
+            match owner.next(&self.ask, tried, in_time, apart) {
                 Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
+                Next::AskApart(count) => return Ok((owner, Question::Apart(count))),
                 Next::LookForEcho => owner.look_for_echo(&self.ask, tried, give_up)?,
                 Next::Probe(unit, probe) => {
                     owner.probe(unit, probe, &self.ask, tried, give_up)?;
@@ -101,19 +134,55 @@ impl<'b> Call<'b, '_> {
                         return Err(error);
                     }
                 }
-                Next::Wait(until) => {
+                // Where the words can be read, what they are is known sooner than who was confirmed.
+                Next::Overtaken(_) if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
+                Next::Wait(until) | Next::Overtaken(until) => {
                     drop(owner);
                     self.stand_by(turn, until, give_up)?;
                 }
-                Next::GiveUp => {
-                    let now = self.bus.now_of(&owner);
-                    return Err(match tried.failure.take() {
-                        Some(error) if !matches!(error.failure, Failure::Refused { .. }) => error,
-                        _ => self.ask.failed(Failure::Doubtful, None, now, &[]),
-                    });
-                }
+                Next::GiveUp => return Err(self.none_settled(tried, &owner)),
             }
         }
+    }
+
+    /// What is said where nothing that was tried made sure of the unit.
+    fn none_settled(&self, tried: &mut Tried, owner: &Owner) -> Box<CallError> {
+        match tried.failure.take() {
+            Some(error) if !matches!(error.failure, Failure::Refused { .. }) => error,
+            _ => self.ask.failed(Failure::Doubtful, None, self.bus.now_of(owner), &[]),
+        }
+    }
+
+    /// Asks as a read of `count` words, which tells its answer apart, and gives those that were asked for to `take`.
+    fn ask_apart(
+        &self,
+        course: &mut Course,
+        owner: &mut Owner,
+        count: u16,
+        again: bool,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let (&Request::ReadHolding { address, count: asked, .. }, Some(unit)) = (self.ask.request, self.unit) else {
+            return course.ask(owner, &self.ask, Form::Plain, give_up, take);
+        };
+        let Ok(request) = Request::read(address, count) else {
+            return course.ask(owner, &self.ask, Form::Plain, give_up, take);
+        };
+        if !again && owner.master.in_quarantine(owner.now(), unit) {
+            owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
+        }
+        let ask = Ask { request: &request, in_doubt: again, ..self.ask };
+        let result = course.ask(owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
+        if count > asked {
+            match &result {
+                Ok(_) => owner.longer.given(unit, address),
+                Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, address, count),
+                Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, address, count),
+                Err(_) => {}
+            }
+        }
+        result
     }
 
     /// What was heard so far, unless somebody else asked the unit in between: that may be open now.
@@ -167,4 +236,9 @@ impl<'b> Call<'b, '_> {
             },
         }
     }
+}
+
+/// Whether a refusal came, whatever it was meant for.
+fn is_refusal(failure: &Failure) -> bool {
+    matches!(failure, Failure::Refused { .. } | Failure::Wrong(AnswerError::Refusal { .. }))
 }

@@ -5,6 +5,9 @@
 //! | a read | asked again, as often as the bus is set to; a damaged answer, which took no time-out, counts half |
 //! | a write whose words can be read back | read back; written again only where the unit shows other words |
 //! | any other write, an echo, a custom request | never: the caller is told |
+//!
+//! What it takes to be sure is bounded too: a call sends eight requests at most for each time that it may ask, the questions,
+//! the probes, and what is asked again included.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -49,7 +52,7 @@ pub(crate) struct Call<'b, 'r> {
     pub(crate) priority: Priority,
     retries: u32,
     pub(crate) verify: bool,
-    read_back: Option<u16>,
+    pub(crate) read_back: Option<u16>,
     pub(crate) connection: Option<u64>,
     /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
     wanted: Option<&'r AtomicBool>,
@@ -106,10 +109,11 @@ impl<'b, 'r> Call<'b, 'r> {
         {
             self.spare_the_others(&mut turn, unit, give_up)?;
         }
+        let mut course = Course::new(self.ask.timeout, self.retries);
         let result = match (self.ask.request, self.read_back) {
-            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, self.retries, give_up, take),
-            (_, Some(address)) => self.write_value(&mut turn, address, give_up, take),
-            _ => self.repeat(&mut turn, 0, give_up, take),
+            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, &mut course, self.retries, give_up, take),
+            (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
+            _ => self.repeat(&mut turn, &mut course, 0, give_up, take),
         };
         if let Some(unit) = self.unit {
             let mut owner = self.bus.lock();
@@ -204,15 +208,16 @@ impl<'b, 'r> Call<'b, 'r> {
     fn repeat(
         &self,
         turn: &mut Turn<'b>,
+        course: &mut Course,
         retries: u32,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut lost = None;
-        let mut course = Course::new(self.ask.timeout, retries);
+        course.go_on_with(self.ask.timeout, retries);
         loop {
             let asked = course.asked();
-            let error = match self.attempt(turn, &mut course, give_up, take) {
+            let error = match self.attempt(turn, course, give_up, take) {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
@@ -238,6 +243,7 @@ impl<'b, 'r> Call<'b, 'r> {
     fn write_value(
         &self,
         turn: &mut Turn<'b>,
+        course: &mut Course,
         address: u16,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
@@ -245,17 +251,23 @@ impl<'b, 'r> Call<'b, 'r> {
         let written = match *self.ask.request {
             Request::WriteSingle { value, .. } => vec![value],
             Request::WriteMultiple { words, .. } => words.iter().collect(),
-            _ => return self.repeat(turn, 0, give_up, take),
+            _ => return self.repeat(turn, course, 0, give_up, take),
         };
         let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
         let Ok(read) = Request::read(address, count) else {
-            return self.repeat(turn, 0, give_up, take);
+            return self.repeat(turn, course, 0, give_up, take);
         };
         let mut writing = Call { ..*self };
         let (mut times, mut before) = (0, None);
         loop {
-            let mut error = match writing.repeat(turn, 0, give_up, take) {
-                Ok(done) => return Ok(done),
+            let outcome = writing.repeat(turn, course, 0, give_up, take);
+            let is_unproven = course.take_unproven();
+            let mut error = match outcome {
+                Ok(done) if !is_unproven => return Ok(done),
+                Ok(done) => {
+                    let failure = Failure::NoAnswer { timeout: self.ask.timeout, attempts: 1 };
+                    self.ask.failed(failure, Some(done.sent), done.ended, &[])
+                }
                 Err(error) => error,
             };
             let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else {
@@ -270,7 +282,7 @@ impl<'b, 'r> Call<'b, 'r> {
             let ask = Ask { request: &read, in_doubt: false, ..self.ask };
             let reading = Call { ask, read_back: None, ..writing };
             let mut shows = Vec::new();
-            let outcome = reading.repeat(turn, self.retries, give_up, &mut |answer| {
+            let outcome = reading.repeat(turn, course, self.retries, give_up, &mut |answer| {
                 if let Answer::Read { words, .. } = answer {
                     shows = words.iter().collect();
                 }
@@ -282,6 +294,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 }
                 Ok(_) => {}
                 // It is still not known whether the write was taken.
+                Err(silent) if is_unproven => return Err(Box::new(CallError { sent: Some(sent), ..*silent })),
                 Err(_) => return Err(error),
             }
         }

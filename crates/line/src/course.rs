@@ -1,4 +1,5 @@
-//! The attempts of one call: how long they may take, what one leaves to the next, and after which failure there is a next.
+//! The attempts of one call: how long they may take, how many requests, what one leaves to the next, and after which failure
+//! there is a next.
 
 use std::time::Duration;
 
@@ -12,6 +13,19 @@ use crate::owner::{Asked, Owner};
 /// How many more attempts than questions there may be: those that end with a probe.
 const PROBED_IN_VAIN: u32 = 4;
 
+/// Requests that one call may send for each time that it may ask, whatever they are for: the question, what makes sure of the
+/// unit and of the adapter before it, and what is asked again because answers do not agree.
+pub(crate) const REQUESTS: u32 = 8;
+
+/// How a question is put.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// As the caller did.
+    Plain,
+    /// As a read of so many words, which nothing that the unit owes could pass for.
+    Apart(u16),
+}
+
 /// What the attempts of one call leave to the next.
 pub(crate) struct Course {
     /// How long the caller allowed them to take.
@@ -23,8 +37,12 @@ pub(crate) struct Course {
     asked: u32,
     /// What is left of the retries, in halves: a damaged answer, which took no time-out, costs one.
     left: u32,
-    /// What was asked of the unit, if the last of it was a read of this call, which it left open.
-    left_open: Option<Asked>,
+    /// What was asked of the unit, if the last of it was a read of this call, which it left open; and how that was put.
+    left_open: Option<(Asked, Form)>,
+    /// Requests that are left.
+    requests: u32,
+    /// Whether a write was confirmed by what may have been the confirmation of another one.
+    unproven: bool,
 }
 
 impl Course {
@@ -35,7 +53,31 @@ impl Course {
     pub(crate) fn new(timeout: Duration, retries: u32) -> Self {
         let allowed = timeout.saturating_mul(retries.saturating_add(1));
         let left = retries.saturating_mul(2);
-        Self { allowed, until: None, attempts: 0, asked: 0, left, left_open: None }
+        // One is kept for the look at the adapter after a request that did not wait for it.
+        let requests = retries.saturating_add(1).saturating_mul(REQUESTS) - 1;
+        Self { allowed, until: None, attempts: 0, asked: 0, left, left_open: None, requests, unproven: false }
+    }
+
+    /// The same call goes on with something else: with `retries` more questions than one, and what is left of the requests.
+    pub(crate) fn go_on_with(&mut self, timeout: Duration, retries: u32) {
+        *self = Self { requests: self.requests, ..Self::new(timeout, retries) };
+    }
+
+    /// Something is done that sends one request at most. False where none is left: then it must not be.
+    pub(crate) fn sends(&mut self) -> bool {
+        let may = self.requests > 0;
+        self.requests = self.requests.saturating_sub(1);
+        may
+    }
+
+    /// What confirmed the write may have been meant for another one.
+    pub(crate) fn is_unproven(&mut self) {
+        self.unproven = true;
+    }
+
+    /// Whether the write was [not proven](Self::is_unproven). Says so once.
+    pub(crate) fn take_unproven(&mut self) -> bool {
+        std::mem::take(&mut self.unproven)
     }
 
     /// Whether there is time left at `now`.
@@ -56,11 +98,12 @@ impl Course {
         self.asked
     }
 
-    /// Asks, and remembers whether the same may be asked again.
+    /// Asks in this form, and remembers whether the same may be asked again.
     pub(crate) fn ask(
         &mut self,
         owner: &mut Owner,
         ask: &Ask<'_>,
+        form: Form,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
@@ -68,17 +111,22 @@ impl Course {
         let result = owner.exchange(ask, give_up, take);
         self.left_open = match (&result, ask.destination, ask.request) {
             (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
-                Some(owner.asked(unit))
+                Some((owner.asked(unit), form))
             }
             _ => None,
         };
         result
     }
 
-    /// Whether all that `unit` owes is the answer to this very question, so that it may be asked again as it is. Says so
-    /// once.
-    pub(crate) fn owes_only_this(&mut self, owner: &Owner, unit: UnitAddress) -> bool {
-        self.left_open.take().is_some_and(|then| then == owner.asked(unit))
+    /// How the question was put, if all that `unit` owes is the answer to this very one, so that it may be asked again as it
+    /// was. Says so once.
+    pub(crate) fn owes_only_this(&mut self, owner: &Owner, unit: UnitAddress) -> Option<Form> {
+        self.left_open.take().filter(|(then, _)| *then == owner.asked(unit)).map(|(_, form)| form)
+    }
+
+    /// The question is put in another way the next time.
+    pub(crate) fn asks_otherwise(&mut self) {
+        self.left_open = None;
     }
 
     /// Whether there is another attempt after one that ended with `error`, before which it had been `asked` so often.
@@ -91,7 +139,7 @@ impl Course {
         };
         let is_over = (cost > 0 && self.left == 0) || self.attempts > self.asked.saturating_add(PROBED_IN_VAIN);
         self.left = self.left.saturating_sub(cost);
-        !is_over && is_passing(&error.failure) && self.is_in_time(error.ended)
+        !is_over && self.requests > 0 && is_passing(&error.failure) && self.is_in_time(error.ended)
     }
 }
 

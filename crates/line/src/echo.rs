@@ -83,7 +83,7 @@ impl Owner {
         if self.echo == AdapterEcho::Absent {
             return Ok(done);
         }
-        self.master.still_owed(done.ended, unit, ask.request);
+        self.master.still_owed(done.ended, unit, ask.request, ask.timeout);
         let failure = Failure::NoAnswer { timeout: ask.timeout, attempts: 1 };
         Err(ask.failed(failure, Some(done.sent), done.ended, &[]))
     }

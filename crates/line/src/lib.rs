@@ -24,6 +24,7 @@ mod identity;
 mod latency;
 mod link;
 mod listen;
+mod longer;
 pub mod mbap;
 mod opener;
 mod order;

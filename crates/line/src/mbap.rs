@@ -151,10 +151,6 @@ impl Line for ModbusTcp {
         sleep_until(until);
     }
 
-    fn may_overtake(&self) -> bool {
-        true
-    }
-
     fn name(&self) -> String {
         self.connection.name.clone()
     }

@@ -10,6 +10,7 @@ use crate::echo::AdapterEcho;
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
 use crate::link::Links;
+use crate::longer::Longer;
 use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
@@ -21,12 +22,16 @@ use crate::{Line, LineClock};
 pub(crate) enum Next {
     /// Send it.
     Ask(Attribution),
+    /// Send it as a read of so many words, which nothing that the unit owes could pass for.
+    AskApart(u16),
     /// See whether the adapter echoes.
     LookForEcho,
     /// Make sure that the unit owes nothing else.
     Probe(UnitAddress, Probe),
     /// Let this moment come; others may use the line.
     Wait(Instant),
+    /// The same: until then an open answer could be taken for its own.
+    Overtaken(Instant),
     /// The unit may still answer something else, and everything was tried.
     GiveUp,
 }
@@ -46,6 +51,8 @@ pub(crate) struct Owner {
     /// What is known by now about the one that is plugged in.
     pub(crate) echo: AdapterEcho,
     resync: Resync,
+    /// Which reads can be asked in a longer form.
+    pub(crate) longer: Longer,
     links: Arc<Mutex<Links>>,
     delays: Delays,
     format: SerialFormat,
@@ -79,6 +86,7 @@ impl Owner {
             given_echo: echo,
             echo,
             resync: Resync::default(),
+            longer: Longer::default(),
             links: Arc::default(),
             delays: Delays::default(),
             format,
@@ -160,7 +168,6 @@ impl Owner {
             given => given,
         };
         self.master.strip_echo(self.echo == AdapterEcho::Present);
-        self.master.answers_may_overtake(line.may_overtake());
         // A connection of our own whose frames are told apart carries nobody else's answers.
         if !line.gapless() {
             self.master.opened(line.now());
@@ -171,10 +178,11 @@ impl Owner {
 
     /// What comes before `ask`, so that what is taken for its answer can only be its answer.
     ///
-    /// Nothing is sent where nothing is in doubt. Before a request whose answer may look like it, a write or the echo
+    /// Nothing is sent where nothing is in doubt. A read that can be put so that its answer is told `apart` needs nothing
+    /// before it, if the caller takes that. Before a request whose answer may look like it, a write or the echo
     /// sent here included, one word is read if it is not known yet whether the adapter echoes. Then a unit that may still
     /// answer something else is probed.
-    pub(crate) fn next(&mut self, ask: &Ask<'_>, tried: &Tried, in_time: bool) -> Next {
+    pub(crate) fn next(&mut self, ask: &Ask<'_>, tried: &Tried, in_time: bool, apart: bool) -> Next {
         let Destination::Unit(unit) = ask.destination else {
             return Next::Ask(Attribution::Certain);
         };
@@ -183,6 +191,14 @@ impl Owner {
         }
         let now = self.now();
         let in_quarantine = self.master.in_quarantine(now, unit);
+        let attribution = self.master.attribution(now, unit, ask.request);
+        let may_be_mistaken = in_quarantine || attribution.may_be_mistaken();
+        if apart
+            && may_be_mistaken
+            && let Some(count) = self.longer.form(&self.master, now, unit, ask.request)
+        {
+            return Next::AskApart(count);
+        }
         if self.echo == AdapterEcho::Auto && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;
         }
@@ -198,8 +214,8 @@ impl Owner {
             return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
         }
         self.resync.is_sure(unit);
-        match self.master.attribution(now, unit, ask.request) {
-            Attribution::Wait(until) => Next::Wait(until),
+        match attribution {
+            Attribution::Wait(until) => Next::Overtaken(until),
             sure => Next::Ask(sure),
         }
     }

@@ -73,11 +73,6 @@ pub trait Line: Send + fmt::Debug {
         false
     }
 
-    /// Whether it leads over a gateway, which may hand on answers in another order than they were asked for.
-    fn may_overtake(&self) -> bool {
-        false
-    }
-
     /// How late a character may be handed over after it was on the wire, because an adapter collects what it receives.
     ///
     /// A time-out shorter than the unit's own time and this hears no answer. A silence is seen this much late, never early.

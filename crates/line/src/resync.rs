@@ -11,9 +11,9 @@ use crate::error::CallError;
 /// How often one attempt echoes a unit that is known to return echoes.
 const ECHOES: u32 = 2;
 
-/// How many echoes in a row a unit must be silent on before it is asked a read of another length instead: one echo may
-/// have been lost, and a fresh word is the better proof.
-const SILENT_BEFORE_READ: u32 = 2;
+/// How many echoes in a row a unit that never returned one must be silent on before it is asked a read of another length
+/// instead: units that know no echo are ordinary.
+const SILENT_BEFORE_READ: u32 = 1;
 
 /// After how many it is taken for one that knows no echo, and is not echoed first any more.
 const SILENT_FOR_GOOD: u32 = 5;
@@ -23,7 +23,7 @@ const SILENT_FOR_GOOD: u32 = 5;
 const OTHER_READS: u32 = 2;
 
 /// Most words that a read asks for only to tell its answer from others: what every drive known here allows.
-const MAX_WORDS: u16 = 16;
+pub(crate) const MAX_WORDS: u16 = 16;
 
 /// Words for probes and echoes.
 #[derive(Debug)]
@@ -90,6 +90,13 @@ impl Tried {
     }
 }
 
+/// What a unit made of an echo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Echo {
+    Returned,
+    Refused,
+}
+
 /// What is known of the units that were asked.
 #[derive(Debug, Default)]
 pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
@@ -98,8 +105,8 @@ pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
 struct Known {
     /// It has answered something.
     alive: bool,
-    /// It has returned an echo, and was not silent on [`SILENT_FOR_GOOD`] since.
-    echoes: bool,
+    /// What it made of the latest echo that it answered, unless it was silent on [`SILENT_FOR_GOOD`] since.
+    echo: Option<Echo>,
     /// Echoes in a row that it was silent on.
     silent_echoes: u32,
     /// A register that it answered a read of.
@@ -116,8 +123,8 @@ impl Resync {
         let known = self.0.entry(unit).or_default();
         known.alive = true;
         match request {
-            Request::Echo { .. } if !refused => {
-                known.echoes = true;
+            Request::Echo { .. } => {
+                known.echo = Some(if refused { Echo::Refused } else { Echo::Returned });
                 known.silent_echoes = 0;
             }
             Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
@@ -137,23 +144,29 @@ impl Resync {
         in_time: bool,
     ) -> Option<Probe> {
         let known = self.0.entry(unit).or_default();
-        let again =
-            if known.echoes { in_time && tried.echoes < ECHOES } else { known.silent_echoes < SILENT_BEFORE_READ };
+        let again = match known.echo {
+            Some(Echo::Returned) => in_time && tried.echoes < ECHOES,
+            // What it says of one echo it says of each.
+            Some(Echo::Refused) => false,
+            None => known.silent_echoes < SILENT_BEFORE_READ,
+        };
         let echo = (tried.echoes == 0 || again).then_some(Probe::Echo);
         let address = match *request {
             Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
             _ => known.readable,
         };
+        let is_silent = known.echo.is_none() && known.silent_echoes >= SILENT_BEFORE_READ;
         let other_read = || {
-            let is_worth_it = !tried.other_read && !known.echoes && known.other_reads < OTHER_READS;
-            let address = address.filter(|_| is_worth_it && known.silent_echoes >= SILENT_BEFORE_READ)?;
+            let knows_no_echo = is_silent || known.echo == Some(Echo::Refused);
+            let is_worth_it = knows_no_echo && !tried.other_read && known.other_reads < OTHER_READS;
+            let address = address.filter(|_| is_worth_it)?;
             (1..=MAX_WORDS)
                 .filter_map(|count| Some((count, Request::read(address, count).ok()?)))
                 .find(|(_, read)| master.tells_apart(now, unit, read))
                 .map(|(count, _)| Probe::OtherRead { address, count })
         };
         let probe = if known.alive {
-            if known.silent_echoes >= SILENT_FOR_GOOD { other_read().or(echo) } else { echo.or_else(other_read) }
+            if is_silent { other_read().or(echo) } else { echo.or_else(other_read) }
         } else if tried.has_echoed() || tried.other_read {
             None // silence is all that is known: one probe an attempt, so that it costs no more than an attempt
         } else if known.echo_was_last {
@@ -178,7 +191,9 @@ impl Resync {
         let known = self.0.entry(unit).or_default();
         known.silent_echoes = known.silent_echoes.saturating_add(1);
         // Another unit may have its address now.
-        known.echoes &= known.silent_echoes < SILENT_FOR_GOOD;
+        if known.silent_echoes >= SILENT_FOR_GOOD {
+            known.echo = None;
+        }
     }
 }
 

@@ -39,7 +39,8 @@ pub struct Counters {
     pub verified: u64,
     /// Calls that were not sent, because the unit was silent before and others use the line.
     pub not_asked: u64,
-    /// Echoes sent to find the way back after a request was left open.
+    /// Requests that found the way back after one was left open: echoes, reads of another length, and reads of the caller's
+    /// that were put so that their answer is told apart.
     pub resyncs: u64,
     /// Whole frames that came before the request went out, or that the unit still owed.
     pub late: u64,

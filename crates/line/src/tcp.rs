@@ -65,10 +65,6 @@ impl Line for RtuOverTcp {
         sleep_until(until);
     }
 
-    fn may_overtake(&self) -> bool {
-        true
-    }
-
     fn name(&self) -> String {
         self.connection.name.clone()
     }

@@ -119,6 +119,15 @@ impl<'a> Answer<'a> {
         Ok(Self::Custom { pdu })
     }
 
+    /// The same with the first `count` words only, where more were read.
+    #[must_use]
+    pub fn shortened(self, count: u16) -> Self {
+        match self {
+            Self::Read { words } => Self::Read { words: words.first(count.into()) },
+            other => other,
+        }
+    }
+
     /// The answer that confirms `request`; `None` for a read and a custom request, whose answers carry data.
     pub fn confirming(request: &Request<'_>) -> Option<Self> {
         match *request {
@@ -376,6 +385,11 @@ pub enum AnswerError {
         /// Bytes of the PDU.
         len: usize,
     },
+    /// It is a refusal, and may be that of an earlier request: refusals of one function look alike.
+    Refusal {
+        /// Why.
+        code: ExceptionCode,
+    },
 }
 
 impl fmt::Display for AnswerError {
@@ -390,6 +404,9 @@ impl fmt::Display for AnswerError {
                 asked[0], asked[1], came[0], came[1]
             ),
             Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
+            Self::Refusal { code } => {
+                write!(f, "exception {:02X}H came, which may be meant for an earlier read", code.0)
+            }
         }
     }
 }

@@ -10,14 +10,18 @@
 //! | the refusal of an echo (exception to 08H), while no other echo is open | requests of our own | the same |
 //! | [`FIRST_CONTACT`] after the line was opened | questions of others | it answers within that time or never |
 //! | [`PATIENCE`] after the last request it left open | requests of our own, to a unit that returns no echo | the same |
+//! | every open answer was seen | requests of our own | it answers at most once |
 //!
-//! Behind a gateway answers may overtake each other, and none of the orders above holds. There an open answer counts as
-//! possible for [`OVERTAKING`], and a read that it could pass for has to be repeated: see [`Attribution`]. What another
-//! client of the gateway asked is not known to anybody; at first contact an echo is believed there too.
+//! A radio bridge, a serial server or a gateway may let answers overtake each other, and nobody can tell from a port
+//! whether one stands behind it. There none of the orders above holds. So on every line an open answer counts as possible
+//! for [`OVERTAKING`], doubt or not, until it is seen. A read that it could pass for is asked in a longer form, whose answer
+//! it cannot pass for, or again and again: see [`Attribution`]. What another program asked is not known to anybody; at
+//! first contact an echo is believed on every line.
 
 use core::time::Duration;
 
-use crate::answer::Expected;
+use crate::answer::{Answer, Expected};
+use crate::frame::Frame;
 use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};
 
@@ -29,19 +33,23 @@ pub const FIRST_CONTACT: Duration = Duration::from_secs(1);
 /// How long a unit that never returned an echo may owe an answer. After that it is taken as never to come.
 pub const PATIENCE: Duration = Duration::from_secs(3);
 
-/// How long behind a gateway an answer may be overtaken by later ones.
+/// How long after it was given up an answer may be overtaken by later ones; four time-outs where that is longer.
 pub const OVERTAKING: Duration = Duration::from_secs(3);
 
-/// Longest time that one answer given up may count as possible. Each answer taken meanwhile may have been the open one, so
-/// that its own is open instead; an answer that is displaced so three times over is not expected of any gateway.
-const LONGEST: Duration = Duration::from_secs(9);
+/// The same, in time-outs of the request that was given up.
+const OVERTAKING_TIMEOUTS: u32 = 4;
+
+/// Longest time that one answer given up may count as possible, in times of the one before. Each answer taken meanwhile may
+/// have been the open one, so that its own is open instead; an answer that is displaced so three times over is not expected
+/// of any line.
+const LONGEST: u32 = 3;
 
 /// After so many echoes that stayed open, one that returned some before counts as a unit that never did: another one may
 /// have its address now.
 const MUTE: u8 = 5;
 
 /// Open requests that are told apart; of more, only the unit and the time are kept.
-const KEPT: usize = 16;
+const KEPT: usize = 32;
 
 /// More answers than this that could pass for one are waited for, not outvoted.
 const MAX_RIVALS: u8 = 3;
@@ -51,8 +59,8 @@ const MAX_RIVALS: u8 = 3;
 pub enum Attribution {
     /// What the master takes for the answer is the answer.
     Certain,
-    /// Open answers behind a gateway could pass for it: a read has to bring the same words `words` times in a row, or
-    /// the same refusal `refusal` times, so that at least one of them is the answer.
+    /// Open answers could pass for it: a read has to bring the same words `words` times in a row, or the same refusal
+    /// `refusal` times, so that at least one of them is the answer. A read of another length may need less.
     Repeat {
         /// Times for the words read; 1 where no open answer could pass for them.
         words: u8,
@@ -61,6 +69,18 @@ pub enum Attribution {
     },
     /// Open answers could pass for it, and repeating does not help: ask at this moment or later.
     Wait(Instant),
+}
+
+impl Attribution {
+    /// Whether the words of an open answer could be taken for those of the answer.
+    #[must_use]
+    pub const fn may_be_mistaken(self) -> bool {
+        match self {
+            Self::Certain => false,
+            Self::Repeat { words, .. } => words > 1,
+            Self::Wait(_) => true,
+        }
+    }
 }
 
 /// Requests of one kind to one unit that were left open.
@@ -73,6 +93,15 @@ struct Open {
     given_up: Instant,
     /// The same, or when the latest answer was taken that one of them may have been.
     last: Instant,
+    /// How long after that it may still come.
+    window: Duration,
+}
+
+impl Open {
+    /// Whether the answer can overtake nothing any more.
+    fn is_past(&self, now: Instant) -> bool {
+        now >= self.last + self.window
+    }
 }
 
 /// All doubts of one line.
@@ -86,10 +115,13 @@ pub(crate) struct Doubts {
     /// Units that have returned an echo, and did not leave [`MUTE`] open since.
     echoers: UnitSet,
     ledger: [Option<Open>; KEPT],
-    /// Units of which something had to be forgotten, and when the latest of it was asked.
+    /// Units that the ledger has something of; nothing is looked up of the others.
+    listed: UnitSet,
+    /// Units of which something had to be forgotten, and until when the latest of it may come.
     forgotten: UnitSet,
-    forgotten_at: Instant,
-    overtaking: bool,
+    forgotten_until: Instant,
+    /// The frame that was heard last since a request went out, by unit and CRC: a line may bring it twice at once.
+    heard: Option<(u8, [u8; 2])>,
 }
 
 impl Doubts {
@@ -99,9 +131,10 @@ impl Doubts {
         open: UnitSet::EMPTY,
         echoers: UnitSet::EMPTY,
         ledger: [None; KEPT],
+        listed: UnitSet::EMPTY,
         forgotten: UnitSet::EMPTY,
-        forgotten_at: Instant::ZERO,
-        overtaking: false,
+        forgotten_until: Instant::ZERO,
+        heard: None,
     };
 
     /// The line was opened at `now`: anybody may have asked anything before.
@@ -110,37 +143,36 @@ impl Doubts {
         self.strangers_until = now + FIRST_CONTACT;
     }
 
-    pub(crate) const fn may_overtake(&mut self, overtaking: bool) {
-        self.overtaking = overtaking;
-    }
-
-    /// `unit` was asked for `expected`, and at `now` the answer is given up.
-    pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected) {
+    /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
+    pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
+        self.enter(now, unit, expected, OVERTAKING.max(timeout.saturating_mul(OVERTAKING_TIMEOUTS)));
         self.open.insert(unit);
-        self.enter(now, unit, expected);
     }
 
-    fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected) {
+    fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
         let alike = |open: &Open| {
             open.unit == unit && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
         };
         if let Some(open) = self.ledger.iter_mut().flatten().find(|open| alike(open)) {
-            open.count = open.count.saturating_add(1);
+            // Echoes are counted as long as none comes back.
+            let over = open.is_past(now) && !self.open.contains(unit) && !expected.is_echo();
+            open.count = if over { 1 } else { open.count.saturating_add(1) };
             open.given_up = now;
             open.last = now;
+            open.window = open.window.max(window);
             if expected.is_echo() && open.count >= MUTE {
                 self.echoers.remove(unit);
             }
             return;
         }
-        let open = Open { unit, expected, count: 1, given_up: now, last: now };
-        let over =
-            |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && is_past(now, open.last));
+        self.listed.insert(unit);
+        let open = Open { unit, expected, count: 1, given_up: now, last: now, window };
+        let over = |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && open.is_past(now));
         if let Some(place) = self.ledger.iter().position(over) {
             self.ledger[place] = Some(open);
         } else if let Some(oldest) = self.ledger.iter_mut().flatten().min_by_key(|open| open.last) {
             self.forgotten.insert(oldest.unit);
-            self.forgotten_at = self.forgotten_at.max(oldest.last);
+            self.forgotten_until = self.forgotten_until.max(oldest.last + oldest.window);
             *oldest = open;
         }
     }
@@ -155,11 +187,11 @@ impl Doubts {
         self.is_strange(now, unit) || self.open.contains(unit)
     }
 
-    /// Whether `unit` owes an answer, and what it answers to `expected` can still be told apart: what does not fit is
+    /// Whether `unit` may owe an answer, and what it answers to `expected` can still be told apart: what does not fit is
     /// late then, and not wrong.
     pub(crate) fn sorts_out(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
-        let owes = self.contains(now, unit) || (expected.is_echo() && self.open.contains(unit));
-        owes && self.tells_apart(now, unit, expected)
+        let owes = self.contains(now, unit) || self.possible(now, unit).next().is_some();
+        (owes || (expected.is_echo() && self.open.contains(unit))) && self.tells_apart(now, unit, expected)
     }
 
     /// Whether the answer of `unit` to `expected` cannot be mistaken for one that it may still give.
@@ -167,31 +199,67 @@ impl Doubts {
         expected.is_echo()
             || (expected.is_read()
                 && !self.is_strange(now, unit)
-                && !self.forgotten.contains(unit)
-                && !self.of(unit).any(|open| open.expected.could_pass_for(expected)))
+                && !self.has_forgotten(now, unit)
+                && !self.possible(now, unit).any(|open| open.expected.could_pass_for(expected)))
     }
 
     /// Whether a refusal that `unit` gives to `expected` may be meant for something else that it was asked before.
     pub(crate) fn may_refuse_another(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
-        let owes = self.contains(now, unit);
-        let may_come = |last| owes || (self.overtaking && !is_past(now, last));
         let rival = |open: &Open| open.expected != expected && open.expected.function() == expected.function();
-        self.is_strange(now, unit)
-            || (self.forgotten.contains(unit) && may_come(self.forgotten_at))
-            || self.of(unit).any(|open| rival(open) && may_come(open.last))
+        self.is_strange(now, unit) || self.has_forgotten(now, unit) || self.possible(now, unit).any(rival)
     }
 
-    /// `unit` has answered what could not be mistaken, and with it everything before.
-    pub(crate) fn settle(&mut self, unit: UnitAddress, echoed: bool) {
+    /// At `now` `unit` has answered what could not be mistaken, and, if it answers in order, everything before.
+    pub(crate) fn settle(&mut self, now: Instant, unit: UnitAddress, echoed: bool) {
         self.strangers.remove(unit);
         self.open.remove(unit);
         if echoed {
             self.echoers.insert(unit);
         }
-        if !self.overtaking {
-            self.forget(unit, |_| true);
+        if self.listed.contains(unit) {
+            self.forget(unit, |open| open.is_past(now));
+        }
+        if now >= self.forgotten_until {
             self.forgotten.remove(unit);
         }
+    }
+
+    /// A request goes out: what is heard from here on is not the same frame twice.
+    pub(crate) fn goes_out(&mut self) {
+        self.heard = None;
+    }
+
+    /// A whole frame came that answers nothing in flight. Where it can only be an answer that is open, that one is not any
+    /// more.
+    ///
+    /// Not so an answer that looks like its request, which an adapter may have sent back; nor one of the first second, which
+    /// another program may have asked for; nor the same frame again, which the line may have brought twice.
+    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>) {
+        let is_new = self.hear(frame);
+        let Ok(unit) = UnitAddress::new(frame.address()) else { return };
+        if !is_new || self.is_strange(now, unit) {
+            return;
+        }
+        let answers = |open: &Open| {
+            open.unit == unit
+                && matches!(open.expected.judge(frame.pdu()), Ok(answer) if !matches!(answer, Answer::Exception { .. }))
+        };
+        let mut fitting = self.ledger.iter_mut().filter(|open| open.as_ref().is_some_and(answers));
+        let (Some(place), None) = (fitting.next(), fitting.next()) else { return };
+        match place {
+            Some(open) if open.expected.may_repeat_request() => return,
+            Some(open) if open.count > 1 => open.count -= 1,
+            other => *other = None,
+        }
+        if !self.has_forgotten(now, unit) && self.of(unit).all(|open| open.expected.is_echo()) {
+            self.open.remove(unit);
+        }
+    }
+
+    /// Whether `frame` is another one than the last since a request went out.
+    pub(crate) fn hear(&mut self, frame: &Frame<'_>) -> bool {
+        let heard = Some((frame.address(), frame.crc()));
+        core::mem::replace(&mut self.heard, heard) != heard
     }
 
     /// `unit` has refused an echo. Refusals look alike: where another echo is open, this may be the refusal of that one,
@@ -200,48 +268,47 @@ impl Doubts {
         let earlier = self
             .of(unit)
             .any(|open| open.expected.function() == Expected::ECHO.function() && now < open.last + PATIENCE);
-        if earlier || self.is_strange(now, unit) || self.forgotten.contains(unit) {
-            self.left_open(now, unit, Expected::ECHO);
+        if earlier || self.is_strange(now, unit) || self.has_forgotten(now, unit) {
+            self.left_open(now, unit, Expected::ECHO, Duration::ZERO);
         } else {
-            self.settle(unit, false);
+            self.settle(now, unit, false);
         }
     }
 
     /// `unit` was asked for `expected`, and an answer or a refusal was taken for its own.
     pub(crate) fn taken(&mut self, now: Instant, unit: UnitAddress, expected: Expected, refused: bool) {
-        if !self.overtaking {
-            return;
-        }
-        let mut displaced = false;
+        let mut displaced = None;
         for open in self.ledger.iter_mut().flatten() {
             let rival =
                 open.expected.could_pass_for(expected) || (refused && open.expected.function() == expected.function());
-            if open.unit == unit && rival && !is_past(now, open.last) {
-                open.last = now.min(open.given_up + LONGEST.saturating_sub(OVERTAKING));
-                displaced |= open.expected != expected;
+            if open.unit == unit && rival && !open.is_past(now) {
+                open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));
+                if open.expected != expected {
+                    displaced = displaced.max(Some(open.window));
+                }
             }
         }
-        if displaced {
-            self.enter(now, unit, expected);
+        if let Some(window) = displaced {
+            self.enter(now, unit, expected, window);
         }
     }
 
     /// How sure the answer of `unit` to `expected` can be, asked at `now`.
     pub(crate) fn attribution(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Attribution {
-        if !self.overtaking || expected.is_echo() {
+        if expected.is_echo() {
             return Attribution::Certain;
         }
-        if self.forgotten.contains(unit) && !is_past(now, self.forgotten_at) {
-            return Attribution::Wait(self.forgotten_at + OVERTAKING);
+        if self.has_forgotten(now, unit) {
+            return Attribution::Wait(self.forgotten_until);
         }
         let (mut words, mut refusal, mut latest) = (1_u8, 1_u8, None);
-        for open in self.of(unit).filter(|open| !is_past(now, open.last)) {
+        for open in self.of(unit).filter(|open| !open.is_past(now)) {
             if open.expected.could_pass_for(expected) {
                 words = words.saturating_add(open.count);
             }
             if open.expected.function() == expected.function() {
                 refusal = refusal.saturating_add(open.count);
-                latest = latest.max(Some(open.last + OVERTAKING));
+                latest = latest.max(Some(open.last + open.window));
             }
         }
         match latest {
@@ -262,14 +329,27 @@ impl Doubts {
 
     /// Whether `unit` never returned an echo and owes nothing any more.
     fn is_over(&self, now: Instant, unit: UnitAddress) -> bool {
-        let forgotten = self.forgotten.contains(unit).then_some(self.forgotten_at);
         // An echo that is still open can be mistaken for nothing but an echo.
-        let asked = self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last).max().max(forgotten);
-        !self.echoers.contains(unit) && asked.is_none_or(|asked| now >= asked + PATIENCE)
+        let asked = self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last).max();
+        !self.echoers.contains(unit)
+            && !self.has_forgotten(now, unit)
+            && asked.is_none_or(|asked| now >= asked + PATIENCE)
+    }
+
+    /// Whether of what `unit` was asked something may still come that is not in the ledger.
+    fn has_forgotten(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.forgotten.contains(unit) && now < self.forgotten_until
+    }
+
+    /// What may still come of `unit`, in order or not.
+    fn possible(&self, now: Instant, unit: UnitAddress) -> impl Iterator<Item = &Open> {
+        let in_doubt = self.contains(now, unit);
+        self.of(unit).filter(move |open| in_doubt || !open.is_past(now))
     }
 
     fn of(&self, unit: UnitAddress) -> impl Iterator<Item = &Open> {
-        self.ledger.iter().flatten().filter(move |open| open.unit == unit)
+        let ledger = if self.listed.contains(unit) { &self.ledger[..] } else { &[] };
+        ledger.iter().flatten().filter(move |open| open.unit == unit)
     }
 
     fn forget(&mut self, unit: UnitAddress, which: impl Fn(&Open) -> bool) {
@@ -278,10 +358,8 @@ impl Doubts {
                 *place = None;
             }
         }
+        if self.of(unit).next().is_none() {
+            self.listed.remove(unit);
+        }
     }
-}
-
-/// Whether an answer that was given up at `last` can overtake nothing any more.
-fn is_past(now: Instant, last: Instant) -> bool {
-    now >= last + OVERTAKING
 }

@@ -56,6 +56,11 @@ impl<'a> Frame<'a> {
         &self.bytes[1..self.bytes.len() - CRC_LEN]
     }
 
+    /// The CRC as it stands on the wire, which says of two frames that they are not the same.
+    pub(crate) fn crc(&self) -> [u8; 2] {
+        self.bytes.last_chunk().copied().unwrap_or_default()
+    }
+
     /// All of it, address and CRC included.
     pub const fn as_bytes(&self) -> &'a [u8] {
         self.bytes

@@ -61,6 +61,7 @@ enum State {
     Waiting {
         unit: UnitAddress,
         expected: Expected,
+        timeout: Duration,
         until: Instant,
     },
     /// After a broadcast: the units act.
@@ -169,7 +170,7 @@ impl Master {
         self.busy = self.busy.max(Some(end));
         let until = end + job.timeout;
         self.state = match job.destination {
-            Destination::Unit(unit) => State::Waiting { unit, expected: job.expected, until },
+            Destination::Unit(unit) => State::Waiting { unit, expected: job.expected, timeout: job.timeout, until },
             Destination::Broadcast => State::Turnaround { until },
         };
     }
@@ -224,6 +225,7 @@ impl Master {
                         }
                     }
                     self.echo_due = self.strips_echo;
+                    self.doubts.goes_out();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {
@@ -240,7 +242,7 @@ impl Master {
                     Event::BroadcastDone
                 })
             }
-            State::Waiting { unit, expected, until } => self.await_answer(now, unit, expected, until),
+            State::Waiting { unit, expected, timeout, until } => self.await_answer(now, unit, expected, timeout, until),
         }
     }
 
@@ -250,12 +252,12 @@ impl Master {
             State::Idle | State::Quiet { .. } => false,
             State::Sending { job } => {
                 if let Destination::Unit(unit) = job.destination {
-                    self.doubts.left_open(now, unit, job.expected);
+                    self.doubts.left_open(now, unit, job.expected, job.timeout);
                 }
                 true
             }
-            State::Waiting { unit, expected, .. } => {
-                self.doubts.left_open(now, unit, expected);
+            State::Waiting { unit, expected, timeout, .. } => {
+                self.doubts.left_open(now, unit, expected, timeout);
                 true
             }
             State::Turnaround { .. } => true,
@@ -275,9 +277,10 @@ impl Master {
         self.doubts.opened(now);
     }
 
-    /// Says that what was taken for the answer of `unit` to `request` may have been none, so that it is still owed.
-    pub fn still_owed(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>) {
-        self.doubts.left_open(now, unit, request.expected());
+    /// Says that what was taken for the answer of `unit` to `request` may have been none, so that it is still owed. It was
+    /// waited for for `timeout`.
+    pub fn still_owed(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>, timeout: Duration) {
+        self.doubts.left_open(now, unit, request.expected(), timeout);
     }
 
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or
@@ -303,18 +306,10 @@ impl Master {
         self.doubts.tells_apart(now, unit, request.expected())
     }
 
-    /// How sure the answer to `request` can be that `unit` is asked at `now`. Always certain unless answers
-    /// [may overtake](Self::answers_may_overtake) each other.
+    /// How sure the answer to `request` can be that `unit` is asked at `now`. Certain while nothing that it owes could
+    /// overtake.
     pub fn attribution(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Attribution {
         self.doubts.attribution(now, unit, request.expected())
-    }
-
-    /// Says whether the line leads over a gateway that may hand on answers in another order than they were asked for.
-    ///
-    /// Then an echo does not prove that everything asked before is answered, and [`attribution`](Self::attribution)
-    /// tells what has to be repeated.
-    pub const fn answers_may_overtake(&mut self, overtake: bool) {
-        self.doubts.may_overtake(overtake);
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.

@@ -47,6 +47,14 @@ impl<'a> Words<'a> {
         self.len() == 0
     }
 
+    /// The first `count` words; all, where there are fewer.
+    pub(crate) fn first(&self, count: usize) -> Self {
+        Self(match self.0 {
+            Source::Host(words) => Source::Host(words.get(..count).unwrap_or(words)),
+            Source::Wire(pairs) => Source::Wire(pairs.get(..count).unwrap_or(pairs)),
+        })
+    }
+
     /// The word at `index`.
     pub fn get(&self, index: usize) -> Option<u16> {
         match self.0 {

@@ -304,8 +304,7 @@ fn program<'a>(luck: &'a [u8], echoes: &[Echo], gateway: bool) -> Program<'a> {
         (unit, Unit { echo, written: BTreeMap::new(), busy_until: Instant::ZERO, taken: Vec::new() })
     });
     let line = Line { luck: Luck(luck.iter()), units: units.collect(), gateway, coming: VecDeque::new() };
-    let mut master = Master::new(&FORMAT);
-    master.answers_may_overtake(gateway);
+    let master = Master::new(&FORMAT);
     Program { master, line, now: Instant::ZERO, word: 0 }
 }
 

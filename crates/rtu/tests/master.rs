@@ -82,19 +82,78 @@ fn a_refusal_is_there_at_its_last_byte() {
     assert!(!master.in_quarantine(at(200_000), unit(1)));
 }
 
-/// Refusals of reads are all alike: a read that its length tells apart from what is open is answered by words only.
+/// Refusals of reads are all alike: the one that comes for a read that its length tells apart may be meant for what is open.
+/// It ends the read, which is owed then, and proves nothing.
 #[test]
-fn a_late_refusal_is_not_that_of_a_read_of_another_length() {
+fn a_refusal_proves_nothing_of_a_read_of_another_length() {
     let mut master = waiting(&Request::read(0x2100, 1).unwrap());
     assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
     let end = send(&mut master, 200_000, &Request::read(0x2200, 2).unwrap());
     let refusal = Adu::answer(unit(1), &Answer::exception(3, ExceptionCode::ILLEGAL_ADDRESS));
     master.receive(at(end + 2_000), refusal.as_bytes());
-    assert_eq!(master.poll(at(end + 2_000)), None);
-    assert_eq!(master.take_tally().late, 1);
-    master.receive(at(end + 9_000), &words(1, &[3, 4]));
-    assert!(matches!(master.poll(at(end + 9_000)), Some(Event::Answer(Answer::Read { .. }))));
-    assert!(!master.in_quarantine(at(end + 9_000), unit(1)));
+    let error = AnswerError::Refusal { code: ExceptionCode::ILLEGAL_ADDRESS };
+    assert!(matches!(master.poll(at(end + 2_000)), Some(Event::Wrong { error: came, .. }) if came == error));
+    assert!(master.in_quarantine(at(end + 9_000), unit(1)));
+    let next = Request::read(0x2300, 2).unwrap();
+    assert!(!master.tells_apart(at(end + 9_000), unit(1), &next), "its own answer may still come");
+}
+
+/// An answer that is open and comes is not owed any more: nothing has to be sent to end that doubt.
+#[test]
+fn an_open_answer_that_is_seen_is_owed_no_more() {
+    let read = Request::read(0x2100, 1).unwrap();
+    let mut master = waiting(&read);
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    assert_eq!(master.attribution(at(110_000), unit(1), &read), Attribution::Repeat { words: 2, refusal: 2 });
+    master.receive(at(150_000), &words(1, &[3]));
+    assert_eq!(master.poll(at(150_000)), None);
+    assert!(!master.in_quarantine(at(150_000), unit(1)));
+    assert_eq!(master.attribution(at(150_000), unit(1), &read), Attribution::Certain);
+}
+
+/// The line may bring a frame twice at once: of two open answers only one is seen by that.
+#[test]
+fn a_frame_that_comes_twice_is_one_answer() {
+    let read = Request::read(0x2100, 1).unwrap();
+    let mut master = waiting(&read);
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    master.begin_in_doubt(at(110_000), unit(1).into(), &read, TIMEOUT).unwrap();
+    assert!(matches!(master.poll(at(110_000)), Some(Event::Transmit(_))));
+    master.sent(at(111_000));
+    assert!(matches!(master.poll(at(220_000)), Some(Event::NoAnswer { .. })));
+    for at_ in [230_000, 230_100] {
+        master.receive(at(at_), &words(1, &[3]));
+        assert_eq!(master.poll(at(at_)), None);
+    }
+    assert!(master.in_quarantine(at(230_100), unit(1)));
+    assert_eq!(master.attribution(at(230_100), unit(1), &read), Attribution::Repeat { words: 2, refusal: 2 });
+}
+
+/// A write looks like its own confirmation: what an adapter has sent back is no answer that was seen.
+#[test]
+fn an_open_write_is_not_seen_by_what_may_be_its_own_echo() {
+    let write = Request::write(0x2000, 5);
+    let mut master = waiting(&write);
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    master.receive(at(150_000), Adu::request(unit(1).into(), &write).as_bytes());
+    assert_eq!(master.poll(at(150_000)), None);
+    assert!(master.in_quarantine(at(150_000), unit(1)));
+    assert_eq!(master.attribution(at(150_000), unit(1), &write), Attribution::Wait(at(110_000) + OVERTAKING));
+}
+
+/// A long time-out makes late answers later.
+#[test]
+fn an_answer_may_overtake_for_four_time_outs_at_least() {
+    let read = Request::read(0x2100, 1).unwrap();
+    let mut master = Master::new(&SerialFormat::DEFAULT);
+    let timeout = Duration::from_secs(2);
+    master.begin(at(10_000), unit(1).into(), &read, timeout).unwrap();
+    assert!(matches!(master.poll(at(20_000)), Some(Event::Transmit(_))));
+    master.sent(at(20_000));
+    let given_up = at(20_000) + timeout;
+    assert!(matches!(master.poll(given_up), Some(Event::NoAnswer { .. })));
+    assert!(master.attribution(given_up + Duration::from_millis(7_999), unit(1), &read).may_be_mistaken());
+    assert!(!master.attribution(given_up + Duration::from_secs(8), unit(1), &read).may_be_mistaken());
 }
 
 #[test]
@@ -217,7 +276,20 @@ fn a_stop_goes_out_whatever_else_is_in_doubt() {
     assert_eq!(master.poll(at(105_000)), None, "the late answer to the read");
     master.receive(at(110_000), Adu::request(unit(1).into(), &stop).as_bytes());
     assert!(matches!(master.poll(at(110_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
-    assert!(master.in_quarantine(at(200_000), unit(1)), "it may have been the answer to an earlier stop");
+    assert!(!master.in_quarantine(at(200_000), unit(1)), "nothing else was owed");
+}
+
+#[test]
+fn a_stop_that_an_earlier_one_may_have_confirmed_leaves_the_doubt() {
+    let stop = Request::write(0x2000, 5);
+    let mut master = waiting(&stop);
+    assert!(matches!(master.poll(at(102_500)), Some(Event::NoAnswer { .. })));
+    master.begin_in_doubt(at(102_500), unit(1).into(), &stop, TIMEOUT).unwrap();
+    assert!(matches!(master.poll(at(102_500)), Some(Event::Transmit(_))));
+    master.sent(at(103_250));
+    master.receive(at(110_000), Adu::request(unit(1).into(), &stop).as_bytes());
+    assert!(matches!(master.poll(at(110_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
+    assert!(master.in_quarantine(at(200_000), unit(1)), "it may have been the answer to the earlier stop");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use drivebus_line::{AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Failure, Line, Priority, UnitOptions};
-use drivebus_rtu::{Destination, FIRST_CONTACT, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{Destination, FIRST_CONTACT, OVERTAKING, Request, SerialFormat, UnitAddress};
 use drivebus_sim::{Options, Simulator};
 
 const FORMAT: SerialFormat = SerialFormat::DEFAULT;
@@ -43,8 +43,9 @@ fn waited(simulator: &Simulator, bus: &Bus, options: CallOptions) -> Duration {
     let sent = error.sent.unwrap() + FORMAT.chars(8);
     let waited = error.ended.saturating_duration_since(sent);
     assert!(matches!(error.failure, Failure::NoAnswer { timeout, .. } if timeout == waited), "{error}");
-    // Whatever it owes is settled before it is asked again.
+    // Whatever it owes is settled, and has come or never will, before it is asked again.
     read(bus, 1, CallOptions::default()).unwrap();
+    bus.sleep(OVERTAKING, &mut || false);
     waited
 }
 

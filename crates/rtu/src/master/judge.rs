@@ -1,6 +1,7 @@
 //! What arrives, judged: the answer, somebody else's, one that comes late, our own request sent back, or noise.
 
 use core::ops::Range;
+use core::time::Duration;
 
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError, Expected};
@@ -15,6 +16,7 @@ impl Master {
         now: Instant,
         unit: UnitAddress,
         expected: Expected,
+        timeout: Duration,
         until: Instant,
     ) -> Option<Event<'_>> {
         while let Some(step) = self.framer.step(now) {
@@ -22,7 +24,7 @@ impl Master {
                 Step::Skipped { range, expected: false, .. } => self.tally.add_noise(self.framer.held(range)),
                 Step::Skipped { range, error, expected: true } => {
                     self.state = State::Idle;
-                    self.doubts.left_open(now, unit, expected);
+                    self.doubts.left_open(now, unit, expected, timeout);
                     return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
@@ -36,12 +38,22 @@ impl Master {
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
+                            self.doubts.seen(now, &self.framer.frame(range.clone()));
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
-                        Err(_) if apart => self.tally.late += 1,
-                        // Refusals of reads look alike.
-                        Ok(Answer::Exception { .. }) if apart && expected.is_read() => self.tally.late += 1,
+                        Err(_) if apart => {
+                            self.doubts.seen(now, &self.framer.frame(range));
+                            self.tally.late += 1;
+                        }
+                        // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
+                        Ok(Answer::Exception { code, .. }) if apart && expected.is_read() => {
+                            self.state = State::Idle;
+                            self.doubts.hear(&self.framer.frame(range.clone()));
+                            self.doubts.left_open(now, unit, expected, timeout);
+                            let frame = self.framer.held(range);
+                            return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
+                        }
                         // So do those of writes, and what went out in doubt was not refused because another was.
                         Ok(Answer::Exception { .. })
                             if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
@@ -52,15 +64,16 @@ impl Master {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
                             let right = outcome.is_ok();
                             self.state = State::Idle;
+                            self.doubts.hear(&self.framer.frame(range.clone()));
                             // The answer proves that the request has left the wire, whatever was computed; but not one
                             // that may be late.
                             if apart || !doubted {
                                 self.busy = Some(now);
                             }
                             match (right, refused, expected.is_echo()) {
-                                (false, ..) => self.doubts.left_open(now, unit, expected),
+                                (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
                                 (true, true, true) => self.doubts.refused_echo(now, unit),
-                                (true, false, echo) if echo || apart => self.doubts.settle(unit, echo),
+                                (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
                                 (true, refused, _) => self.doubts.taken(now, unit, expected, refused),
                             }
                             return Some(self.tell(expected, range));
@@ -73,7 +86,7 @@ impl Master {
             return None;
         }
         self.state = State::Idle;
-        self.doubts.left_open(now, unit, expected);
+        self.doubts.left_open(now, unit, expected, timeout);
         Some(Event::NoAnswer { bytes: self.framer.pending() })
     }
 
@@ -109,7 +122,10 @@ impl Master {
                 Step::Frame(range) if broadcast && self.framer.held(range.clone()) == self.request.as_bytes() => {
                     self.tally.own_echo += 1;
                 }
-                Step::Frame(_) => self.tally.late += 1,
+                Step::Frame(range) => {
+                    self.doubts.seen(now, &self.framer.frame(range));
+                    self.tally.late += 1;
+                }
                 Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
             }
         }

@@ -67,8 +67,6 @@ pub(crate) struct Wire {
     /// Fails once after the next request, as an adapter does that is pulled out and put in again.
     pub(crate) vanish_after_sending: bool,
     pub(crate) opened: u32,
-    /// Whether it leads over a gateway that hands on answers as they come.
-    pub(crate) gateway: bool,
 }
 
 impl std::fmt::Debug for Wire {
@@ -153,10 +151,6 @@ impl Line for Scripted {
     fn may_echo(&self) -> bool {
         true
     }
-
-    fn may_overtake(&self) -> bool {
-        self.0.lock().unwrap().gateway
-    }
 }
 
 /// A bus on a scripted line.
@@ -174,26 +168,18 @@ impl Rig {
         Self::echoing(|_, _| Vec::new(), script)
     }
 
-    /// As [`new`](Self::new), behind a gateway.
-    pub(crate) fn gateway(script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static) -> Self {
-        let rig = Self::fresh(true, |_, _| Vec::new(), script);
-        rig.pass(FIRST_CONTACT);
-        rig
-    }
-
     /// As [`new`](Self::new), with an adapter that sends back what `echo` says.
     pub(crate) fn echoing(
         echo: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
         script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
     ) -> Self {
-        let rig = Self::fresh(false, echo, script);
+        let rig = Self::fresh(echo, script);
         rig.pass(FIRST_CONTACT);
         rig
     }
 
     /// On a line that was just opened, so that nobody knows what another program has asked.
     pub(crate) fn fresh(
-        gateway: bool,
         echo: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
         script: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
     ) -> Self {
@@ -206,7 +192,6 @@ impl Rig {
             echo: Box::new(echo),
             vanish_after_sending: false,
             opened: 0,
-            gateway,
         }));
         let line = Scripted(Arc::clone(&wire));
         let opening = Arc::default();
