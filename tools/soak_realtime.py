@@ -160,7 +160,7 @@ def main() -> int:
 def soak(run: Soak, seconds: float, rate: float) -> int:
     """Works and watches for *seconds*; the verdict as an exit code."""
     line = run.simulator.line
-    line.set_times(late=0.15)
+    line.set_times(late=0.15, overtaken=(0.11, 0.4))
     line.set_faults(all=rate)
     threads = [threading.Thread(target=run.work, args=(number,), daemon=True) for number in range(6)]
     threads.append(threading.Thread(target=run.unplug, daemon=True))

@@ -612,11 +612,19 @@ class SimulatedLine:
         """Says which answer, counted from now (the next one is 1), is hit by what kind. Rates go on beside it."""
     def fault_counts(self) -> dict[str, int]:
         """How often each kind has happened."""
-    def set_times(self, *, delay: float | None = None, late: float | None = None, replug: float | None = None) -> None:
+    def set_times(
+        self,
+        *,
+        delay: float | None = None,
+        late: float | None = None,
+        overtaken: tuple[float, float] | None = None,
+        replug: float | None = None,
+    ) -> None:
         """Sets how long faults take, in seconds.
 
-        *delay* at most (0.05), *late* at least and twice that at most (0.6), *replug* until an adapter that fell out by
-        rate is back (0.5).
+        *delay* at most (0.05), *late* at least and twice that at most (0.6), *overtaken* at least and at most (0.6 and
+        2.4), *replug* until an adapter that fell out by rate is back (0.5). NotAllowed where the least is more than
+        the most.
         """
     echo: bool
     """Whether the adapter hands back what it sends."""

@@ -33,6 +33,7 @@ ALL, UNPLUG = "all", "unplug"
 # Chance pulls out only what is in this process: here the port is unplugged by hand, before every 50th read.
 KINDS = (*(kind for kind in FAULT_KINDS if kind != UNPLUG), UNPLUG, ALL)
 LATE = 0.25  # seconds at least, twice that at most: the time-out is 0.2
+OVERTAKEN = (0.22, 0.8)  # seconds at least and at most
 AWAY = 0.25  # seconds without the port
 PARAMETERS = range(0x2000)  # below commands and states: they stay as they are
 
@@ -93,7 +94,7 @@ def spoilt(library: str, kind: str, reads: int | None = None) -> Tally:
         if kind == UNPLUG:
             _reads(child, pairs, reads, tally, lambda number: _unplug(simulator, number, tally))
         else:
-            simulator.line.set_times(late=LATE)
+            simulator.line.set_times(late=LATE, overtaken=OVERTAKEN)
             simulator.line.set_faults(**{kind: RATE})
             _reads(child, pairs, reads, tally)
             tally.hits = sum(simulator.line.fault_counts().values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -34,6 +35,27 @@ def test_a_script_hits_the_answers_it_names(simulator: Simulator, bus: Bus) -> N
     assert hit == {"noise_before": 1, "foreign": 1, "delay": 1, "noise_after": 1}
 
 
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_later_answers_pass_one_that_is_overtaken(transport: str) -> None:
+    clock = "virtual" if transport == "process" else "real"
+    with Simulator({1: "gd350"}, transport=transport, clock=clock) as simulator:
+        line = simulator.line
+        with Bus(simulator, timeout=0.5, retries=0) as bus:
+            assert bus.read(1, IDENTIFICATION) == [GD350]
+            line.set_times(overtaken=(0.9, 0.9))
+            line.script([(1, "overtaken")])
+            with pytest.raises(NoAnswer):
+                bus.read(1, 0x0E00, 2)
+            for _ in range(10_000):
+                with contextlib.suppress(DrivebusError):  # it may be spoken over
+                    bus.read(1, IDENTIFICATION)
+                sent = [(who, frame[:3].hex()) for _, who, frame in line.trace()]
+                if ("unit", "010304") in sent:
+                    break
+        assert ("unit", "010302") in sent[sent.index(("master", "01030e")) : sent.index(("unit", "010304"))], sent
+        assert line.fault_counts()["overtaken"] == 1
+
+
 def test_what_is_lost_is_no_answer(simulator: Simulator, bus: Bus) -> None:
     bus.read(1, IDENTIFICATION)
     simulator.line.set_faults(silence=1.0)
@@ -56,7 +78,7 @@ def test_whatever_happens_no_value_is_wrong(seed: int) -> None:
         Simulator({1: "gd350", 2: "gd350"}, transport="process", clock="virtual", seed=seed, faults=rates) as simulator,
         Bus(simulator, timeout=0.05) as bus,
     ):
-        simulator.line.set_times(late=0.06, replug=0.1)
+        simulator.line.set_times(late=0.06, overtaken=(0.055, 0.2), replug=0.1)
         right = 0
         for number in range(1000):
             unit = 1 + number % 2
@@ -180,6 +202,8 @@ def test_other_nonsense_is_refused(virtual: Simulator) -> None:
         lambda: virtual.line.script([(1, "latest")]),
         lambda: virtual.line.script(7),  # type: ignore[arg-type]
         lambda: virtual.line.set_times(late=-1.0),
+        lambda: virtual.line.set_times(overtaken=(-1.0, 1.0)),
+        lambda: virtual.line.set_times(overtaken=(0.2, 0.1)),
         lambda: Simulator({1: "gd350"}, transport="tcp", link="there"),
         lambda: Bus("sim://gd350?clock=virtual&late=often"),
         lambda: Bus("sim://gd350?clock=virtual&latest=1"),

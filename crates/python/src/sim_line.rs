@@ -103,14 +103,27 @@ impl SimulatedLine {
         Ok(counts)
     }
 
-    #[pyo3(signature = (*, delay = None, late = None, replug = None))]
-    fn set_times(&self, delay: Option<f64>, late: Option<f64>, replug: Option<f64>) -> PyResult<()> {
+    #[pyo3(signature = (*, delay = None, late = None, overtaken = None, replug = None))]
+    fn set_times(
+        &self,
+        delay: Option<f64>,
+        late: Option<f64>,
+        overtaken: Option<(f64, f64)>,
+        replug: Option<f64>,
+    ) -> PyResult<()> {
         let [delay, late, replug] = [delay, late, replug].map(|given| given.map(duration).transpose());
         if let Some(delay) = delay? {
             self.0.set_delay(delay);
         }
         if let Some(late) = late? {
             self.0.set_late(late);
+        }
+        if let Some((least, most)) = overtaken {
+            let (least, most) = (duration(least)?, duration(most)?);
+            if least > most {
+                return Err(not_allowed(format!("overtaken {least:?} to {most:?}: give the least first")));
+            }
+            self.0.set_overtaken(least, most);
         }
         if let Some(replug) = replug? {
             self.0.set_replug(replug);

@@ -66,6 +66,7 @@
 //! - Assumption: where both sides speak at once, each hears the other's characters spoilt by chance (from the seed), and
 //!   nobody hears the third side's.
 //! - Assumption: two units never speak at once; the later one waits.
+//! - Assumption: a unit answers in the order it was asked, unless [`FaultKind::Overtaken`] says otherwise.
 //! - Assumption: whoever speaks in pieces ([`FaultKind::Split`]) holds the line in the pauses too.
 //! - Bits, parity and noise levels are not simulated: a character arrives, or it arrives spoilt.
 //! - What a drive does that its manual does not say is marked "Assumption:" in the source, beside the code that does it.

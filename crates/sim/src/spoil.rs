@@ -88,7 +88,7 @@ impl Spoil {
         }
         bytes.extend(Counted::take(&mut self.after).unwrap_or_default());
         let delay = Counted::take(&mut self.delay).unwrap_or_default();
-        Some(Outgoing { bytes, delay, pauses: Vec::new() })
+        Some(Outgoing { bytes, delay, ..Outgoing::default() })
     }
 }
 
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn sent(bytes: &[u8], millis: u64) -> Outgoing {
-        Outgoing { bytes: bytes.to_vec(), delay: Duration::from_millis(millis), pauses: Vec::new() }
+        Outgoing { bytes: bytes.to_vec(), delay: Duration::from_millis(millis), ..Outgoing::default() }
     }
 
     #[test]

@@ -49,6 +49,7 @@ struct Waiting {
     begin: Instant,
     bytes: Vec<u8>,
     pauses: VecDeque<(usize, Duration)>,
+    may_be_passed: bool,
 }
 
 /// An answer that is on the wire.
@@ -197,7 +198,8 @@ impl Wire {
 
     /// `unit` answers, from `begin` on, after whatever the wire was told to do to answers, and whatever `hits` it.
     ///
-    /// Assumption: a unit answers in the order it was asked, so an answer that is held back holds back those after it.
+    /// Assumption: a unit answers in the order it was asked, so an answer that is held back holds back those after it. Only
+    /// one that may be passed does not.
     pub(crate) fn answer(&mut self, unit: u8, begin: Instant, answer: &[u8], hits: Hits) {
         let outgoing = if self.spoil.is_idle() {
             let mut bytes = std::mem::take(&mut self.spare_answer);
@@ -208,14 +210,15 @@ impl Wire {
             self.spoil.apply(answer)
         };
         let outgoing = outgoing.and_then(|outgoing| self.faults.apply(hits, outgoing));
-        let Some(Outgoing { bytes, pauses, delay }) = outgoing else { return };
+        let Some(Outgoing { bytes, pauses, delay, may_be_passed }) = outgoing else { return };
         if bytes.is_empty() {
             return;
         }
-        let earlier = self.waiting.iter().rfind(|waiting| waiting.unit == unit).map(|waiting| waiting.begin);
+        let holds_back = |waiting: &&Waiting| waiting.unit == unit && !waiting.may_be_passed;
+        let earlier = self.waiting.iter().rfind(holds_back).map(|waiting| waiting.begin);
         let begin = earlier.map_or(begin + delay, |earlier| earlier.max(begin + delay));
         let place = self.waiting.partition_point(|waiting| waiting.begin <= begin);
-        self.waiting.insert(place, Waiting { unit, begin, bytes, pauses: pauses.into() });
+        self.waiting.insert(place, Waiting { unit, begin, bytes, pauses: pauses.into(), may_be_passed });
     }
 
     /// What happens next, not later than `to`. `None`: nothing does.

@@ -109,6 +109,11 @@ impl SimulatedLine {
         self.shared.present().wire.faults.times.late = shortest;
     }
 
+    /// How much later [`FaultKind::Overtaken`] lets an answer come, at least and at most; 0.6 s to 2.4 s if it is not said.
+    pub fn set_overtaken(&self, least: Duration, most: Duration) {
+        self.shared.present().wire.faults.times.overtaken = (least, most);
+    }
+
     /// How long [`FaultKind::Unplug`] keeps the adapter out; 0.5 s if it is not said.
     pub fn set_replug(&self, time: Duration) {
         self.shared.present().wire.faults.times.replug = time;

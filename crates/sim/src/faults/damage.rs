@@ -29,6 +29,8 @@ pub(crate) struct Outgoing {
     pub(crate) pauses: Vec<(usize, Duration)>,
     /// How much later than the unit would it begins.
     pub(crate) delay: Duration,
+    /// Whether later answers of the same unit may come before it.
+    pub(crate) may_be_passed: bool,
 }
 
 impl Faults {
@@ -59,6 +61,12 @@ impl Faults {
         if hits.has(FaultKind::Late) {
             damaged.delay += self.times.late + self.random.up_to(self.times.late);
             self.happened(FaultKind::Late);
+        }
+        if hits.has(FaultKind::Overtaken) {
+            let (least, most) = self.times.overtaken;
+            damaged.delay += least + self.random.up_to(most.saturating_sub(least));
+            damaged.may_be_passed = true;
+            self.happened(FaultKind::Overtaken);
         }
         Some(damaged)
     }

@@ -33,6 +33,9 @@ pub enum FaultKind {
     /// The answer comes 0.6 s to 1.2 s later, or what was set: after the time-out, perhaps during a later request. The
     /// unit answers in the order it was asked, so it holds back those after it.
     Late,
+    /// The answer is held back for 0.6 s to 2.4 s, or what was set, and later answers of the same unit pass it, as behind a
+    /// gateway that serves several requests at a time. It comes after those that were due before it all the same.
+    Overtaken,
     /// The unit has done what it was asked, and its answer is lost.
     Silence,
     /// The request is lost or spoilt on the way: the unit does nothing and says nothing.
@@ -59,7 +62,7 @@ pub enum FaultKind {
 
 impl FaultKind {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::FlipBit,
         Self::LoseByte,
         Self::DoubleByte,
@@ -68,6 +71,7 @@ impl FaultKind {
         Self::NoiseInside,
         Self::Delay,
         Self::Late,
+        Self::Overtaken,
         Self::Silence,
         Self::Deaf,
         Self::Split,
@@ -90,6 +94,7 @@ impl FaultKind {
             Self::NoiseInside => "noise_inside",
             Self::Delay => "delay",
             Self::Late => "late",
+            Self::Overtaken => "overtaken",
             Self::Silence => "silence",
             Self::Deaf => "deaf",
             Self::Split => "split",

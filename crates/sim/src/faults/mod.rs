@@ -43,13 +43,20 @@ pub(crate) struct Times {
     pub(crate) delay: Duration,
     /// Of [`FaultKind::Late`], at least; at most twice as long.
     pub(crate) late: Duration,
+    /// Of [`FaultKind::Overtaken`], at least and at most.
+    pub(crate) overtaken: (Duration, Duration),
     /// From [`FaultKind::Unplug`] until the port is there again.
     pub(crate) replug: Duration,
 }
 
 impl Default for Times {
     fn default() -> Self {
-        Self { delay: Duration::from_millis(50), late: Duration::from_millis(600), replug: Duration::from_millis(500) }
+        Self {
+            delay: Duration::from_millis(50),
+            late: Duration::from_millis(600),
+            overtaken: (Duration::from_millis(600), Duration::from_millis(2_400)),
+            replug: Duration::from_millis(500),
+        }
     }
 }
 

@@ -112,7 +112,9 @@ fn a_lost_answer_was_earned_and_a_lost_request_was_not_heard() {
 
 #[test]
 fn delays_are_as_long_as_they_were_set() {
-    for (kind, shortest, longest) in [(FaultKind::Delay, 0, 50), (FaultKind::Late, 600, 1_200)] {
+    for (kind, shortest, longest) in
+        [(FaultKind::Delay, 0, 50), (FaultKind::Late, 600, 1_200), (FaultKind::Overtaken, 600, 2_400)]
+    {
         let mut bench = hit_by(kind);
         for came in arrivals(&mut bench, &request()) {
             assert_eq!(came.iter().map(|&(_, byte)| byte).collect::<Vec<_>>(), answer());
@@ -141,6 +143,45 @@ fn a_late_answer_comes_in_order_before_that_to_the_next_request() {
     wire.clear();
     wire.set_late(Duration::from_millis(20));
     wire.script(&[(1, FaultKind::Late)]);
+    let sent = bench.line.send(&request()).unwrap();
+    bench.line.sleep(sent + Duration::from_millis(10));
+    bench.line.send(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    let came: Vec<u8> = bench.listen(sent + LONG).into_iter().map(|(_, byte)| byte).collect();
+    assert_eq!(came, [answer(), hex("01 03 02 01 A0 B9 AC")].concat());
+}
+
+/// Drive 1, of which the first answer is hit by `kind` and comes 40 ms later, is asked for `WORDS`, then for its code.
+fn two_questions(kind: FaultKind) -> Vec<u8> {
+    let mut bench = hit_by(kind);
+    let wire = bench.simulator.wire();
+    wire.clear();
+    let later = Duration::from_millis(40);
+    wire.set_late(later);
+    wire.set_overtaken(later, later);
+    wire.script(&[(1, kind)]);
+    let sent = bench.line.send(&request()).unwrap();
+    bench.line.sleep(sent + Duration::from_millis(10));
+    bench.line.send(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    let came = bench.listen(sent + LONG);
+    assert_eq!(wire.counts(kind), 1);
+    came.into_iter().map(|(_, byte)| byte).collect()
+}
+
+#[test]
+fn later_answers_pass_one_that_is_overtaken_and_wait_behind_one_that_is_late() {
+    let code = hex("01 03 02 01 A0 B9 AC");
+    assert_eq!(two_questions(FaultKind::Overtaken), [code.clone(), answer()].concat());
+    assert_eq!(two_questions(FaultKind::Late), [answer(), code].concat());
+}
+
+#[test]
+fn an_answer_that_may_be_passed_waits_behind_one_that_is_late() {
+    let mut bench = hit_by(FaultKind::Late);
+    let wire = bench.simulator.wire();
+    wire.clear();
+    wire.set_late(Duration::from_millis(200));
+    wire.set_overtaken(Duration::from_millis(20), Duration::from_millis(30));
+    wire.script(&[(1, FaultKind::Late), (2, FaultKind::Overtaken)]);
     let sent = bench.line.send(&request()).unwrap();
     bench.line.sleep(sent + Duration::from_millis(10));
     bench.line.send(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
@@ -238,6 +279,7 @@ fn no_mixture_of_faults_ever_looks_like_the_answer() {
     bench.write_many(0x000B, &WORDS);
     let wire = bench.simulator.wire();
     wire.set_late(Duration::from_millis(1));
+    wire.set_overtaken(Duration::from_millis(1), Duration::from_millis(4));
     for kind in FaultKind::ALL.into_iter().filter(|&kind| kind != FaultKind::Unplug) {
         wire.set_rate(kind, 0.2).unwrap();
     }
@@ -342,7 +384,7 @@ fn the_same_seed_gives_the_same_faults() {
     let run = |seed| {
         let mut bench = Bench::with(Options::default().seed(seed));
         let wire = bench.simulator.wire();
-        FaultKind::ALL[..16].iter().for_each(|&kind| wire.set_rate(kind, 0.1).unwrap());
+        FaultKind::ALL[..17].iter().for_each(|&kind| wire.set_rate(kind, 0.1).unwrap());
         arrivals(&mut bench, &request())
     };
     assert_eq!(run(1), run(1));
