@@ -2,6 +2,7 @@
 //!
 //! Every word that is read has a value that is known, and every write has a value of its own. So a reply that was taken
 //! for the answer to something else shows as a wrong value, and the drives' own logs show what was done, and how often.
+//! Some words are changed before each read, so that an answer to an earlier read of the same words shows too.
 //!
 //! [`run`] does it; `main` prints what came of it. Chance comes from the seed. With more than one thread the order in which
 //! they come to the line is the system's; with one, the same plan gives the same run but for the words of probes.
@@ -13,6 +14,7 @@ mod poller;
 mod rig;
 mod roles;
 mod verdict;
+mod watcher;
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -23,6 +25,7 @@ pub use verdict::{Verdict, Wrong};
 use chance::Chance;
 use poller::Poller;
 use roles::{Commander, Reader, Role, Writer};
+use watcher::Watcher;
 
 /// What to run.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +42,7 @@ pub struct Plan {
     pub unplug_rate: f64,
     /// How long between two times that the adapter is pulled out by hand, on average.
     pub pull_every: Duration,
-    /// How many threads use the bus, 1..=7.
+    /// How many threads use the bus, 1..=8.
     pub threads: usize,
 }
 
@@ -53,7 +56,7 @@ impl Default for Plan {
             rate: 0.003,
             unplug_rate: 0.000_05,
             pull_every: Duration::from_secs(60),
-            threads: 7,
+            threads: 8,
         }
     }
 }
@@ -86,7 +89,8 @@ pub fn run(plan: &Plan) -> Result<Verdict, String> {
     Ok(verdict)
 }
 
-/// Three readers, two writers for half of the units each, one who commands all motors, and one who polls.
+/// Three readers, two writers for half of the units each, one who commands all motors, one who polls, and one
+/// who reads what moves.
 fn roles(seed: u64) -> Vec<Box<dyn Role>> {
     let chance = |number: u64| Chance::new(seed.wrapping_mul(16).wrapping_add(number));
     vec![
@@ -97,6 +101,7 @@ fn roles(seed: u64) -> Vec<Box<dyn Role>> {
         Box::new(Writer::new(chance(5), &UNITS[UNITS.len() / 2..])),
         Box::new(Reader::new(chance(6))),
         Box::new(Poller::new(chance(7))),
+        Box::new(Watcher::new(chance(8))),
     ]
 }
 

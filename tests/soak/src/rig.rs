@@ -22,6 +22,8 @@ const TIMEOUT: Duration = Duration::from_millis(30);
 const DELAY: Duration = Duration::from_millis(10);
 /// Of late answers, at least: beyond the time-out.
 const LATE: Duration = Duration::from_millis(35);
+/// Of answers that others pass, at least and at most: 1.1 to 4 time-outs.
+const OVERTAKEN: (Duration, Duration) = (Duration::from_millis(33), Duration::from_millis(120));
 const OUT: Duration = Duration::from_millis(100);
 /// Calls until everybody asks another unit.
 const FOCUS: u64 = 50;
@@ -109,6 +111,7 @@ impl Rig {
         }
         self.wire.set_delay(DELAY);
         self.wire.set_late(LATE);
+        self.wire.set_overtaken(OVERTAKEN.0, OVERTAKEN.1);
         self.wire.set_replug(OUT);
         Ok(())
     }
@@ -136,6 +139,15 @@ impl Rig {
         // All units of the rig are 1..=8.
         let unit = UnitAddress::new(unit).unwrap_or(UnitAddress::MIN);
         self.bus.call(unit.into(), request, options, &mut || false, take)
+    }
+
+    /// Sets `words` from `first` on at the keypad of `unit`.
+    pub(crate) fn set(&self, unit: u8, first: u16, words: &[u16]) {
+        let Ok(drive) = self.simulator.drive(unit) else { return };
+        for (address, &word) in (first..).zip(words) {
+            // No parameter that a role sets has a range.
+            let _ = drive.set_parameter(address, word);
+        }
     }
 
     /// So many calls were made by the bus itself.

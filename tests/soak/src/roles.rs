@@ -22,7 +22,7 @@ const STOP: u16 = 5;
 const COMMANDS: [u16; 3] = [1, 2, 6];
 /// 630.00 Hz and a little less.
 const SETPOINTS: u16 = 63_000;
-/// How long an answer that is late may be owed: more than ten times as long as the line holds one back.
+/// How long an answer that is late may be owed: eight times as long as the line holds one back.
 const OWED: Duration = Duration::from_secs(1);
 /// Writes that may still turn up in a log.
 const REMEMBERED: usize = 8;
@@ -62,13 +62,13 @@ impl Role for Reader {
 }
 
 /// Most of the time the unit that everybody asks, if it is one of `units`.
-fn some_unit(rig: &Rig, chance: &mut Chance, units: &[u8]) -> Option<u8> {
+pub(crate) fn some_unit(rig: &Rig, chance: &mut Chance, units: &[u8]) -> Option<u8> {
     let focus = rig.focus();
     if chance.below(4) > 0 && units.contains(&focus) { Some(focus) } else { chance.one_of(units) }
 }
 
 /// Reads as many words as are `expected`, or says what came instead.
-fn read(rig: &Rig, unit: u8, address: u16, expected: &[u16], retries: Option<u32>, verdict: &mut Verdict) {
+pub(crate) fn read(rig: &Rig, unit: u8, address: u16, expected: &[u16], retries: Option<u32>, verdict: &mut Verdict) {
     if let Some(came) = words(rig, unit, address, expected.len(), retries, verdict) {
         judge(rig, unit, address, &[expected], &came, verdict);
     }

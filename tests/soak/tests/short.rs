@@ -25,6 +25,6 @@ fn everything_is_true_with_one_thread() {
 
 #[test]
 fn everything_is_true_with_a_thread_for_each() {
-    let verdict = run(&plan(2, 7)).unwrap();
+    let verdict = run(&plan(2, 8)).unwrap();
     assert!(verdict.is_good(), "{verdict}");
 }
