@@ -149,14 +149,14 @@ $(BENCH_PEERS)/.installed: pyproject.toml dist/.wheel
 	$(BENCH_PEERS)/bin/python -m pip install --quiet --group bench dist/drivebus-*.whl
 	@touch $@
 
-# Some sections only, printed and not written: make bench ONLY="cycle unpaced"
+# Some sections or rows only, printed and not written: make bench ONLY="cycle unpaced", make conformance ONLY=overtaken
 ONLY ?=
 
 bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 	$(BENCH_PEERS)/bin/python tools/bench_report.py $(ONLY)
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
-	$(PEERS)/bin/python -m tests.conformance.run --out docs/conformance.md
+	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)
 
 # libFuzzer needs no nightly compiler: without a sanitizer its counters are plain code generation options. The memory
 # limit is the oracle of "bounded". What is found is kept out of the work tree until `make fuzz-corpus` chooses from it.

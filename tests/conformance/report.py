@@ -172,8 +172,8 @@ SINGLE = """\
 
 The unit is a small slave in plain Python (`tests/conformance`) that shares no code with any of the libraries. Its
 register *a* holds *a*, and it keeps a log of every write. Each library runs in a process of its own. A late reply is
-one that the slave holds back until the next request is in. Before each row one register is read, except at first
-contact.
+one that the slave holds back until the next request is in, or, where others pass it, until register 200 is read. Before
+each row one register is read, except at first contact.
 
 - **right**: the values asked for came back; a write was carried out once, and the call said so.
 - **wrong**: the call returned something else without an error: values of another question, fewer values than asked

@@ -64,6 +64,13 @@ def late_then_read(first: int, second: int) -> Play:
     return play
 
 
+def overtaken_then_read(_: Slave, child: Child) -> Verdict:
+    """A read of 100 whose reply is late, a read of two that is answered, then a read of 200: judged is that."""
+    child.read(100)
+    child.read(300, 2)
+    return of_read(child.read(200), 200, 1)
+
+
 def queued_then_read(slave: Slave, child: Child) -> Verdict:
     child.read(100)
     slave.release()
@@ -140,6 +147,13 @@ def late(request: wire.Request, before: int, reply: bytes) -> Reaction | None:
     return None
 
 
+def overtaken(request: wire.Request, before: int, reply: bytes) -> Reaction | None:
+    """The first reply about 100 is passed by others and goes out when 200 is read."""
+    if before == 0 and request.is_read(100):
+        return Reaction([(0.0, reply)], held=True, until=200)
+    return None
+
+
 def late_and_lost(request: wire.Request, before: int, reply: bytes) -> Reaction | None:
     """The same, and the write of 200 never reaches the unit."""
     return Reaction(lost=True) if request.is_write(200) else late(request, before, reply)
@@ -206,6 +220,10 @@ ROWS: Sequence[Row] = (
     ),
     Row("late, queued", "read 100 times out; its reply waits in the port before read 200", queued_then_read, late),
     Row(
+        *("overtaken", "read 100 times out; other requests are answered, then its reply comes during read 200"),
+        *(overtaken_then_read, overtaken),
+    ),
+    Row(
         *("first contact", "port just opened; the reply to another program's read of 100 comes during read 200"),
         stale_at_first_contact,
         fresh=True,
@@ -240,6 +258,13 @@ ROWS: Sequence[Row] = (
         "default retries: a read whose first reply comes during the next request",
         read(100),
         late,
+        retries=None,
+    ),
+    Row(
+        "overtaken, default retries",
+        "default retries: read 100 is repeated and answered; the reply to its first request comes during read 200",
+        overtaken_then_read,
+        overtaken,
         retries=None,
     ),
     Row(

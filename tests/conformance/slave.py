@@ -3,7 +3,7 @@
 It answers 03H, 06H, 08H and 10H, in the order it was asked and each at most once, as a unit with one buffer does.
 What it does to a certain request is the row's business: a `Behaviour` may lose the request, change its reply, cut it
 up, put it off, or hold it back until the next request has come in, so that a late reply is late however fast or slow
-the master is.
+the master is. A reply that is held back until a certain register is read lets those to other requests pass.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class Reaction:
     pieces: Sequence[tuple[float, bytes]] = ()
     lost: bool = False  # the request never reached the unit; it changes nothing there
     held: bool = False  # the reply waits until the next request came, or until `release`
+    until: int | None = None  # it waits for a read of this register instead, and is passed by other replies
 
 
 # Given the request, how often the very same one came before, and its ordinary reply. None: nothing unusual.
@@ -72,7 +73,7 @@ class Slave:
         self.echo = echo  # the adapter hands back what it sends
         self._registers: dict[int, int] = {}
         self._seen: Counter[wire.Request] = Counter()
-        self._held: list[bytes] = []
+        self._held: list[tuple[int | None, bytes]] = []  # for a read of which register, or for any request
         self._outbox: deque[tuple[float, bytes]] = deque()
         self._free = 0.0  # when the line is free for the next reply
         self._lock = threading.Lock()
@@ -121,14 +122,14 @@ class Slave:
     def hold_stale(self, address: int) -> None:
         """Owes the reply to a read of *address* that came earlier: it goes out when the next request is in."""
         with self._lock:
-            self._held.append(wire.read_reply(UNIT, [address]))
+            self._held.append((None, wire.read_reply(UNIT, [address])))
 
     def release(self) -> None:
         """Sends what was held back, and returns when the port has it (or a reader was quicker)."""
         with self._lock:
-            size = sum(map(len, self._held))
+            size = sum(len(reply) for _, reply in self._held)
             ends = self._ends
-            self._send_held()
+            self._send_held(lambda _: True)
         deadline = time.monotonic() + 0.05
         while ends and _queued(ends[1]) < size and time.monotonic() < deadline:
             time.sleep(0.001)
@@ -140,11 +141,12 @@ class Slave:
         with self._lock:
             return
 
-    def _send_held(self) -> None:
-        for reply in self._held:
-            self._free = max(time.monotonic(), self._free) + GAP
-            self._write(reply)
-        self._held.clear()
+    def _send_held(self, is_free: Callable[[int | None], bool]) -> None:
+        for until, reply in self._held:
+            if is_free(until):
+                self._free = max(time.monotonic(), self._free) + GAP
+                self._write(reply)
+        self._held = [(until, reply) for until, reply in self._held if not is_free(until)]
 
     def _write(self, data: bytes) -> None:
         if self._ends:
@@ -185,7 +187,7 @@ class Slave:
     def _take(self, request: wire.Request) -> None:
         before = self._seen[request]
         self._seen[request] += 1
-        self._send_held()
+        self._send_held(lambda until: until is None or request.is_read(until))
         if request.unit not in (0, UNIT):
             return
         reply = self._reply(request)
@@ -201,7 +203,7 @@ class Slave:
         if reaction is None:
             reaction = Reaction([(0.0, b"" if self.mute and request.function == wire.LOOP_BACK else reply)])
         if reaction.held:
-            self._held += [data for _, data in reaction.pieces]
+            self._held += [(reaction.until, data) for _, data in reaction.pieces]
             return
         due = max(time.monotonic(), self._free)
         for delay, data in reaction.pieces:
