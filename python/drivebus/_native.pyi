@@ -608,8 +608,11 @@ class SimulatedLine:
     @property
     def faults(self) -> dict[str, float]:
         """The kinds that have a rate, and the rate."""
-    def script(self, faults: Iterable[tuple[int, str]], /) -> None:
-        """Says which answer, counted from now (the next one is 1), is hit by what kind. Rates go on beside it."""
+    def script(self, faults: Iterable[tuple[int, str | bytes]], /) -> None:
+        """Says which answer, counted from now (the next one is 1), is hit by what kind, or which bytes come instead of it.
+
+        Rates go on beside it. NotAllowed: something else stands in the list; nothing was changed.
+        """
     def fault_counts(self) -> dict[str, int]:
         """How often each kind has happened."""
     def set_times(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from drivebus import Bus, DrivebusError, NoAnswer, NotAllowed, PortError, Simulator
+from drivebus import Bus, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Simulator
 from drivebus.sim import FAULT_KINDS
 
 from .conftest import TRANSPORTS
@@ -33,6 +33,16 @@ def test_a_script_hits_the_answers_it_names(simulator: Simulator, bus: Bus) -> N
     assert list(counts) == list(FAULT_KINDS)
     hit = {kind: count for kind, count in counts.items() if count}
     assert hit == {"noise_before": 1, "foreign": 1, "delay": 1, "noise_after": 1}
+
+
+def test_a_script_says_the_bytes_too(virtual: Simulator) -> None:
+    with Bus(virtual, timeout=0.1, retries=0) as bus:
+        bus.read(1, IDENTIFICATION)
+        virtual.line.script([(2, bytes.fromhex("01 83 06 C1 32")), (1, "split")])
+        assert bus.read(1, IDENTIFICATION) == [GD350]
+        with pytest.raises(Refused, match="06H"):
+            bus.read(1, IDENTIFICATION)
+        assert bus.read(1, IDENTIFICATION) == [GD350]
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
@@ -200,6 +210,7 @@ def test_other_nonsense_is_refused(virtual: Simulator) -> None:
         lambda: virtual.line.set_faults(late=2.0),
         lambda: virtual.line.script([(0, "late")]),
         lambda: virtual.line.script([(1, "latest")]),
+        lambda: virtual.line.script([(1, 2)]),  # type: ignore[list-item]
         lambda: virtual.line.script(7),  # type: ignore[arg-type]
         lambda: virtual.line.set_times(late=-1.0),
         lambda: virtual.line.set_times(overtaken=(-1.0, 1.0)),

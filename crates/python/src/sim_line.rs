@@ -86,12 +86,21 @@ impl SimulatedLine {
 
     #[pyo3(signature = (faults, /))]
     fn script(&self, faults: &Bound<'_, PyAny>) -> PyResult<()> {
-        let mistake = || not_allowed(format!("script {} is no list of (answer number from 1, kind)", shown(faults)));
-        let listed = faults.try_iter().map_err(|_| mistake())?.map(|item| {
-            let (answer, kind): (u64, String) = item?.extract().map_err(|_| mistake())?;
-            if answer == 0 { Err(mistake()) } else { Ok((answer, kind_of(&kind)?)) }
-        });
-        self.0.script(&listed.collect::<PyResult<Vec<_>>>()?);
+        let mistake =
+            || not_allowed(format!("script {} is no list of (answer number from 1, kind or bytes)", shown(faults)));
+        let (mut kinds, mut instead) = (Vec::new(), Vec::new());
+        for item in faults.try_iter().map_err(|_| mistake())? {
+            let (answer, what): (u64, Bound<'_, PyAny>) = item?.extract().map_err(|_| mistake())?;
+            if answer == 0 {
+                return Err(mistake());
+            }
+            match what.extract::<String>() {
+                Ok(kind) => kinds.push((answer, kind_of(&kind)?)),
+                Err(_) => instead.push((answer, what.extract::<Vec<u8>>().map_err(|_| mistake())?)),
+            }
+        }
+        let instead: Vec<(u64, &[u8])> = instead.iter().map(|(answer, bytes)| (*answer, bytes.as_slice())).collect();
+        self.0.script_with(&kinds, &instead);
         Ok(())
     }
 

@@ -91,7 +91,13 @@ impl SimulatedLine {
     /// Every request that reaches a unit counts, also where a fault then keeps the answer back. Replaces what was left
     /// of an earlier script; rates go on beside it.
     pub fn script(&self, faults: &[(u64, FaultKind)]) {
-        self.shared.present().wire.faults.script(faults);
+        self.script_with(faults, &[]);
+    }
+
+    /// As [`script`](Self::script), and says which answer is replaced by which bytes, as they are. What hits such an answer
+    /// hits the bytes.
+    pub fn script_with(&self, faults: &[(u64, FaultKind)], instead: &[(u64, &[u8])]) {
+        self.shared.present().wire.faults.script(faults, instead);
     }
 
     /// How often `kind` has happened.

@@ -207,6 +207,7 @@ impl World {
             Ok(Destination::Unit(unit)) => {
                 let Some(drive) = self.drives.get_mut(unit) else { return };
                 let hits = self.wire.faults.next();
+                let instead = self.wire.faults.instead();
                 if hits.has(FaultKind::Deaf) {
                     self.wire.faults.happened(FaultKind::Deaf);
                     return;
@@ -218,7 +219,7 @@ impl World {
                     self.unplug(silent, Some(silent + self.wire.faults.times.replug));
                 }
                 if let Some(answer) = answer {
-                    self.wire.answer(unit.get(), ready, answer.as_bytes(), hits);
+                    self.wire.answer(unit.get(), ready, instead.as_deref().unwrap_or(answer.as_bytes()), hits);
                 }
             }
             Err(_) => {}

@@ -69,6 +69,8 @@ pub(crate) struct Faults {
     by_rate: bool,
     /// By the number of the answer.
     script: BTreeMap<u64, Hits>,
+    /// What comes instead of an answer, by its number.
+    instead: BTreeMap<u64, Vec<u8>>,
     /// Answers since the script began.
     answers: u64,
     counts: [u64; KINDS],
@@ -84,6 +86,7 @@ impl Faults {
             rates: [0.0; KINDS],
             by_rate: false,
             script: BTreeMap::new(),
+            instead: BTreeMap::new(),
             answers: 0,
             counts: [0; KINDS],
             times: Times::default(),
@@ -101,13 +104,15 @@ impl Faults {
         self.rates[kind.index()]
     }
 
-    /// Sets what hits which answer, counted from now: 1 is the next. Replaces what was left of the script before.
-    pub(crate) fn script(&mut self, faults: &[(u64, FaultKind)]) {
+    /// Sets what hits which answer, and which bytes come instead of which, counted from now: 1 is the next. Replaces what
+    /// was left of the script before.
+    pub(crate) fn script(&mut self, faults: &[(u64, FaultKind)], instead: &[(u64, &[u8])]) {
         self.answers = 0;
         self.script.clear();
         for &(answer, kind) in faults {
             self.script.entry(answer).or_default().add(kind);
         }
+        self.instead = instead.iter().map(|&(answer, bytes)| (answer, bytes.to_vec())).collect();
     }
 
     /// Forgets rates and script; what was counted stays.
@@ -115,6 +120,7 @@ impl Faults {
         self.rates = [0.0; KINDS];
         self.by_rate = false;
         self.script.clear();
+        self.instead.clear();
     }
 
     pub(crate) fn count(&self, kind: FaultKind) -> u64 {
@@ -137,6 +143,11 @@ impl Faults {
         hits
     }
 
+    /// What comes instead of the answer that [`next`](Self::next) was about.
+    pub(crate) fn instead(&mut self) -> Option<Vec<u8>> {
+        self.instead.remove(&self.answers)
+    }
+
     /// Counts a fault that has happened.
     pub(crate) fn happened(&mut self, kind: FaultKind) {
         self.counts[kind.index()] += 1;
@@ -151,7 +162,7 @@ mod tests {
     fn a_script_counts_from_the_next_answer() {
         let mut faults = Faults::new(0, Duration::ZERO);
         faults.next();
-        faults.script(&[(2, FaultKind::Late), (2, FaultKind::Split), (1, FaultKind::Deaf)]);
+        faults.script(&[(2, FaultKind::Late), (2, FaultKind::Split), (1, FaultKind::Deaf)], &[]);
         let hits = [faults.next(), faults.next(), faults.next()];
         assert!(hits[0].has(FaultKind::Deaf) && !hits[0].has(FaultKind::Late));
         assert!(hits[1].has(FaultKind::Late) && hits[1].has(FaultKind::Split));

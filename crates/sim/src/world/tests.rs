@@ -79,7 +79,7 @@ fn happened(mut world: World, acts: &[Act]) -> (Vec<Vec<u8>>, World) {
 fn handed_over(fifo: usize, faults: &[(u64, FaultKind)], echo: bool, counts: &[u16]) -> Vec<(Instant, Vec<u8>)> {
     let unit = UnitAddress::MIN;
     let mut world = world(false);
-    world.wire.faults.script(faults);
+    world.wire.faults.script(faults, &[]);
     world.wire.echo = echo;
     let port = world.attach();
     let mut handed = Vec::new();
@@ -151,7 +151,7 @@ proptest! {
         let [fast, slow] = [false, true].map(|plodding| {
             let mut world = world(strict);
             world.wire.plodding = plodding;
-            world.wire.faults.script(&faults);
+            world.wire.faults.script(&faults, &[]);
             world.wire.echo = echo;
             happened(world, &acts)
         });

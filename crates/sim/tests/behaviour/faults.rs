@@ -190,6 +190,19 @@ fn an_answer_that_may_be_passed_waits_behind_one_that_is_late() {
 }
 
 #[test]
+fn a_script_replaces_the_answers_it_names() {
+    let mut bench = hit_by(FaultKind::Late);
+    let wire = bench.simulator.wire();
+    wire.clear();
+    wire.script_with(&[(3, FaultKind::Silence), (3, FaultKind::Late)], &[(2, &[1, 2, 3]), (3, &[4]), (4, &[])]);
+    let came: Vec<Vec<u8>> = (0..5).map(|_| bench.exchange(&request())).collect();
+    assert_eq!(came, [answer(), vec![1, 2, 3], vec![], vec![], answer()]);
+    wire.script_with(&[], &[(1, &[5])]);
+    wire.clear();
+    assert_eq!(bench.exchange(&request()), answer());
+}
+
+#[test]
 fn a_split_answer_comes_in_pieces_16_ms_apart() {
     let mut bench = hit_by(FaultKind::Split);
     let character = SerialFormat::DEFAULT.char_time() + Duration::from_nanos(1);
