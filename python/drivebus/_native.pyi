@@ -52,7 +52,9 @@ def encode_echo(unit: int, word: int) -> bytes:
     """A whole 08H/0000 request frame with *word* 0..=0xFFFF."""
 
 def decode_answer(request: Buffer, frame: Buffer) -> list[int] | None:
-    """The words that *frame* answers to *request*; None for a confirmed write or echo.
+    """The words that *frame* answers to *request*; None for a confirmed write or echo, and for any other function.
+
+    Answers of other functions are held to what the specification says of them: byte count, and what they repeat.
 
     Raises CrcError, BadAnswer, Refused; NotAllowed where *request* is no request.
     """

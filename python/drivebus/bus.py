@@ -229,7 +229,8 @@ class Bus(BusFace[_native.Bus]):
     ) -> bytes:
         """Sends any PDU (1..253 bytes) and returns the answer's PDU; unit and CRC are added and checked. Sent once.
 
-        *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence.
+        *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence,
+        and what the specification says of that function's answers is checked.
         What 06H and 10H would write is refused as `write` refuses it, unless *force*.
         """
         try:

@@ -155,3 +155,28 @@ def test_one_flipped_bit_is_never_a_frame(vector: Vector) -> None:
         spoilt[bit // 8] ^= 1 << bit % 8
         with pytest.raises(drivebus.CrcError):
             drivebus.rtu.decode(spoilt)
+
+
+def framed(pdu: str) -> bytes:
+    body = bytes([1]) + bytes.fromhex(pdu)
+    return body + drivebus.crc16(body).to_bytes(2, "little")
+
+
+FUNCTIONS = load("functions")["function"]
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda each: str(each["what"]))
+def test_a_right_answer_of_any_function_is_taken(function: Fields) -> None:
+    assert drivebus.rtu.decode_answer(framed(function["request"]), framed(function["answer"])) is None
+
+
+@pytest.mark.parametrize(
+    ("request_pdu", "wrong"),
+    [(each["request"], wrong) for each in FUNCTIONS for wrong in each["wrong"]],
+    ids=lambda each: str(each),
+)
+def test_no_answer_that_the_specification_excludes_is_taken(request_pdu: str, wrong: str) -> None:
+    with pytest.raises(drivebus.BadAnswer) as bad:
+        drivebus.rtu.decode_answer(framed(request_pdu), framed(wrong))
+    assert not isinstance(bad.value, drivebus.CrcError)
+    assert bad.value.raw == framed(wrong)

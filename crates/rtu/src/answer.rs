@@ -1,11 +1,16 @@
 //! What a unit answers: the PDUs of answers, built, parsed, and judged against what was asked.
 
-use core::fmt;
+mod error;
+mod shape;
 
 use crate::frame::{AROUND_PDU, Frame};
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::request::{AnswerLength, MAX_PDU, MAX_READ, Request, RequestError, put_words};
 use crate::{UnitAddress, Words};
+
+pub use error::AnswerError;
+pub use shape::Head;
+use shape::Shape;
 
 /// The code in an exception: why a unit refused. What a code means beyond 04H differs from family to family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -211,7 +216,7 @@ enum Kind {
     WriteSingle { address: u16, value: u16 },
     Echo { data: u16 },
     WriteMultiple { address: u16, count: u16 },
-    Custom { function: u8, answer: AnswerLength },
+    Custom { function: u8, answer: AnswerLength, shape: Shape },
 }
 
 impl Expected {
@@ -225,7 +230,14 @@ impl Expected {
             Request::Echo { data } => Kind::Echo { data },
             #[expect(clippy::cast_possible_truncation, reason = "at most 123 words")]
             Request::WriteMultiple { address, words } => Kind::WriteMultiple { address, count: words.len() as u16 },
-            Request::Custom { answer, .. } => Kind::Custom { function: request.function(), answer },
+            Request::Custom { pdu, answer } => {
+                // Who says how long the answer is knows a unit that the specification may not know.
+                let shape = match answer {
+                    AnswerLength::BySilence => Shape::of_answer_to(pdu),
+                    AnswerLength::Bytes(_) => Shape::FREE,
+                };
+                Kind::Custom { function: request.function(), answer, shape }
+            }
         })
     }
 
@@ -318,12 +330,12 @@ impl Expected {
         if came & !EXCEPTION_BIT != self.function() {
             return Err(AnswerError::Function { asked: self.function(), came });
         }
-        if let (Kind::Custom { answer, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
+        if let (Kind::Custom { answer, shape, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
             return match answer {
                 AnswerLength::Bytes(len) if usize::from(len) != pdu.len() => {
                     Err(AnswerError::Length { len: pdu.len() })
                 }
-                _ => Ok(Answer::Custom { pdu }),
+                _ => shape.check(pdu).map(|()| Answer::Custom { pdu }),
             };
         }
         let answer = Answer::parse(pdu)?;
@@ -347,68 +359,3 @@ impl Expected {
 fn repeats(asked: [u16; 2], came: [u16; 2], answer: Answer<'_>) -> Result<Answer<'_>, AnswerError> {
     if asked == came { Ok(answer) } else { Err(AnswerError::Echo { asked, came }) }
 }
-
-/// Why a frame with a good CRC is not the answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum AnswerError {
-    /// It comes from another unit.
-    Unit {
-        /// Who was asked.
-        asked: u8,
-        /// Who answers.
-        came: u8,
-    },
-    /// It answers another function.
-    Function {
-        /// The function asked for.
-        asked: u8,
-        /// The function that came.
-        came: u8,
-    },
-    /// It carries another number of words.
-    Count {
-        /// Words asked for.
-        asked: u16,
-        /// Words that came.
-        came: usize,
-    },
-    /// It repeats other words than those sent: address and value, address and count, or sub-function and data.
-    Echo {
-        /// What was sent.
-        asked: [u16; 2],
-        /// What came.
-        came: [u16; 2],
-    },
-    /// Its length does not fit its function.
-    Length {
-        /// Bytes of the PDU.
-        len: usize,
-    },
-    /// It is a refusal, and may be that of an earlier request: refusals of one function look alike.
-    Refusal {
-        /// Why.
-        code: ExceptionCode,
-    },
-}
-
-impl fmt::Display for AnswerError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unit { asked, came } => write!(f, "unit {asked} was asked, unit {came} answers"),
-            Self::Function { asked, came } => write!(f, "function {asked:02X}H was asked, {came:02X}H came"),
-            Self::Count { asked, came } => write!(f, "{asked} words were asked for, {came} came"),
-            Self::Echo { asked, came } => write!(
-                f,
-                "{:04X}H {:04X}H was sent, the answer repeats {:04X}H {:04X}H",
-                asked[0], asked[1], came[0], came[1]
-            ),
-            Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
-            Self::Refusal { code } => {
-                write!(f, "exception {:02X}H came, which may be meant for an earlier read", code.0)
-            }
-        }
-    }
-}
-
-impl core::error::Error for AnswerError {}

@@ -21,7 +21,7 @@ pub use core::time::Duration;
 
 pub use address::{AddressError, Destination, UnitAddress};
 pub use agreement::Agreement;
-pub use answer::{Answer, AnswerError, ExceptionCode, Expected};
+pub use answer::{Answer, AnswerError, ExceptionCode, Expected, Head};
 pub use crc::crc16;
 pub use doubt::{Attribution, FIRST_CONTACT, OVERTAKING, PATIENCE};
 pub use event::{BeginError, Event, Tally};
