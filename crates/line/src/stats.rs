@@ -97,15 +97,19 @@ impl Stats {
 impl Counters {
     /// What was seen beside the answer.
     pub(crate) fn add(&mut self, tally: Tally) {
-        self.late += u64::from(tally.late);
-        self.foreign += u64::from(tally.foreign);
-        self.noise_bytes += u64::from(tally.noise);
-        self.noise_idle += u64::from(tally.noise_idle);
-        self.own_echoes += u64::from(tally.own_echo);
+        for (count, more) in [
+            (&mut self.late, tally.late),
+            (&mut self.foreign, tally.foreign),
+            (&mut self.noise_bytes, tally.noise),
+            (&mut self.noise_idle, tally.noise_idle),
+            (&mut self.own_echoes, tally.own_echo),
+        ] {
+            *count = count.saturating_add(more.into());
+        }
     }
 
     pub(crate) fn answered(&mut self, round_trip: Duration, delay: Duration) {
-        self.answers += 1;
+        self.answers = self.answers.saturating_add(1);
         self.round_trip.add(round_trip);
         self.delay.add(delay);
     }
@@ -114,6 +118,25 @@ impl Counters {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_that_are_full_stay_full() {
+        let full = Counters {
+            answers: u64::MAX,
+            late: u64::MAX,
+            foreign: u64::MAX,
+            noise_bytes: u64::MAX,
+            noise_idle: u64::MAX,
+            own_echoes: u64::MAX,
+            ..Counters::default()
+        };
+        let mut counters = full.clone();
+        counters.add(Tally { late: 1, foreign: 1, noise: 1, noise_idle: 1, own_echo: 1 });
+        counters.answered(Duration::MAX, Duration::MAX);
+        counters.answered(Duration::MAX, Duration::MAX);
+        assert_eq!(Counters { round_trip: full.round_trip, delay: full.delay, ..counters }, full);
+        assert_eq!(counters.round_trip.max, Duration::MAX);
+    }
 
     #[test]
     fn latency_keeps_the_ends_and_the_mean() {

@@ -34,7 +34,7 @@ pub enum Event<'a> {
     Busy,
 }
 
-/// What was seen on the line beside answers, since [`crate::Master::take_tally`].
+/// What was seen on the line beside answers, since [`crate::Master::take_tally`]. A count that is full stays full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
     /// Whole frames that came when nothing was waited for, or from a unit in quarantine.
@@ -54,8 +54,20 @@ impl Tally {
 
     pub(crate) fn add_noise(&mut self, bytes: &[u8]) {
         let idle = bytes.iter().filter(|&&byte| byte == 0x00 || byte == 0xFF).count();
-        self.noise += u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        self.noise_idle += u32::try_from(idle).unwrap_or(u32::MAX);
+        self.noise = self.noise.saturating_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
+        self.noise_idle = self.noise_idle.saturating_add(u32::try_from(idle).unwrap_or(u32::MAX));
+    }
+
+    pub(crate) fn add_late(&mut self) {
+        self.late = self.late.saturating_add(1);
+    }
+
+    pub(crate) fn add_foreign(&mut self) {
+        self.foreign = self.foreign.saturating_add(1);
+    }
+
+    pub(crate) fn add_own_echo(&mut self) {
+        self.own_echo = self.own_echo.saturating_add(1);
     }
 }
 
@@ -85,3 +97,20 @@ impl core::fmt::Display for BeginError {
 }
 
 impl core::error::Error for BeginError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tally_that_is_full_stays_full() {
+        let full =
+            Tally { late: u32::MAX, foreign: u32::MAX, noise: u32::MAX, noise_idle: u32::MAX, own_echo: u32::MAX };
+        let mut tally = full;
+        tally.add_noise(&[0x00, 0x55]);
+        tally.add_late();
+        tally.add_foreign();
+        tally.add_own_echo();
+        assert_eq!(tally, full);
+    }
+}

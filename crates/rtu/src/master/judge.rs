@@ -28,7 +28,7 @@ impl Master {
                     return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
-                    self.tally.own_echo += 1;
+                    self.tally.add_own_echo();
                     self.echo_due = false;
                     self.framer.forget_own();
                 }
@@ -44,7 +44,7 @@ impl Master {
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart => {
                             self.doubts.seen(now, &self.framer.frame(range));
-                            self.tally.late += 1;
+                            self.tally.add_late();
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
                         Ok(Answer::Exception { code, .. }) if apart && expected.is_read() => {
@@ -58,7 +58,7 @@ impl Master {
                         Ok(Answer::Exception { .. })
                             if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
                         {
-                            self.tally.late += 1;
+                            self.tally.add_late();
                         }
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
@@ -108,9 +108,9 @@ impl Master {
     /// Counts a whole frame that is not the answer.
     fn count_other(&mut self, range: Range<usize>, unit: UnitAddress, doubted: bool) {
         if doubted && self.framer.held(range).first() == Some(&unit.get()) {
-            self.tally.late += 1;
+            self.tally.add_late();
         } else {
-            self.tally.foreign += 1;
+            self.tally.add_foreign();
         }
     }
 
@@ -120,11 +120,11 @@ impl Master {
         while let Some(step) = self.framer.step(now) {
             match step {
                 Step::Frame(range) if broadcast && self.framer.held(range.clone()) == self.request.as_bytes() => {
-                    self.tally.own_echo += 1;
+                    self.tally.add_own_echo();
                 }
                 Step::Frame(range) => {
                     self.doubts.seen(now, &self.framer.frame(range));
-                    self.tally.late += 1;
+                    self.tally.add_late();
                 }
                 Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
             }
