@@ -137,6 +137,7 @@ class Bus:
         turnaround: float = 0.1,
         learn_timeout: bool = False,
         low_latency: bool = True,
+        queue: int = 65_536,
     ) -> Bus:
         """Opens *port*.
 
@@ -293,6 +294,7 @@ def open_bus(
     turnaround: float = 0.1,
     learn_timeout: bool = False,
     low_latency: bool = True,
+    queue: int = 65_536,
 ) -> Asked:
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 

@@ -50,6 +50,8 @@ class Bus(BusFace[_native.Bus]):
             its last 32 answers, at least 100 ms, beside the time the characters take; never longer than *timeout*. The
             next read after silence waits the whole *timeout* again. What `poll` asks waits so in any case.
         low_latency: Whether an adapter that keeps what it receives (FTDI: 16 ms) is told to hurry while it is open.
+        queue: How many requests may wait for the line, 1..1000000. Who finds no room is told so at once (`NotAllowed`);
+            a stop always does.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.
@@ -77,6 +79,7 @@ class Bus(BusFace[_native.Bus]):
         turnaround: float = 0.1,
         learn_timeout: bool = False,
         low_latency: bool = True,
+        queue: int = 65_536,
     ) -> None:
         opening = Opening(
             port,
@@ -89,6 +92,7 @@ class Bus(BusFace[_native.Bus]):
             turnaround=turnaround,
             learn_timeout=learn_timeout,
             low_latency=low_latency,
+            queue=queue,
         )
         super().__init__(opening, _native.Bus(opening.target, opening.format, **opening.keywords))
 

@@ -40,6 +40,7 @@ class Opening:
         turnaround: float,
         learn_timeout: bool,
         low_latency: bool,
+        queue: int,
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
@@ -53,6 +54,7 @@ class Opening:
             "turnaround": checks.number("turnaround", turnaround, 0.0, 3600.0),
             "learn_timeout": checks.flag("learn_timeout", learn_timeout),
             "low_latency": checks.flag("low_latency", low_latency),
+            "queue": checks.whole("queue", queue, 1, 1_000_000),
         }
         target = ports.resolve(port, line)
         self.format = ports.format_of(target, line)

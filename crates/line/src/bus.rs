@@ -42,11 +42,17 @@ pub struct BusOptions {
     /// at least 100 ms, beside the time that the answer's characters take, and never longer than the time-out. What is
     /// polled waits so in any case.
     pub learn_timeout: bool,
+    /// How many requests may wait for the line; who comes then is told so at once ([`Failure::QueueFull`]). A stop is
+    /// always let in. 0 would let nobody wait.
+    pub queue: usize,
 }
+
+/// More than any program means to have under way, and some tens of megabytes.
+pub(crate) const DEFAULT_QUEUE: usize = 65_536;
 
 impl BusOptions {
     /// Half a second, two retries of reads, writing allowed, the adapter's echo found out, the turnaround delay of the
-    /// specification, no time-outs that learn.
+    /// specification, no time-outs that learn, 65 536 requests that may wait.
     pub const fn new(format: SerialFormat) -> Self {
         Self {
             format,
@@ -56,6 +62,7 @@ impl BusOptions {
             echo: AdapterEcho::Auto,
             turnaround: TURNAROUND,
             learn_timeout: false,
+            queue: DEFAULT_QUEUE,
         }
     }
 }
@@ -133,7 +140,7 @@ impl Bus {
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         let gapless = owner.line().is_some_and(|line| line.gapless());
         Ok(Self {
-            queue: Arc::default(),
+            queue: Arc::new(Queue::with_room(options.queue)),
             stats: owner.shared_stats(),
             links: owner.shared_links(),
             words,
@@ -347,6 +354,7 @@ impl Bus {
         match why {
             NoTurn::GivenUp => self.given_up(),
             NoTurn::OwnThread => Failure::NotBegun(BeginError::OutOfTurn),
+            NoTurn::Full => Failure::QueueFull { room: self.options.queue },
         }
     }
 

@@ -19,7 +19,7 @@ use crate::bus::Bus;
 use crate::course::{Course, is_unanswered};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::queue::{Priority, Turn};
+use crate::queue::{NoTurn, Priority, Turn};
 
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
@@ -134,10 +134,11 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b>, Box<CallError>> {
-        self.bus
-            .queue
-            .turn(self.priority, self.unit, give_up)
-            .map_err(|why| self.ask.failed(self.bus.no_turn(why), None, self.bus.now_if_known(), &[]))
+        self.bus.queue.turn(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))
+    }
+
+    fn no_turn(&self, why: NoTurn) -> Box<CallError> {
+        self.ask.failed(self.bus.no_turn(why), None, self.bus.now_if_known(), &[])
     }
 
     /// An error of a request that was not sent.
@@ -200,7 +201,7 @@ impl<'b, 'r> Call<'b, 'r> {
         if ended || self.bus.is_shut() {
             return Err(self.failed(self.bus.given_up()));
         }
-        *turn = self.turn(give_up)?;
+        *turn = self.bus.queue.turn_again(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))?;
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use drivebus_rtu::UnitAddress;
 use crate::bus::Bus;
 use crate::errand::{self, Errand};
 use crate::order::Ticket;
-use crate::queue::{Priority, Queue, State, Turn};
+use crate::queue::{NoTurn, Priority, Queue, State, Turn};
 
 /// Most threads of one bus, but for stops, which always get one. One has the line; others stand by for units that are
 /// silent, and of those there may be many.
@@ -122,17 +122,21 @@ impl Crew {
 }
 
 impl Queue {
-    /// Leaves `work` in the queue, to be done when its turn comes; gives it back where nothing is taken any more.
+    /// Leaves `work` in the queue, to be done when its turn comes; gives it back where nothing is taken any more, or too
+    /// much waits.
     pub(crate) fn leave_work(
         &self,
         priority: Priority,
         unit: Option<UnitAddress>,
         work: Errand,
         crew: &Arc<Bus>,
-    ) -> Result<Ticket, Errand> {
+    ) -> Result<Ticket, (Errand, NoTurn)> {
         let mut state = self.lock();
         if state.crew.is_dismissed() {
-            return Err(work);
+            return Err((work, NoTurn::GivenUp));
+        }
+        if state.is_full_for(priority, self.room) {
+            return Err((work, NoTurn::Full));
         }
         state.crew.belongs_to(crew);
         let ticket = state.order.ticket(priority, unit);

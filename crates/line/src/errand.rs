@@ -15,7 +15,7 @@ use crate::call::{Call, CallOptions};
 use crate::error::{CallError, Failure};
 use crate::exchange::Done;
 use crate::order::Ticket;
-use crate::queue::{Priority, Queue, Turn};
+use crate::queue::{NoTurn, Priority, Queue, Turn};
 
 /// A request, and who is told what became of it.
 pub struct Errand {
@@ -173,8 +173,9 @@ impl Bus {
         let wanted = Arc::clone(&errand.wanted);
         match self.queue.leave_work(priority, unit, errand, self) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),
-            Err(errand) => {
-                errand.fail(self, Failure::Closed);
+            Err((errand, why)) => {
+                let failure = if why == NoTurn::Full { self.no_turn(why) } else { Failure::Closed };
+                errand.fail(self, failure);
                 None
             }
         }

@@ -112,6 +112,12 @@ pub enum Failure {
         /// The function asked for.
         function: u8,
     },
+    /// As many wait for the line as may. Nothing was sent.
+    #[error("{room} requests wait for this line already, and no more may; nothing was sent")]
+    QueueFull {
+        /// How many may wait.
+        room: usize,
+    },
     /// The request cannot be sent like this. Nothing was sent.
     #[error("{0}")]
     NotBegun(BeginError),

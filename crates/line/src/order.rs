@@ -87,6 +87,11 @@ impl<T> Order<T> {
         self.waiting.is_empty()
     }
 
+    /// How many wait.
+    pub(crate) fn len(&self) -> usize {
+        self.waiting.len()
+    }
+
     /// What is kept about those who wait, in no order.
     pub(crate) fn waiting(&self) -> impl Iterator<Item = &T> {
         self.waiting.iter().map(|waiting| &waiting.whose)

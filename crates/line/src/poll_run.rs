@@ -126,7 +126,9 @@ impl Runner {
                 match error.failure {
                     Failure::Closed | Failure::Forked => return Progress::Over,
                     Failure::Interrupted => return Progress::GivenUp,
-                    Failure::NotAsked { .. } | Failure::Port(_) | Failure::NotBegun(_) => heard = index > 0,
+                    Failure::NotAsked { .. } | Failure::Port(_) | Failure::NotBegun(_) | Failure::QueueFull { .. } => {
+                        heard = index > 0;
+                    }
                     _ => {}
                 }
                 sample.missing = Some(error);

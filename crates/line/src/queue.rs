@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
 
+use crate::bus::DEFAULT_QUEUE;
 use crate::clock::monotonic;
 use crate::crew::{Crew, Waiter};
 use crate::order::{Order, Ticket};
@@ -36,8 +37,10 @@ pub enum Priority {
 /// for no hand-over.
 ///
 /// Work that is left here waits in the same order, without a thread: one of the [`Crew`] is called when its turn comes.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Queue {
+    /// How many may wait, stops aside.
+    pub(crate) room: usize,
     pub(crate) state: Mutex<State>,
     /// Where the crew waits to be called.
     pub(crate) called: Condvar,
@@ -58,6 +61,8 @@ pub(crate) enum NoTurn {
     GivenUp,
     /// This thread stands in the queue already.
     OwnThread,
+    /// As many wait as may.
+    Full,
 }
 
 /// The right to use the line, until it is dropped.
@@ -69,18 +74,49 @@ pub(crate) struct Turn<'a> {
     pub(crate) of_crew: bool,
 }
 
+impl Default for Queue {
+    fn default() -> Self {
+        Self::with_room(DEFAULT_QUEUE)
+    }
+}
+
 impl Queue {
+    /// A queue in which `room` may wait, stops aside.
+    pub(crate) fn with_room(room: usize) -> Self {
+        Self { room, state: Mutex::default(), called: Condvar::new() }
+    }
+
     /// Waits for a turn to ask `unit`.
     ///
     /// `unit` is `None` for a broadcast and for what concerns the whole line.
     ///
     /// # Errors
     ///
-    /// [`NoTurn`]: `give_up` said so before it came, or this thread would wait for itself.
+    /// [`NoTurn`]: `give_up` said so before it came, this thread would wait for itself, or too many wait.
     pub(crate) fn turn(
         &self,
         priority: Priority,
         unit: Option<UnitAddress>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Turn<'_>, NoTurn> {
+        self.enter(priority, unit, self.room, give_up)
+    }
+
+    /// As [`turn`](Self::turn), for who had one and gave way: there is always room.
+    pub(crate) fn turn_again(
+        &self,
+        priority: Priority,
+        unit: Option<UnitAddress>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Turn<'_>, NoTurn> {
+        self.enter(priority, unit, usize::MAX, give_up)
+    }
+
+    fn enter(
+        &self,
+        priority: Priority,
+        unit: Option<UnitAddress>,
+        room: usize,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<Turn<'_>, NoTurn> {
         let thread = thread::current();
@@ -88,6 +124,9 @@ impl Queue {
         let is_free = state.owner.is_none() && state.order.is_empty();
         if !is_free && state.has(thread.id()) {
             return Err(NoTurn::OwnThread);
+        }
+        if !is_free && state.is_full_for(priority, room) {
+            return Err(NoTurn::Full);
         }
         let ticket = state.order.ticket(priority, unit);
         if is_free {
@@ -190,6 +229,11 @@ impl Drop for Turn<'_> {
 }
 
 impl State {
+    /// Whether who comes with `priority` finds no room among the `room` who may wait. A stop always does.
+    pub(crate) fn is_full_for(&self, priority: Priority, room: usize) -> bool {
+        priority != Priority::Stop && self.order.len() >= room
+    }
+
     /// Whether `this` thread has the line or waits for it.
     fn has(&self, this: ThreadId) -> bool {
         self.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this)

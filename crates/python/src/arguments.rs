@@ -25,6 +25,7 @@ pub(crate) fn to_open(
     turnaround: f64,
     learn_timeout: bool,
     low_latency: bool,
+    queue: usize,
 ) -> PyResult<(Opener, BusOptions)> {
     let echo = match echo {
         "auto" => AdapterEcho::Auto,
@@ -35,7 +36,7 @@ pub(crate) fn to_open(
     let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
     let timeout = duration("timeout", timeout)?;
     let turnaround = duration("turnaround", turnaround)?;
-    Ok((opener, BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout }))
+    Ok((opener, BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout, queue }))
 }
 
 /// Why a bus could not be opened.

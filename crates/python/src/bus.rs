@@ -29,7 +29,7 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-        turnaround = 0.1, learn_timeout = false, low_latency = true))]
+        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
         py: Python<'_>,
@@ -43,9 +43,21 @@ impl Bus {
         turnaround: f64,
         learn_timeout: bool,
         low_latency: bool,
+        queue: usize,
     ) -> PyResult<Self> {
-        let (opener, options) =
-            to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency)?;
+        let (opener, options) = to_open(
+            port,
+            format,
+            timeout,
+            retries,
+            read_only,
+            rs485,
+            echo,
+            turnaround,
+            learn_timeout,
+            low_latency,
+            queue,
+        )?;
         let core = with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(open_failed)?;
         Ok(Self::around(core))
     }
@@ -306,6 +318,7 @@ impl Heard {
     pub(crate) fn into_python<'py>(self, py: Python<'py>, port: &str) -> PyResult<Vec<(f64, Bound<'py, PyBytes>)>> {
         self.end.map_err(|failure| match failure {
             Failure::Port(error) => port_error(&error),
+            full @ Failure::QueueFull { .. } => refuse(full),
             other => port_error(&PortError::new(PortErrorKind::Closed, port, other.to_string())),
         })?;
         Ok(self.frames.into_iter().map(|(moment, bytes)| (moment, PyBytes::new(py, &bytes))).collect())

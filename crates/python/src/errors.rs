@@ -115,7 +115,9 @@ pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) ->
     let message = error.to_string();
     match error.failure {
         Failure::Port(_) | Failure::Reopened | Failure::Forked | Failure::Closed => Class::Port.raise(message, details),
-        Failure::NotBegun(_) | Failure::ReadOnly { .. } => Class::NotAllowed.raise(message, details),
+        Failure::NotBegun(_) | Failure::ReadOnly { .. } | Failure::QueueFull { .. } => {
+            Class::NotAllowed.raise(message, details)
+        }
         Failure::Doubtful | Failure::NotAsked { .. } | Failure::Unreached => Class::NoAnswer.raise(message, details),
         Failure::NotTaken { .. } => Class::Unconfirmed.raise(message, details),
         Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),

@@ -64,7 +64,7 @@ impl Asked {
 /// Opens a bus in a thread of its own; it comes as a letter.
 #[pyfunction]
 #[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-    turnaround = 0.1, learn_timeout = false, low_latency = true))]
+    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
 pub(crate) fn open_bus(
     mailbox: &Mailbox,
@@ -78,9 +78,10 @@ pub(crate) fn open_bus(
     turnaround: f64,
     learn_timeout: bool,
     low_latency: bool,
+    queue: usize,
 ) -> PyResult<Asked> {
     let (opener, options) =
-        to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency)?;
+        to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency, queue)?;
     apart(&mailbox.inbox, move |wanted| {
         let core = CoreBus::open(opener, options, &mut || !wanted.load(Ordering::Acquire));
         move |py: Python<'_>| match core {

@@ -75,6 +75,7 @@ class Bus(BusFace[Line]):
         turnaround: float = 0.1,
         learn_timeout: bool = False,
         low_latency: bool = True,
+        queue: int = 65_536,
     ) -> None:
         self._opening = Opening(
             port,
@@ -87,6 +88,7 @@ class Bus(BusFace[Line]):
             turnaround=turnaround,
             learn_timeout=learn_timeout,
             low_latency=low_latency,
+            queue=queue,
         )
         self._shown = str(port)
 

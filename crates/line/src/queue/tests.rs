@@ -39,6 +39,27 @@ fn turns_come_in_order_and_a_stop_overtakes() {
 }
 
 #[test]
+fn a_full_queue_takes_nobody_but_a_stop_and_who_had_a_turn() {
+    let queue = &Queue::with_room(1);
+    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    thread::scope(|scope| {
+        let waits = |priority| move || drop(queue.turn(priority, unit(2), &mut || false).unwrap());
+        scope.spawn(waits(Read));
+        wait_for(queue, 1);
+        for priority in [Write, Read, Poll] {
+            let refused = scope.spawn(move || queue.turn(priority, unit(2), &mut || false).map(drop));
+            assert_eq!(refused.join().unwrap(), Err(NoTurn::Full));
+        }
+        scope.spawn(waits(Stop));
+        wait_for(queue, 2);
+        scope.spawn(|| drop(queue.turn_again(Poll, unit(3), &mut || false).unwrap()));
+        wait_for(queue, 3);
+        drop(first);
+    });
+    assert_eq!(queue.turn(Read, unit(1), &mut || false).map(drop), Ok(()), "there is room again");
+}
+
+#[test]
 fn one_at_a_time_has_the_line() {
     let queue = Queue::default();
     let inside = Mutex::new(());
