@@ -10,7 +10,7 @@ import pytest
 
 import drivebus
 import drivebus.aio
-from drivebus import Backup, Bus, Drive, NotAllowed, Simulator
+from drivebus import Backup, Bus, Drive, NotAllowed, Profile, Simulator
 
 from .kept import OTHER, Store
 
@@ -181,3 +181,26 @@ def test_the_awaited_drive_does_the_same(tmp_path: Path) -> None:
                 assert not await drive.diff(kept)
 
     asyncio.run(awaited())
+
+
+@pytest.fixture
+def guessed(tmp_path: Path) -> Profile:
+    """A family of which it is only assumed where it says what it is."""
+    head = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source"
+    row = "0x2103,identification_code,What it is,,1,no,,,,ro,assumed,A sister has it there.,notes"
+    (tmp_path / "registers.csv").write_text(f"{head}\n{row}\n")
+    (tmp_path / "profile.toml").write_text('name = "ours"\nversion = 1\nsource = "notes"\n[overlay]\nprofile = "gd350"\n')
+    return Profile.load(tmp_path)
+
+
+@pytest.mark.parametrize("drive_trusts", [False, True])
+@pytest.mark.parametrize("call_trusts", [False, True])
+def test_who_it_is_is_asked_with_the_trust_of_the_call(
+    virtual: Simulator, virtual_bus: Bus, guessed: Profile, drive_trusts: bool, call_trusts: bool
+) -> None:
+    drive = virtual_bus.drive(1, guessed, unverified=drive_trusts)
+    trusts = drive_trusts or call_trusts
+    kept = drive.backup(unverified=call_trusts)
+    assert kept.origin.identification == (0x01A0 if trusts else None)
+    assert not drive.diff(kept, unverified=call_trusts)
+    assert drive.restore(kept, unverified=call_trusts).ok

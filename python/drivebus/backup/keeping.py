@@ -125,11 +125,12 @@ class Keeping(Parameters):
             NoAnswer, BadAnswer, PortError, Refused: See each.
         """
         everything, force = checks.flag("everything", everything), checks.flag("force", force)
+        drive = self.trusting(unverified)
         if backup is None:
             left = factory(self.profile)
         else:
             kept = self._kept(backup, force)
-            others = [] if force else kept.origin.other(await taking.origin_of(self))
+            others = [] if force else kept.origin.other(await taking.origin_of(drive))
             if others:
                 raise NotAllowed(
                     f"the backup is not of the drive at unit {self.unit}: {'; '.join(others)}. To compare them all the "
@@ -138,7 +139,6 @@ class Keeping(Parameters):
                 )
             left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
         rules = Rules(self.profile)
-        drive = self.trusting(unverified)
         unasked = {code: reason for code in left.raw if (reason := rules.unread(code, drive.unverified)) is not None}
         left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
         codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
