@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import SupportsIndex
 
 from drivebus.errors import NotAllowed
 
-__all__ = ["address", "closest", "flag", "number", "one_of", "payload", "unit", "whole"]
+__all__ = ["address", "closest", "digits", "flag", "number", "one_of", "path", "payload", "shown", "unit", "whole"]
+
+_MOST_DIGITS = 20
+"""Digits of the largest number that anything here can be: 2 ** 64 - 1."""
 
 
 def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = False) -> int:
@@ -23,11 +27,11 @@ def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = 
         return value
     allowed = f"{low:#06x}..{high:#06x}" if hexadecimal else f"{low}..{high}"
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):
-        raise NotAllowed(f"{what} {value!r} is not a whole number; allowed is {allowed}")
+        raise NotAllowed(f"{what} {shown(value)} is not a whole number; allowed is {allowed}")
     number = operator.index(value)
     if not low <= number <= high:
-        shown = f"{number:#06x}" if hexadecimal and number >= 0 else str(number)
-        raise NotAllowed(f"{what} {shown} is out of range; allowed is {allowed}")
+        said = f"{number:#06x}" if hexadecimal and 0 <= number < 1 << 64 else shown(number)
+        raise NotAllowed(f"{what} {said} is out of range; allowed is {allowed}")
     return number
 
 
@@ -59,11 +63,11 @@ def number(what: str, value: object, low: float, high: float = math.inf, *, abov
     allowed = f"{'more than ' if above else ''}{low:g}" + ("" if math.isinf(high) else f"..{high:g}")
     allowed += " or more" if math.isinf(high) and not above else ""
     if isinstance(value, (bool, str, bytes)):
-        raise NotAllowed(f"{what} {value!r} is not a number; allowed is {allowed}")
+        raise NotAllowed(f"{what} {shown(value)} is not a number; allowed is {allowed}")
     try:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise NotAllowed(f"{what} {value!r} is not a number; allowed is {allowed}") from None
+        raise NotAllowed(f"{what} {shown(value)} is not a number; allowed is {allowed}") from None
     if not math.isfinite(result) or not low <= result <= high or (above and result == low):
         raise NotAllowed(f"{what} {value} is out of range; allowed is {allowed}")
     return result
@@ -73,7 +77,7 @@ def flag(what: str, value: object) -> bool:
     """*value*, if it is True or False."""
     if isinstance(value, bool):
         return value
-    raise NotAllowed(f"{what} {value!r} is neither True nor False")
+    raise NotAllowed(f"{what} {shown(value)} is neither True nor False")
 
 
 def one_of(what: str, value: object, allowed: Sequence[str]) -> str:
@@ -81,7 +85,32 @@ def one_of(what: str, value: object, allowed: Sequence[str]) -> str:
     if isinstance(value, str) and value in allowed:
         return value
     hint = closest(value, allowed) if isinstance(value, str) else ""
-    raise NotAllowed(f"{what} {value!r} is unknown; allowed is {', '.join(allowed)}{hint}")
+    raise NotAllowed(f"{what} {shown(value)} is unknown; allowed is {', '.join(allowed)}{hint}")
+
+
+def path(what: str, value: object) -> str:
+    """*value* as the text of a path, if the system can be handed it. Whether it leads anywhere is not looked at."""
+    try:
+        text = os.fspath(value)  # type: ignore[call-overload]
+        if isinstance(text, str) and text.strip() and "\0" not in text:
+            os.fsencode(text)
+            return text
+    except (TypeError, UnicodeError):
+        pass
+    raise NotAllowed(f"{what} {shown(value)} is no path")
+
+
+def digits(text: str) -> int | None:
+    """The number that *text* writes in digits, or None. Thousands of them are no number that anybody means."""
+    return int(text) if text.isdecimal() and len(text) <= _MOST_DIGITS else None
+
+
+def shown(value: object) -> str:
+    """*value* as Python shows it; a number that it refuses to show, by its size."""
+    try:
+        return repr(value)
+    except ValueError:
+        return f"of {value.bit_length()} bits" if isinstance(value, int) else f"of type {type(value).__name__}"
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -54,8 +54,11 @@ def facts(
     """What the system tells of *port*; nothing is opened or sent.
 
     *by_id* and *tty_class* stand for `/dev/serial/by-id` and `/sys/class/tty`.
+
+    Raises:
+        NotAllowed: It is no path.
     """
-    return PortFacts(**_native.port_facts(port, by_id=by_id, tty_class=tty_class))
+    return PortFacts(**_native.port_facts(checks.path("port", port), by_id=by_id, tty_class=tty_class))
 
 
 def resolve(port: object, line: SerialFormat) -> Any:
@@ -74,8 +77,8 @@ def resolve(port: object, line: SerialFormat) -> Any:
     if callable(getattr(port, "read", None)) and callable(getattr(port, "write", None)):
         return port
     raise NotAllowed(
-        f"port {port!r} is no port; give a path (/dev/ttyUSB0, COM3), a URL (socket://host:port, sim://gd350), "
-        "a Simulator, or an open serial.Serial"
+        f"port {checks.shown(port)} is no port; give a path (/dev/ttyUSB0, COM3), a URL (socket://host:port, "
+        "sim://gd350), a Simulator, or an open serial.Serial"
     )
 
 
@@ -97,6 +100,10 @@ def format_of(port: object, asked: SerialFormat) -> SerialFormat:
 def _resolve_text(port: str, line: SerialFormat) -> Any:
     if not port.strip() or "\0" in port:
         raise NotAllowed(f"port {port!r} is no port; give a path such as /dev/ttyUSB0 or COM3, or a URL")
+    try:
+        port.encode()
+    except UnicodeError:
+        raise NotAllowed(f"port {port!r} is not in UTF-8, and no port can be called that") from None
     scheme, separator, _ = port.partition("://")
     if not separator or scheme in _CORE_SCHEMES:
         return port
@@ -119,7 +126,8 @@ def _open_pyserial(url: str, line: SerialFormat) -> Any:
             bytesize=line.bytesize,
             timeout=0,
         )
-    except (serial.SerialException, ValueError, OSError) as error:
+    except Exception as error:
+        # What somebody's module for a scheme makes of a URL that it does not understand, it says in its own way.
         raise PortError(f"{url} could not be opened: {error}") from error
 
 
@@ -134,11 +142,12 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
     for part in body.strip("/").split(","):
         left, equals, right = part.partition("=")
         unit, family = (left, right) if equals else ("1", left)
-        if not unit.isdecimal():
+        number = checks.digits(unit)
+        if number is None:
             raise NotAllowed(f"unit {unit!r} in {url!r} is not a whole number; allowed is 1..247, as in sim://1=gd350")
-        if int(unit) in units:
+        if number in units:
             raise NotAllowed(f"unit {unit} stands twice in {url!r}; give each unit once, as in sim://1=gd350,2=gd350")
-        units[checks.unit(int(unit))] = checks.one_of("profile", family, profiles())
+        units[checks.unit(number)] = checks.one_of("profile", family, profiles())
     options = {"clock": "real", "seed": "0", "strict_silence": "0", "echo": "0"}
     faults: dict[str, float] = {}
     for key, value in parse_qsl(query, keep_blank_values=True):
@@ -147,7 +156,8 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
             faults["all" if key == "faults" else key] = _share(key, value, url)
         else:
             options[key] = value
-    if not options["seed"].isdecimal():
+    seed = checks.digits(options["seed"])
+    if seed is None:
         raise NotAllowed(f"seed {options['seed']!r} in {url!r} is not a whole number; allowed is 0 or more")
     return Simulator(
         units,
@@ -156,7 +166,7 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
         stopbits=line.stopbits,
         bytesize=line.bytesize,
         silence=line.silence,
-        seed=int(options["seed"]),
+        seed=seed,
         transport="process",
         clock=options["clock"],
         strict_silence=_is_on("strict_silence", options["strict_silence"]),

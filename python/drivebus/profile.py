@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from drivebus import _native, checks
@@ -62,11 +61,14 @@ class Profile:
             return profile
         if isinstance(profile, str) and profile.strip():
             # A shipped name comes first: what a command means must not depend on the folder one happens to be in.
-            is_folder = profile not in profiles() and (os.sep in profile or Path(profile).is_dir())
+            there = os.path.isdir(profile)  # noqa: PTH112 - Path raises where a name is too long
+            is_folder = profile not in profiles() and (os.sep in profile or there)
             return cls.load(profile) if is_folder else cls.builtin(profile)
         if isinstance(profile, os.PathLike):
             return cls.load(profile)
-        raise NotAllowed(f"profile {profile!r} is none; give a name ({', '.join(profiles())}), a folder, or a Profile")
+        raise NotAllowed(
+            f"profile {checks.shown(profile)} is none; give a name ({', '.join(profiles())}), a folder, or a Profile"
+        )
 
     @property
     def name(self) -> str:

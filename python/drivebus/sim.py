@@ -193,8 +193,10 @@ class Simulator:
             raise NotAllowed(
                 f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
             )
-        if link is not None and transport != "pty":
-            raise NotAllowed(f'link {os.fspath(link)!r} leads to a pseudo-terminal: it needs transport "pty"')
+        if link is not None:
+            link = checks.path("link", link)
+            if transport != "pty":
+                raise NotAllowed(f'link {link!r} leads to a pseudo-terminal: it needs transport "pty"')
         _check_units(units)
         rates = check_faults(faults or {}, transport)
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)

@@ -189,14 +189,16 @@ def guessed(tmp_path: Path) -> Profile:
     head = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source"
     row = "0x2103,identification_code,What it is,,1,no,,,,ro,assumed,A sister has it there.,notes"
     (tmp_path / "registers.csv").write_text(f"{head}\n{row}\n")
-    (tmp_path / "profile.toml").write_text('name = "ours"\nversion = 1\nsource = "notes"\n[overlay]\nprofile = "gd350"\n')
+    (tmp_path / "profile.toml").write_text(
+        'name = "ours"\nversion = 1\nsource = "notes"\n[overlay]\nprofile = "gd350"\n'
+    )
     return Profile.load(tmp_path)
 
 
 @pytest.mark.parametrize("drive_trusts", [False, True])
 @pytest.mark.parametrize("call_trusts", [False, True])
 def test_who_it_is_is_asked_with_the_trust_of_the_call(
-    virtual: Simulator, virtual_bus: Bus, guessed: Profile, drive_trusts: bool, call_trusts: bool
+    virtual_bus: Bus, guessed: Profile, drive_trusts: bool, call_trusts: bool
 ) -> None:
     drive = virtual_bus.drive(1, guessed, unverified=drive_trusts)
     trusts = drive_trusts or call_trusts

@@ -147,6 +147,7 @@ impl Link {
         name.push(format!(".{}", std::process::id()));
         let new = self.path.with_file_name(name);
         symlink(target, &new).and_then(|()| fs::rename(&new, &self.path)).map_err(|error| {
+            let _ = fs::remove_file(&new); // where it was made, and leads nowhere that anybody asked for
             io::Error::new(error.kind(), format!("the link {} cannot be made: {error}", self.path.display()))
         })
     }

@@ -8,10 +8,22 @@ from pathlib import Path
 
 from drivebus.errors import NotAllowed
 
-__all__ = ["part_of", "read", "remove", "write"]
+__all__ = ["is_there", "part_of", "read", "remove", "write"]
 
 _MOST = 1 << 20
 """Bytes a backup may have: some ten thousand parameters."""
+
+
+def is_there(path: Path) -> bool:
+    """Whether *path* leads to anything.
+
+    Raises:
+        NotAllowed: The system cannot tell: the path is too long, for one.
+    """
+    try:
+        return path.exists()
+    except (OSError, ValueError) as error:
+        raise NotAllowed(f"{path} cannot be looked at: {_reason(error)}") from None
 
 
 def read(path: Path) -> bytes:

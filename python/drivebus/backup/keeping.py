@@ -183,6 +183,6 @@ class Keeping(Parameters):
 
 def _path(path: object) -> Path:
     """*path*, if it can be that of a file."""
-    if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
-        raise NotAllowed(f"{path!r} is neither a backup nor the path of a file")
-    return Path(path)
+    if not isinstance(path, (str, os.PathLike)) or not isinstance(os.fspath(path), str) or not Path(path).name:
+        raise NotAllowed(f"{checks.shown(path)} is neither a backup nor the path of a file")
+    return Path(checks.path("file", path))

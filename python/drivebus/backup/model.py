@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from drivebus import checks
 from drivebus.backup import disk, parse, text
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
@@ -116,7 +117,7 @@ class Backup(Mapping[str, Value]):
             NotAllowed: The file is no backup, or lines in it are wrong: the message names every one of them, with what
                 is wrong and the closest name.
         """
-        path = Path(path)
+        path = Path(checks.path("file", path))
         found = parse.parse(path, disk.read(path), _shipped if profile is None else _meant_by(profile))
         return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete, told=found.told)
 
@@ -169,7 +170,7 @@ class Backup(Mapping[str, Value]):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file, whole or not at all: what was there before is there until the new one is."""
-        disk.write(Path(path), self.text())
+        disk.write(Path(checks.path("file", path)), self.text())
 
     def text(self) -> str:
         """What stands in the file: sorted, one parameter a line."""

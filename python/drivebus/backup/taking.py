@@ -134,9 +134,9 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
 
 def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
-    if path.exists() and not path.is_file():
+    if disk.is_there(path) and not path.is_file():
         raise NotAllowed(f"{path} is no file, and a backup cannot take its place; nothing was read")
-    if force or not path.exists():
+    if force or not disk.is_there(path):
         return
     try:
         others = Backup.load(path, drive.profile).origin.other(origin, unit=True)
@@ -156,7 +156,7 @@ def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> Non
 
 def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
     """What was read before a break, if it was read of this drive."""
-    if not part.exists():
+    if not disk.is_there(part):
         return None
     try:
         before = Backup.load(part, drive.profile)

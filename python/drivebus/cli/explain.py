@@ -149,7 +149,7 @@ def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:
     """
     words = text.lower().split()
     for means in (
-        lambda fault: text.isdecimal() and fault.code == int(text),
+        lambda fault: str(fault.code) == (text.lstrip("0") or "0"),
         lambda fault: fault.mnemonic == text,
         lambda fault: fault.mnemonic.lower() == text.lower(),
         lambda fault: all(word in f"{fault.mnemonic} {fault.label} {fault.cause}".lower() for word in words),

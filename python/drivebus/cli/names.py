@@ -95,7 +95,7 @@ def parse_units(text: str) -> list[int]:
     """Units of a text such as `1-31,40`."""
     units: list[int] = []
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        match = re.fullmatch(r"\s*(\d{1,20})\s*(?:-\s*(\d{1,20})\s*)?", part)
         if match is None:
             raise click.UsageError(f"{part!r} is no unit address; write 1-247, or a list such as 1-31,40")
         first, last = int(match[1]), int(match[2] or match[1])

@@ -103,11 +103,11 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
     base = like or overlay
     if base is not None:
         drivebus.Profile.builtin(base)
-    written = skeleton.files(folder.resolve().name, like=like, overlay=overlay)
-    there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
-    if there:
-        raise click.UsageError(f"{folder} has {', '.join(there)} already; nothing was written")
     try:
+        written = skeleton.files(folder.resolve().name, like=like, overlay=overlay)
+        there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
+        if there:
+            raise click.UsageError(f"{folder} has {', '.join(there)} already; nothing was written")
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in written.items():
             with (folder / name).open("x", encoding="utf-8", newline="\n") as file:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, cast
 
 import click
@@ -152,7 +152,7 @@ class Session:
         if silent is not None and silent.unit and self.port is not None:
             click.echo(f"What may be wrong: `{self.doctor(silent.unit)}`", err=True)
 
-        if self.profile and Path(self.profile).is_dir():
+        if self.profile and os.path.isdir(self.profile):  # noqa: PTH112 - Path raises where a name is too long
             problems = len(drivebus.Profile.check(self.profile))
             if problems > 1:
                 click.echo(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`", err=True)

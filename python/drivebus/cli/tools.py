@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import threading
 
@@ -95,7 +96,7 @@ def _simulated(text: str) -> dict[int, str]:
     units: dict[int, str] = {}
     for part in text.split(","):
         unit, equals, family = part.strip().partition("=")
-        if not equals or not unit.isdecimal():
+        if not equals or re.fullmatch(r"\d{1,20}", unit) is None:
             raise click.UsageError(f"{part!r} is no simulated drive; write UNIT=FAMILY, such as 1=gd350")
         if int(unit) in units:
             raise click.UsageError(f"unit {unit} is given twice; give each unit once, such as 1=gd350,2=gd350")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from typing import Any
 
@@ -63,6 +64,12 @@ class Place(click.Path):
         """*value* as a path."""
         if not str(value).strip():
             self.fail("an empty text is no path.", parameter, context)
+        try:
+            nameless = b"\0" in os.fsencode(value)
+        except UnicodeError:
+            nameless = True
+        if nameless:
+            self.fail(f"{str(value)!r} is no path.", parameter, context)
         return super().convert(value, parameter, context)
 
 
