@@ -7,7 +7,8 @@ import io
 import os
 import sys
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import click
 import drivebus
 from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools, watch
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
-from drivebus.cli.output import Output, printable
+from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
 from drivebus.cli.types import Whole
 
@@ -32,7 +33,7 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
     """A warning is one line as well: where in this program it came from helps nobody."""
     # Whoever has gone and reads it no more must not keep a stop from being sent.
     with suppress(OSError):
-        click.echo(printable(f"Warning: {message}"), err=True)
+        remark(f"Warning: {message}")
 
 
 def _forget_what_is_not_shown() -> None:
@@ -41,8 +42,23 @@ def _forget_what_is_not_shown() -> None:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
+@contextmanager
+def _quoted_as_letters() -> Iterator[None]:
+    """What click quotes of words that are wrong, it shows as it was typed."""
+    try:
+        yield
+    except click.ClickException as error:
+        error.message = printable(error.message)  # type: ignore[misc]  # it is shown later, by click itself
+        raise
+
+
 class _Commands(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        """Takes the words before the command."""
+        with _quoted_as_letters():
+            return super().make_context(*args, **extra)
 
     def invoke(self, context: click.Context) -> Any:
         """Runs the command."""
@@ -50,7 +66,8 @@ class _Commands(click.Group):
             with warnings.catch_warnings():
                 warnings.simplefilter("always", drivebus.DrivebusWarning)
                 warnings.showwarning = _warn
-                return super().invoke(context)
+                with _quoted_as_letters():
+                    return super().invoke(context)
         except drivebus.DrivebusError as error:
             tell(error)
             if isinstance(context.obj, Session):
@@ -59,13 +76,13 @@ class _Commands(click.Group):
         except KeyboardInterrupt as error:
             # What click makes of it, 1, would read as a difference.
             for line in ("Interrupted.", *getattr(error, "__notes__", ())):
-                click.echo(printable(line), err=True)
+                remark(line)
             context.exit(130)
         except OSError as error:
             # A reader that has gone ends the command in silence: click sees to that.
             if error.errno == errno.EPIPE:
                 raise
-            click.echo(printable(f"Error: what was done cannot be shown: {error.strerror or error}"), err=True)
+            remark(f"Error: what was done cannot be shown: {error.strerror or error}")
             _forget_what_is_not_shown()
             context.exit(1)
 

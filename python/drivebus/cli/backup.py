@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import drivebus
 from drivebus.cli.names import complete_group
-from drivebus.cli.output import show
+from drivebus.cli.output import remark, show
 from drivebus.cli.session import Session, pass_session, yes_option
 from drivebus.cli.types import Place
 
@@ -107,7 +107,7 @@ def restore(
     if not plan.ok:
         failed = sum(item.failed for item in plan)
         were = "would not be" if dry_run else "was not" if failed == 1 else "were not"
-        click.echo(f"{failed} parameter{'' if failed == 1 else 's'} {were} restored: see above.", err=True)
+        remark(f"{failed} parameter{'' if failed == 1 else 's'} {were} restored: see above.")
         raise click.exceptions.Exit(1)
 
 
@@ -162,10 +162,9 @@ def _load(session: Session, file: Path) -> drivebus.Backup:
     kept = drivebus.Backup.load(file, profile)
     version, now = kept.origin.profile_version, kept.profile.version
     if kept.origin.profile == kept.profile.name and version not in (0, now):
-        click.echo(
+        remark(
             f"{file} was read with version {version} of the profile {kept.profile.name}, and this is version {now}: "
-            "its values are taken as this one means them.",
-            err=True,
+            "its values are taken as this one means them."
         )
     return kept
 
@@ -218,10 +217,7 @@ def _progress(session: Session, what: str) -> Iterator[Callable[[int, int], None
         def progress(done: int, total: int) -> None:
             nonlocal first
             if first and done and what == "reading":
-                click.echo(
-                    f"Going on where it was: {show(done)} of {show(total)} are there. `--fresh` reads them again.",
-                    err=True,
-                )
+                remark(f"Going on where it was: {show(done)} of {show(total)} are there. `--fresh` reads them again.")
             first = False
             bar.update(task, completed=done, total=total)
 

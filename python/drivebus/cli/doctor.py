@@ -10,7 +10,7 @@ from click.core import ParameterSource
 from rich.status import Status
 
 import drivebus
-from drivebus.cli.output import Output
+from drivebus.cli.output import Output, show
 from drivebus.cli.session import EXIT_CODES, Session, parse_format, pass_session
 from drivebus.cli.types import Seconds, Whole
 
@@ -71,7 +71,7 @@ def doctor(
             rs485=session.direction,
             profile=session.profile,
             unverified=session.unverified,
-            tell=status.update if status is not None else None,
+            tell=(lambda text: status.update(show(text))) if status is not None else None,
         )
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.
         with closing(findings):

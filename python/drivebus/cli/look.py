@@ -9,7 +9,7 @@ from rich.progress import Progress
 
 import drivebus
 from drivebus.cli import names, rules
-from drivebus.cli.output import Output
+from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, exit_code, pass_session, profile_of, tell
 from drivebus.cli.types import Seconds
 
@@ -47,10 +47,9 @@ def scan(session: Session, units: str, timeout: float | None) -> None:
                 _show_found(session, found)
             progress.advance(task)
     if not count:
-        click.echo(
+        remark(
             "Error: no unit answered. Check wiring (A/B), baud rate and format (factory setting of a Goodrive: "
-            f"19200 8E1, unit 1). Or let `{session.doctor()}` look.",
-            err=True,
+            f"19200 8E1, unit 1). Or let `{session.doctor()}` look."
         )
         raise click.exceptions.Exit(3)
 
@@ -109,9 +108,9 @@ def info(session: Session) -> None:
             }
         )
         if against is not None:
-            click.echo(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.", err=True)
+            remark(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.")
         elif found.candidates and profile.family not in found.candidates:
-            click.echo(f"It is treated as {profile.family}, and does not say that it is one.", err=True)
+            remark(f"It is treated as {profile.family}, and does not say that it is one.")
         if not len(control):
             out.say("What makes it obey the bus is not known.")
             return

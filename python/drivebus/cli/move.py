@@ -10,7 +10,7 @@ import click
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.output import printable
+from drivebus.cli.output import remark
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
 from drivebus.cli.types import Hertz, Seconds
 
@@ -195,16 +195,15 @@ def _word(drive: drivebus.Drive, place: int, value: float | str, force: bool) ->
 def _say_kept(names: list[str]) -> None:
     """Says that *names* were not stored, because they have their values: where from, a drive does not tell."""
     if names:
-        click.echo(
+        remark(
             f"{', '.join(names)}: the value was there already, so EEPROM was not written. If it came from an earlier "
-            "write to RAM, it is lost with power: switch the drive off and on, then store again.",
-            err=True,
+            "write to RAM, it is lost with power: switch the drive off and on, then store again."
         )
 
 
 def _say_lost(text: str) -> None:
     """Says that something was done, and that the drive does not tell what came of it."""
-    click.echo(printable(text), err=True)
+    remark(text)
 
 
 def _done(session: Session, drive: drivebus.Drive, command: str) -> None:

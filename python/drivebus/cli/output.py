@@ -1,13 +1,19 @@
-"""Results on standard output: tables for people, one JSON object a line for programs."""
+"""What reaches a terminal: results as tables for people or one JSON object a line for programs, and remarks.
+
+Text comes from anywhere: from folders, profiles, adapters and drives. Everything goes out through here, and what a
+terminal would obey comes out as letters. rich and click were looked at for that: rich takes away a few characters and
+lets ESC pass, click takes away the sequences it knows, and only where there is no terminal.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from typing import Any
 
+import click
 from rich.console import Console
 from rich.markup import escape
 from rich.measure import Measurement
@@ -15,7 +21,7 @@ from rich.table import Table
 
 import drivebus
 
-__all__ = ["Output", "plain", "printable", "show"]
+__all__ = ["Output", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -46,7 +52,9 @@ class Output:
     def record(self, values: Mapping[str, Any]) -> None:
         """One JSON object."""
         told = {key: plain(value) for key, value in values.items()}
-        print(json.dumps(told, ensure_ascii=not _takes_everything(sys.stdout.encoding)), flush=True)
+        text = json.dumps(told, ensure_ascii=not _takes_everything(sys.stdout.encoding))
+        # Of what a terminal obeys, JSON has to escape the least part.
+        print(_replaced(text, lambda letter: json.dumps(letter)[1:-1]), flush=True)
 
     def say(self, text: str) -> None:
         """A line for people; nothing in JSON."""
@@ -66,7 +74,7 @@ class Output:
         table = Table.grid(padding=(0, 2))
         for name, value in values.items():
             if value is not None and value != "":
-                table.add_row(name.replace("_", " "), show(value))
+                table.add_row(show(name.replace("_", " ")), show(value))
         self.console.print(table)
 
     def rows(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -135,5 +143,15 @@ def show(value: Any) -> str:
 
 
 def printable(text: str) -> str:
-    """*text* without what would do something to a terminal; a profile may come from anywhere."""
-    return "".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text)
+    """*text* without what would do something to a terminal; each such letter as Python writes it."""
+    return _replaced(text, lambda letter: letter if letter == "\n" else repr(letter)[1:-1])
+
+
+def remark(text: str = "") -> None:
+    """A line on standard error: what is no result."""
+    click.echo(printable(text), err=True)
+
+
+def _replaced(text: str, shown: Callable[[str], str]) -> str:
+    """*text* with what is not printable as *shown* says."""
+    return text if text.isprintable() else "".join(each if each.isprintable() else shown(each) for each in text)

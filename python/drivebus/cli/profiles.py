@@ -10,6 +10,7 @@ import click
 import drivebus
 from drivebus.cli import rules, skeleton
 from drivebus.cli.names import complete_profile
+from drivebus.cli.output import remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.types import Place
 
@@ -78,7 +79,7 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
             session.out.say(_placed(problem))
     if problems:
         some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        click.echo(f"Error: {folder} has {some}; nothing of it is used until it has none.", err=True)
+        remark(f"Error: {folder} has {some}; nothing of it is used until it has none.")
         context.exit(2)
     counts = drivebus.Profile.load(folder).counts()
     totals = {kind: counts[kind]["total"] for kind in KINDS}

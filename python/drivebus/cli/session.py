@@ -14,7 +14,7 @@ from typing import Any, cast
 import click
 
 import drivebus
-from drivebus.cli.output import Output, printable
+from drivebus.cli.output import Output, remark
 
 __all__ = [
     "DEFAULT_BAUD",
@@ -115,12 +115,11 @@ class Session:
             try:
                 drive = self.drive_on(bus)
             except drivebus.DrivebusError:
-                click.echo(
+                remark(
                     f"Unit {self.unit} was not told to {command}: the code for that depends on the family, and it did "
                     f"not say which it is. If you know: drivebus --profile FAMILY … {command}, which asks it nothing "
                     f"first (or set DRIVEBUS_PROFILE); families: {', '.join(drivebus.profiles())}. "
-                    "If it has to stand now, use the emergency stop.",
-                    err=True,
+                    "If it has to stand now, use the emergency stop."
                 )
                 raise
             yield drive
@@ -150,12 +149,12 @@ class Session:
         silent = next((each for each in errors if isinstance(each, (drivebus.NoAnswer, drivebus.BadAnswer))), None)
         # A frame that is only taken apart came from nobody.
         if silent is not None and silent.unit and self.port is not None:
-            click.echo(f"What may be wrong: `{self.doctor(silent.unit)}`", err=True)
+            remark(f"What may be wrong: `{self.doctor(silent.unit)}`")
 
         if self.profile and os.path.isdir(self.profile):  # noqa: PTH112 - Path raises where a name is too long
             problems = len(drivebus.Profile.check(self.profile))
             if problems > 1:
-                click.echo(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`", err=True)
+                remark(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`")
 
     def doctor(self, unit: int | None = None) -> str:
         """The command that looks at the same line, and at *unit*."""
@@ -180,7 +179,7 @@ class Session:
 
     def ask(self, what: str, yes: bool, unit: int | None = None) -> None:
         """Says that *what* moves the motor of *unit* (None: the one of the options), and goes on only if wanted."""
-        click.echo(f"{what} (unit {unit or self.unit} on {self.port}).", err=True)
+        remark(f"{what} (unit {unit or self.unit} on {self.port}).")
         if yes:
             return
         # Who closed standard input has none at all.
@@ -189,7 +188,7 @@ class Session:
         try:
             wanted = click.confirm("Is the machine clear, and shall it be done?", err=True)
         except click.Abort:
-            click.echo(err=True)
+            remark()
             wanted = False
         if not wanted:
             raise _Declined("nothing was written")
@@ -235,4 +234,4 @@ def tell(error: drivebus.DrivebusError, about: str = "") -> None:
     """Says *error* on standard error; *about* is what it is the error of, where it was one of several."""
     # Notes say what was done before; Python 3.10 has none.
     for line in (f"Error: {about + ': ' if about else ''}{error}", *getattr(error, "__notes__", ())):
-        click.echo(printable(line), err=True)
+        remark(line)

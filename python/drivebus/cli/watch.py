@@ -13,7 +13,7 @@ from rich.text import Text
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.output import Output, printable
+from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import Session, exit_code, pass_session
 from drivebus.cli.types import Seconds, Whole
 
@@ -61,7 +61,7 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
             except KeyboardInterrupt:
                 interrupted = True
     for text in seen.told(poll, interval):
-        click.echo(text, err=True)
+        remark(text)
     if seen.last is not None and seen.missing == seen.count:
         session.advise(seen.last)
         raise click.exceptions.Exit(exit_code(seen.last))
