@@ -340,7 +340,7 @@ class Profile:
     def max_words(self) -> int:
         """Most words in one read or write."""
     def role(self, role: str, /) -> str | None:
-        """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `identification`, `setpoints.torque`."""
+        """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `deceleration`, `setpoints.torque` …"""
     def status_words(self) -> list[str]:
         """The words whose bit fields tell more of the state."""
     def reports_as(self) -> list[str]:
@@ -416,6 +416,8 @@ class Profile:
         """Whether a write to *address* can move a motor."""
     def state(self, raw: int, /) -> str:
         """State word 1 as `forward`, `reverse`, `stopped`, `fault`, `power_off`, `pre_exciting` or `unknown`."""
+    def is_in_fault(self, raw: int, /) -> bool:
+        """Whether state word 1 says that the drive is in fault, which it may run in."""
     def state_reason(self) -> str | None:
         """Why the states are not verified."""
     def control(self) -> list[dict[str, Any]]:

@@ -157,7 +157,8 @@ class Profile:
         """The register with a role that every family has under some name; None where it is not known.
 
         Roles are `"state"`, `"fault"` (the present one), `"frequency"` (at the output), `"setpoint"` (the frequency in
-        force), `"identification"`, and for each of `setpoint_names` one such as `"setpoints.torque"`.
+        force), `"deceleration"` (the time of a stop's ramp) and `"ramp_start"` (the frequency it is counted from),
+        `"identification"`, and for each of `setpoint_names` one such as `"setpoints.torque"`.
         """
         return self._native.role(role)
 
@@ -264,6 +265,10 @@ class Profile:
     def state(self, raw: int, /) -> str:
         """The state word by name."""
         return self._native.state(raw)
+
+    def is_in_fault(self, raw: int, /) -> bool:
+        """Whether the state word says that the drive is in fault, which it may run in."""
+        return self._native.is_in_fault(raw)
 
     def state_reason(self) -> str | None:
         """Why the states are not verified; None where they are, or where the family has no state word."""

@@ -219,6 +219,9 @@ class ProfileProtocol(Protocol):
     def state(self, raw: int, /) -> str:
         """The first status word by name."""
 
+    def is_in_fault(self, raw: int, /) -> bool:
+        """Whether the first status word says that the drive is in fault, which it may run in."""
+
     def state_reason(self) -> str | None:
         """Why the states may not be used unless it is said that they may; None if they may."""
 

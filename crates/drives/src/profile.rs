@@ -271,6 +271,11 @@ impl Profile {
         self.state.as_ref().map_or(State::Unknown, |word| word.state(raw))
     }
 
+    /// Whether the state word `raw` says that the drive is in fault, which it may run in.
+    pub fn is_in_fault(&self, raw: u16) -> bool {
+        self.state.as_ref().is_some_and(|word| word.is_in_fault(raw))
+    }
+
     /// What must be set before the drive obeys the bus, in order.
     pub fn control(&self) -> &[Control] {
         &self.control

@@ -11,14 +11,24 @@ pub(crate) struct Roles {
     pub(crate) fault: Option<String>,
     pub(crate) frequency: Option<String>,
     pub(crate) setpoint: Option<String>,
+    /// The time that the ramp of a stop takes to 0 Hz, and the frequency that it is counted from.
+    pub(crate) deceleration: Option<String>,
+    pub(crate) ramp_start: Option<String>,
     /// The words whose bit fields tell more of the state.
     pub(crate) status_words: Vec<String>,
 }
 
 impl Roles {
     /// The roles that one register each has.
-    pub(crate) fn single_mut(&mut self) -> [&mut Option<String>; 4] {
-        [&mut self.identification, &mut self.fault, &mut self.frequency, &mut self.setpoint]
+    pub(crate) fn single_mut(&mut self) -> [&mut Option<String>; 6] {
+        [
+            &mut self.identification,
+            &mut self.fault,
+            &mut self.frequency,
+            &mut self.setpoint,
+            &mut self.deceleration,
+            &mut self.ramp_start,
+        ]
     }
 }
 
@@ -39,14 +49,17 @@ impl Profile {
     }
 
     /// The entry that has a role: `"state"`, `"fault"` (the present one), `"frequency"` (at the output), `"setpoint"`
-    /// (the frequency in force), `"identification"`, or a [setpoint](Setpoint), `"setpoints.torque"`. `None` where the
-    /// family has none, or none is known, or nothing has such a role.
+    /// (the frequency in force), `"deceleration"` (the time that the ramp of a stop takes to 0 Hz) and `"ramp_start"` (the
+    /// frequency that it is counted from), `"identification"`, or a [setpoint](Setpoint), `"setpoints.torque"`. `None`
+    /// where the family has none, or none is known, or nothing has such a role.
     pub fn role(&self, role: &str) -> Option<&Entry> {
         let name = match role {
             "state" => self.state.as_ref().map(|state| &state.register),
             "fault" => self.roles.fault.as_ref(),
             "frequency" => self.roles.frequency.as_ref(),
             "setpoint" => self.roles.setpoint.as_ref(),
+            "deceleration" => self.roles.deceleration.as_ref(),
+            "ramp_start" => self.roles.ramp_start.as_ref(),
             "identification" => self.roles.identification.as_ref(),
             _ => {
                 let wanted = role.strip_prefix("setpoints.")?;

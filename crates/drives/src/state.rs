@@ -26,6 +26,16 @@ pub enum State {
 }
 
 impl State {
+    /// Whether the drive feeds the motor with the aim of turning it.
+    pub const fn is_running(self) -> bool {
+        matches!(self, Self::Forward | Self::Reverse)
+    }
+
+    /// Whether the drive feeds the motor nothing.
+    pub const fn is_at_rest(self) -> bool {
+        matches!(self, Self::Stopped | Self::Fault | Self::PowerOff)
+    }
+
     /// Its name in profiles and programs: `forward`, `power_off` …
     pub const fn name(self) -> &'static str {
         match self {
@@ -46,7 +56,7 @@ impl State {
 pub struct StateWord {
     /// The register's name.
     pub register: String,
-    /// Which words mean which state; the first that fits holds.
+    /// Which words mean which state: of those that fit, one that runs, else the first.
     pub rules: Vec<StateRule>,
     /// Whether a document of this family prints it.
     pub verified: bool,
@@ -70,7 +80,41 @@ pub struct StateRule {
 
 impl StateWord {
     /// What the word `raw` means.
+    ///
+    /// A motor that runs is told as running, whatever else the word says of the drive: some run on in a fault. So a fault
+    /// is no rest either where its own bits say nothing of running, and the others are those of a motor that runs.
     pub fn state(&self, raw: u16) -> State {
-        self.rules.iter().find(|rule| raw & rule.mask == rule.value).map_or(State::Unknown, |rule| rule.state)
+        let mut fitting = self.rules.iter().filter(|rule| rule.fits(raw));
+        if let Some(running) = fitting.clone().find(|rule| rule.state.is_running()) {
+            return running.state;
+        }
+        match fitting.next() {
+            Some(rule) if rule.state.is_at_rest() && self.may_run(raw, rule) => State::Unknown,
+            Some(rule) => rule.state,
+            None => State::Unknown,
+        }
+    }
+
+    /// Whether the word `raw` says that the drive is in fault, which it may run in.
+    pub fn is_in_fault(&self, raw: u16) -> bool {
+        self.rules.iter().any(|rule| rule.state == State::Fault && rule.fits(raw))
+    }
+
+    /// Whether `raw`, of which `rule` says that the motor rests, has the bits by which a running motor is told
+    /// from a stopped one. Bits of the rule itself do not count: where it fits, they mean what it says.
+    fn may_run(&self, raw: u16, rule: &StateRule) -> bool {
+        let of = |wanted: fn(State) -> bool| self.rules.iter().filter(move |rule| wanted(rule.state));
+        of(State::is_running).any(|running| {
+            of(|state| state == State::Stopped).any(|stopped| {
+                let telling = running.mask & stopped.mask & (running.value ^ stopped.value) & !rule.mask;
+                telling != 0 && raw & telling == running.value & telling
+            })
+        })
+    }
+}
+
+impl StateRule {
+    fn fits(&self, raw: u16) -> bool {
+        raw & self.mask == self.value
     }
 }

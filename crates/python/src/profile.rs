@@ -299,6 +299,12 @@ impl Profile {
         Ok(self.0.state(one_word("raw", raw)?).name())
     }
 
+    /// Whether the state word `raw` says that the drive is in fault, which it may run in.
+    #[pyo3(signature = (raw, /))]
+    fn is_in_fault(&self, raw: &Bound<'_, PyAny>) -> PyResult<bool> {
+        Ok(self.0.is_in_fault(one_word("raw", raw)?))
+    }
+
     /// Why the states are not verified; `None` where they are, or where there are none.
     fn state_reason(&self) -> Option<&str> {
         self.0.state_reason()

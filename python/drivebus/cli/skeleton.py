@@ -110,7 +110,7 @@ source = "Not read yet: the rule of most drives with codes such as P05.06"
 # stopped = 3
 # fault = 4
 #
-# … or as bits, the first that fits:
+# … or as bits; of those that fit, one that runs, else the first:
 # [[state.when]]
 # is = "fault"
 # fields = {{ fault = 1 }}
@@ -120,6 +120,11 @@ source = "Not read yet: the rule of most drives with codes such as P05.06"
 # fault = "fault_code"
 # frequency = "running_frequency"
 # setpoint = "set_frequency_actual"
+
+# The time that the ramp of a stop takes to 0 Hz, and the frequency that it is counted from.
+# [ramp]
+# deceleration = "P00.12"
+# start = "P00.03"
 
 # What must be set before the drive obeys the bus, in this order.
 # [[control]]

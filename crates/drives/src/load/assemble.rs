@@ -277,6 +277,26 @@ fn roles(file: &File, manifest: &Manifest, roles: &mut Roles, entries: &Entries,
         own(&status.setpoint, &mut roles.setpoint);
         roles.status_words = entries.names(file, &status.words, problems);
     }
+    if let Some(ramp) = &manifest.ramp {
+        roles.deceleration = in_unit(file, entries, &ramp.deceleration, "s", problems);
+        roles.ramp_start = in_unit(file, entries, &ramp.start, "Hz", problems);
+    }
+}
+
+/// The name of what is `wanted`, if it counts in `unit`.
+fn in_unit(
+    file: &File,
+    entries: &Entries,
+    wanted: &Placed<String>,
+    unit: &str,
+    problems: &mut Problems,
+) -> Option<String> {
+    let entry = entries.get(file, wanted, problems)?;
+    if entry.quantity.unit != unit || entry.quantity.decimals.is_none() {
+        let reason = format!("{} must be in {unit}, with a scale that is known", wanted.get_ref());
+        problems.add(file, line(file, wanted), reason);
+    }
+    Some(entry.name.clone())
 }
 
 fn lists(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entries, problems: &mut Problems) {

@@ -43,6 +43,7 @@ pub(super) struct Manifest {
     pub(super) commands: Option<Commands>,
     pub(super) state: Option<Placed<States>>,
     pub(super) status: Option<Status>,
+    pub(super) ramp: Option<Ramp>,
     /// What must be set before the drive obeys the bus, in this order.
     pub(super) control: Option<Vec<Placed<Control>>>,
     /// What can be given over the bus beside commands.
@@ -246,6 +247,17 @@ pub(super) struct Status {
     pub(super) frequency: Option<Placed<String>>,
     /// The frequency setpoint in force.
     pub(super) setpoint: Option<Placed<String>>,
+}
+
+/// The ramp along which a stop slows the motor down.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct Ramp {
+    /// The parameter with the time that it takes from `start` to 0 Hz.
+    pub(super) deceleration: Placed<String>,
+    /// The parameter with the frequency that this time is counted from.
+    pub(super) start: Placed<String>,
 }
 
 /// What `monitor` shows when it is not told what.
