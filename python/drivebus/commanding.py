@@ -124,7 +124,8 @@ class Commanding(Setpoints):
                 source = seen.source
                 if source not in (ControlSource.COMMUNICATION, None):
                     last += f", with commands from the {source}"
-                if seen.fault is not None and command != "reset_fault":
+                # A motor that was told to stop is looked at: some drives run on in a fault.
+                if seen.fault is not None and command not in (*HALTS, "reset_fault"):
                     break
             except (NoAnswer, BadAnswer, Refused) as error:
                 # A refusal here is one of a read: it says nothing about the command.

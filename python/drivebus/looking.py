@@ -29,6 +29,8 @@ class Seen(NamedTuple):
     fault: Fault | None
     time: float
     missing: Mapping[str, str]
+    in_fault: bool
+    """Whether the state word says that the drive is in fault. It may run all the same."""
 
     @property
     def source(self) -> ControlSource | None:
@@ -38,12 +40,14 @@ class Seen(NamedTuple):
 
     @property
     def tripped(self) -> bool:
-        """Whether the drive is in fault: by its state, or where that is not known by its fault number."""
-        return self.state is State.FAULT or ("state" in self.missing and self.fault is not None)
+        """Whether the drive is in fault: by its state word, or where that is not known by its fault number."""
+        return self.in_fault or ("state" in self.missing and self.fault is not None)
 
     def __str__(self) -> str:
         if "state" in self.missing:
             return f"state not known, {self.fault or ('fault not known' if 'fault' in self.missing else 'no fault')}"
+        if self.in_fault and self.state is not State.FAULT:
+            return f"{self.state}, in fault: {self.fault or 'not named'}"
         return f"{self.state}, {self.fault}" if self.fault else str(self.state)
 
 
@@ -81,7 +85,7 @@ class Looks(Registers):
         """As `look`; where nothing may be read, nothing is, and nothing is told."""
         look = self._planned_look()
         if look.plan is None:
-            return Seen(State.UNKNOWN, {}, None, 0.0, look.missing)
+            return Seen(State.UNKNOWN, {}, None, 0.0, look.missing, False)
         answers: list[list[int]] = []
         first = 0.0
         for address, count in look.plan.reads:
@@ -100,6 +104,7 @@ class Looks(Registers):
             self.profile.fault(fault) if fault else None,
             first,
             look.missing,
+            look.state is not None and self.profile.is_in_fault(values[look.state]),
         )
         self._remember(str(seen))
         return seen

@@ -7,15 +7,15 @@ never repeated. Success is what the drive's own state says afterwards; if that c
 from __future__ import annotations
 
 import math
-from contextlib import suppress
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from drivebus import checks
 from drivebus.commanding import Commanding
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
 from drivebus.falling import Fall
 from drivebus.looking import Seen
-from drivebus.values import ControlSource, State
+from drivebus.values import ControlSource, State, Value
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -28,6 +28,13 @@ two are, the next may be the one that stops the motor."""
 
 _LOOKS_TO_PROVE = 10
 """Looks at the state that prove a link in doubt: as many as `Link` counts, so that the old ones count no more."""
+
+
+class _Ramp(NamedTuple):
+    """How a drive is set to slow down: in Hz/s, None where that is not known; and whether only the bus tells it to."""
+
+    slope: float | None
+    only_by_bus: bool
 
 
 class Motion(Commanding):
@@ -104,11 +111,12 @@ class Motion(Commanding):
     async def stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
 
-        Returns when the drive is stopped, or its frequency falls and only the stop explains that; `wait_until_stopped`
-        waits for the end. Where the family has no state that may be used, when the drive has confirmed the command.
+        Returns after half a second and a hertz of the drive's own ramp, where a motor ran at its setpoint and only the bus
+        tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped` waits for
+        that in any case. Where the family has no state that may be used, when the drive has confirmed the command.
 
-        A frequency above the setpoint would fall without a stop as well, and so may one of a jog that caught a motor
-        which turned. Then this waits for as long as it falls, a minute at most, and beyond *confirm*.
+        A frequency that falls is looked at beyond *confirm*: for as long as it falls, and a minute at most, or where the
+        drive's ramp is known half as long again as that takes. A family without a frequency is looked at for *confirm*.
 
         It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
         seems deaf too. Sent once.
@@ -171,7 +179,7 @@ class Motion(Commanding):
             return
 
         async def shows(seen: Seen) -> bool:
-            return not seen.tripped if "state" in seen.missing else seen.state not in (State.FAULT, State.UNKNOWN)
+            return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
 
         await drive._command("reset_fault")
         await drive._confirm("reset_fault", shows, confirm)
@@ -229,9 +237,7 @@ class Motion(Commanding):
         self._ventured.update([command] if self.unverified else [])
         # Before it is sent: whoever is interrupted from here on has to end it.
         self._starts[0] += 1
-        jog = command.startswith("jog")
-        # Of a jog that is not looked at, nobody knows whether it caught a motor that turned faster.
-        self._jogged_from[:] = [math.inf] if jog else []
+        self._started_as[:] = [State.UNKNOWN if command.startswith("jog") else wanted]
         await self._command(command, setpoint)
 
         async def shows(seen: Seen) -> bool:
@@ -244,34 +250,37 @@ class Motion(Commanding):
             return now is not None and frequency is not None and now < frequency
 
         await self._confirm(command, shows, confirm)
-        if jog and confirm:
-            with suppress(*LINE_ERRORS, Refused):
-                begun = await self.output_frequency()
-                self._jogged_from[:] = [] if begun is None else [abs(begun)]
 
     async def _halt(self, command: str, confirm: float) -> None:
         confirm = checks.number("confirm", confirm, 0.0, 3600.0)
         drive = self._halting(command)
         drive._evidence.commands(command)
+        sent = drive.bus.now()
         await drive._command(command)
         if drive._evidence.without_state() is not None:
             return  # its confirmation is all there is
-        fall = Fall(drive.bus.now(), confirm)
+        fall = Fall(sent, drive.bus.now(), confirm)
+        told_by_others = command != "stop"  # what coasts has no ramp, and a jog is not at its setpoint
+        ramp: _Ramp | None = None
 
         async def shows(seen: Seen) -> bool:
+            nonlocal told_by_others, ramp
+            asked = drive.bus.now()
             if not seen.state.running:
-                return seen.state.at_rest
-            frequency, setpoint = await drive._frequencies(urgent=not fall.is_overdue(drive.bus.now()))
+                return seen.state.at_rest and fall.rests(asked)
+            fall.runs()
+            urgent = not fall.is_overdue(asked)
+            frequency, setpoint = await drive._frequencies(urgent=urgent)
             if frequency is None:
-                # No ramp can be seen, so the drive's confirmation is all there is; but what coasts does not run.
-                return command != "coast"
-            fall.see(frequency, drive.bus.now())
-            if command == "coast" or seen.source not in (ControlSource.COMMUNICATION, None):
                 return False
-            if drive._jogged_from:
-                # What rose to the jog frequency falls by a stop only.
-                return fall.began_above(drive._jogged_from[0]) and fall.proves(math.inf)
-            return fall.proves(setpoint)
+            fall.see(frequency, setpoint, asked, drive.bus.now())
+            elsewhere = seen.source not in (ControlSource.COMMUNICATION, None)
+            told_by_others |= elsewhere or drive._started_as not in ([], [seen.state])
+            if ramp is None and fall.is_worth_asking():
+                ramp = await drive._ramp(urgent=urgent)
+            if ramp is None or ramp.slope is None:
+                return False
+            return fall.goes_along(ramp.slope) and ramp.only_by_bus and not told_by_others
 
         await drive._confirm(command, shows, confirm, fall)
 
@@ -287,10 +296,31 @@ class Motion(Commanding):
             return None, math.inf
         if len({self.profile.describe(name).unit for name in known.values()}) > 1:
             del known["setpoint"]  # in percent, or rpm
-        plan = self.profile.compile(list(known.values()))
-        words = [await self.read_words(address, count, urgent=urgent) for address, count in plan.reads]
-        told = {role: abs(float(value)) for role, value in zip(known, plan.values(words), strict=True)}
+        values = await self._told(list(known.values()), urgent=urgent)
+        told = {role: abs(float(values[name])) for role, name in known.items()}
         return told["frequency"], told.get("setpoint", math.inf)
+
+    async def _ramp(self, *, urgent: bool) -> _Ramp:
+        """How a stop slows the motor down, and who else may, as the drive's parameters say it."""
+        time, start = self.profile.role("deceleration"), self.profile.role("ramp_start")
+        wanted = self._wanted(None)
+        codes = [row["code"] for row in wanted]
+        readable = self._evidence.readable([*codes, *(name for name in (time, start) if name)])
+        try:
+            told = await self._told(readable, urgent=urgent)
+        except Refused:
+            told = {}
+        seconds, hz = float(told.get(time or "", 0.0)), float(told.get(start or "", 0.0))
+        only_by_bus = bool(wanted) and all(told.get(row["code"]) == row["value"] for row in wanted)
+        return _Ramp(hz / seconds if hz > 0 and seconds > 0 else None, only_by_bus)
+
+    async def _told(self, names: Sequence[str], *, urgent: bool) -> dict[str, Value]:
+        """What the drive says of *names*, in the fewest requests."""
+        if not names:
+            return {}
+        plan = self.profile.compile(names)
+        words = [await self.read_words(address, count, urgent=urgent) for address, count in plan.reads]
+        return dict(zip(plan.names, plan.values(words), strict=True))
 
     async def output_frequency(self, *, urgent: bool = False) -> float | None:
         """In Hz; None where the family does not tell."""

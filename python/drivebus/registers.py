@@ -19,7 +19,7 @@ from drivebus.evidence import Evidence, not_verified
 from drivebus.identity import Identity
 from drivebus.known import check_words
 from drivebus.protocols import AwaitableBus, ProfileProtocol
-from drivebus.values import Choice, Description, Snapshot, Value
+from drivebus.values import Choice, Description, Snapshot, State, Value
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -66,7 +66,7 @@ class Registers:
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
         self._ventured: set[str] = set()
-        self._jogged_from: list[float] = []
+        self._started_as: list[State] = []
         self._starts = [0]
         self._know(profile, checks.flag("unverified", unverified))
 
@@ -214,6 +214,8 @@ class Registers:
         address, words = checks.address(address), checks.payload(value)
         if not checks.flag("force", force):
             check_words([self.profile], self.unit, address, words)
+        if self.profile.is_command(address):
+            self._started_as[:] = [State.UNKNOWN]
         await self._write(address, words, force=force)
 
     def value(self, name: str, raw: int) -> Value:

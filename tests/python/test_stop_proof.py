@@ -1,8 +1,9 @@
-"""What proves that a stop works: a state that no longer runs, or a fall that only the stop explains.
+"""What proves that a stop works: standstill, or a fall that began with the stop and goes along the drive's own ramp.
 
-A frequency also falls to a lower setpoint, and to the jog frequency after a jog that caught a motor which turned. A
-drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not pass for one
-that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz.
+A frequency also falls to a lower setpoint, in a reversal, and to the jog frequency after a jog that caught a motor which
+turned. A drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not pass
+for one that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz. `test_stop_explained` has more that
+makes a frequency fall.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from drivebus import Bus, Drive, Simulator, State, Unconfirmed
 
 COMMAND, STATE, FREQUENCY = 0x2000, 0x2100, 0x3000
 STOP, COAST = 5, 6
+SETTINGS = [0x0001, 0x0006, 0x000C]
+"""Where P00.01 to P00.03, P00.06 and P00.12 are read."""
 OTHER_BUS = {"P00.02": 1}
 """The drive takes the words, and does nothing by them; its status words still say communication."""
 
@@ -56,24 +59,40 @@ def at_speed(drive: Drive, hz: float = 50.0) -> None:
 
 
 class TestTheUsualCase:
-    def test_a_stop_from_its_speed_is_proved_by_two_looks(self, simulator: Simulator, drive: Drive) -> None:
-        at_speed(drive)
+    @pytest.mark.parametrize("reverse", [False, True])
+    def test_a_stop_from_its_speed_is_proved_by_half_a_second_of_its_ramp(
+        self, simulator: Simulator, drive: Drive, reverse: bool
+    ) -> None:
+        """And by how the drive is set: P00.01, P00.02, P00.03, P00.06 and P00.12."""
+        drive.run(50.0, reverse)
+        drive.wait_for_speed(timeout=30)
+        begun = drive.bus.now()
         drive.stop()
-        assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
-        assert drive.state() is State.FORWARD
+        assert 0.5 < drive.bus.now() - begun < 0.75
+        asked = asked_after(simulator, STOP)
+        looks = len(asked) - len(SETTINGS)
+        assert asked == [*[STATE, FREQUENCY] * (looks // 2), *SETTINGS]
+        assert drive.state() is (State.REVERSE if reverse else State.FORWARD)
 
-    def test_a_stop_while_it_gets_faster(self, simulator: Simulator, drive: Drive) -> None:
+    def test_a_stop_that_who_knows_nothing_of_the_start_gives(self, simulator: Simulator, drive: Drive) -> None:
+        """As `drivebus stop` in another terminal."""
+        at_speed(drive)
+        drive.bus.drive(1).stop()
+        assert simulator.drive(1).frequency > 46.0
+
+    def test_a_stop_while_it_gets_faster(self, drive: Drive) -> None:
+        """At no setpoint: when its fall began, nobody knows."""
         drive.run(50.0)
         drive.bus.sleep(2.0)
         drive.stop()
-        assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
+        assert drive.state() is State.STOPPED
 
     @pytest.mark.parametrize("reverse", [False, True])
-    def test_the_end_of_a_jog(self, simulator: Simulator, drive: Drive, reverse: bool) -> None:
+    def test_the_end_of_a_jog(self, drive: Drive, reverse: bool) -> None:
         drive.jog(reverse)
         drive.bus.sleep(3.0)
         drive.jog_stop()
-        assert asked_after(simulator, 8) == [STATE, FREQUENCY] * 2
+        assert drive.state() is State.STOPPED
 
     def test_a_coast_is_off_at_once(self, simulator: Simulator, drive: Drive) -> None:
         at_speed(drive)
@@ -100,10 +119,49 @@ class TestTheUsualCase:
             drive.run(50.0)
             drive.wait_for_speed(50.0, timeout=30)
             drive.stop()
-            assert asked_after(simulator, STOP) == [STATE, FREQUENCY] * 2
+            assert drive.state() is State.STOPPED
 
 
 class TestAFallThatProvesNothing:
+    def test_a_reversal_under_way(self, simulator: Simulator, drive: Drive) -> None:
+        """It passes through zero along the very ramp, and goes on."""
+        at_speed(drive, 30.0)
+        drive.run(30.0, reverse=True)
+        drive.write(OTHER_BUS, unverified=True)
+        with pytest.raises(Unconfirmed, match=r"stop was sent.*the motor may still turn.*reverse"):
+            drive.stop()
+        drive.bus.sleep(30.0)
+        drive.state()
+        assert simulator.drive(1).frequency == -30.0
+
+    @pytest.mark.parametrize("who", ["the same", "another"])
+    def test_a_reversal_of_a_drive_that_is_set_as_it_should_be(
+        self, simulator: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch, who: str
+    ) -> None:
+        """It confirms the stop, and nothing that it says speaks against it."""
+        at_speed(drive, 30.0)
+        drive.run(30.0, reverse=True)
+        hear = drive.bus.write
+        ignored: list[object] = []
+
+        def ignore_stops(unit: int, address: int, value: object, **how: Any) -> None:
+            if (address, value) == (COMMAND, STOP):
+                ignored.append(drive.bus.read(unit, STATE))
+            else:
+                hear(unit, address, value, **how)  # type: ignore[arg-type]
+
+        teller = drive if who == "the same" else drive.bus.drive(1)
+        monkeypatch.setattr(drive.bus, "write", ignore_stops)
+        with pytest.raises(Unconfirmed, match=r"stop was sent.*the motor may still turn.*reverse"):
+            teller.stop()
+        assert len(ignored) == 1
+
+    def test_the_end_of_a_block_goes_on_to_coast(self, simulator: Simulator, drive: Drive) -> None:
+        at_speed(drive, 30.0)
+        with pytest.raises(Unconfirmed, match=r"coast was sent"), drive.running(30.0, reverse=True):
+            drive.write(OTHER_BUS, unverified=True)
+        assert commands(simulator)[-4:] == [STOP, STOP, STOP, COAST]
+
     def test_a_jog_that_caught_the_motor(self, simulator: Simulator, drive: Drive) -> None:
         """It slows down to the jog frequency, and would jog there for ever."""
         at_speed(drive)
@@ -187,22 +245,22 @@ class TestAFallThatProvesNothing:
 
 
 class TestAStopThatWorksMeanwhile:
-    """It passes, only later: where the fall has two reasons, it is looked at until one is left."""
+    """It passes, only later: where the fall may have another reason, it is looked at until the motor stands."""
 
-    def test_under_a_lower_setpoint(self, simulator: Simulator, drive: Drive) -> None:
+    @pytest.mark.parametrize("setpoint", [45.0, 10.0])
+    def test_under_a_lower_setpoint(self, drive: Drive, setpoint: float) -> None:
+        """The ramp from 50 Hz takes 10 s, and `confirm` is 1 s: it is no failure while it falls."""
         at_speed(drive)
-        drive.setpoint = 45.0
+        drive.setpoint = setpoint
         drive.bus.sleep(0.1)
         drive.stop()
-        assert 44.0 < simulator.drive(1).frequency < 45.0
+        assert drive.state() is State.STOPPED
 
-    def test_far_under_a_lower_setpoint(self, simulator: Simulator, drive: Drive) -> None:
-        """The ramp from 50 Hz to 10 Hz takes 8 s, and `confirm` is 1 s: it is no failure while it falls."""
-        at_speed(drive)
-        drive.setpoint = 10.0
-        drive.bus.sleep(0.1)
+    def test_of_a_motor_that_turns_round(self, drive: Drive) -> None:
+        at_speed(drive, 30.0)
+        drive.run(30.0, reverse=True)
         drive.stop()
-        assert 9.0 < simulator.drive(1).frequency < 10.0
+        assert drive.state() is State.STOPPED
 
     def test_out_of_a_jog_that_caught_the_motor(self, drive: Drive) -> None:
         at_speed(drive)
@@ -293,3 +351,65 @@ class TestABlockThatDidNotStartTheMotor:
         at_speed(drive, 10.0)
         asyncio.run(main())
         assert [word for word in commands(simulator) if word in (STOP, COAST)] == []
+
+
+class TestAMotorThatRunsInAFault:
+    """A VFD500 that keeps running in a fault: bits 0 and 3 of status word 1, and 3 in bits 5 and 4. Its manual, p. 96."""
+
+    COMMANDS, STATUS = 0x7000, 0x1B12
+    RUNS_ON = 0x0039
+
+    @pytest.fixture
+    def drive(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Drive]:
+        """It runs at 30 Hz, and ignores what it is told unless a test says otherwise."""
+        with Simulator({1: "vfd500"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+            drive = bus.drive(1, "vfd500", unverified=True, variants={"speed_unit": "Hz"})
+            drive.prepare_control(store=True)
+            drive.run(30.0)
+            drive.wait_for_speed(30.0, timeout=60)
+            read = bus.read_stamped
+            hear = bus.write
+            self.told: list[object] = []
+            self.obeys = False
+
+            def answer(unit: int, address: int, *rest: int, **how: bool) -> tuple[list[int], float, float]:
+                words, *times = read(unit, address, *rest, **how)
+                if address == self.STATUS:
+                    words[0] |= self.RUNS_ON & 0x0038
+                return words, times[0], times[1]
+
+            def take(unit: int, address: int, value: int, **how: Any) -> None:
+                self.told.append(value)
+                if self.obeys:
+                    hear(unit, address, value, **how)
+
+            monkeypatch.setattr(bus, "read_stamped", answer)
+            monkeypatch.setattr(bus, "write", take)
+            yield drive
+
+    @pytest.mark.parametrize(("command", "code"), [("stop", 6), ("coast", 5)])
+    def test_it_has_not_stopped(self, drive: Drive, command: str, code: int) -> None:
+        with pytest.raises(Unconfirmed, match=rf"{command} was sent.*forward, in fault"):
+            getattr(drive, command)()
+        assert self.told == [code]
+
+    def test_it_has_once_it_stands(self, drive: Drive) -> None:
+        """The fault is still there, and is no reason not to look on."""
+        self.obeys = True
+        drive.stop()
+        assert drive.status().state is State.FAULT
+
+    def test_the_fault_is_told_beside_it(self, drive: Drive) -> None:
+        status = drive.status()
+        assert (status.state, status.fields["fault"]) == (State.FORWARD, "fault")
+        assert status.fields["fault_reaction"] == "keep running"
+
+    def test_it_is_not_started_again(self, drive: Drive) -> None:
+        with pytest.raises(drivebus.NotAllowed, match="is in fault"):
+            drive.run(10.0)
+        assert self.told == []
+
+    def test_a_reset_that_changes_nothing_is_not_confirmed(self, drive: Drive) -> None:
+        with pytest.raises(Unconfirmed, match=r"reset_fault was sent.*forward, in fault"):
+            drive.reset_fault()
+        assert self.told == [8]
