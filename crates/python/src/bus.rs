@@ -335,12 +335,12 @@ pub(crate) fn with_signals<T: Send>(
     let raised = Mutex::new(None);
     let result = py.detach(|| {
         work(&mut || {
-            let error = Python::try_attach(|py| py.check_signals().err()).flatten();
-            let give_up = error.is_some();
-            if let (Ok(mut raised), true) = (raised.lock(), give_up) {
-                *raised = error;
+            let Ok(mut raised) = raised.lock() else { return true };
+            // The first is the one that counts; what comes after it, the interpreter raises when this has ended.
+            if raised.is_none() {
+                *raised = Python::try_attach(|py| py.check_signals().err()).flatten();
             }
-            give_up
+            raised.is_some()
         })
     });
     match raised.into_inner() {

@@ -6,6 +6,7 @@
 use pyo3::prelude::*;
 
 mod arguments;
+mod attendant;
 mod bus;
 mod convert;
 mod errors;

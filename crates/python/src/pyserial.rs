@@ -1,35 +1,45 @@
 //! A line over a Python object that reads and writes like pyserial's `serial.Serial`.
 //!
 //! So a port the user has opened, and everything pyserial has a URL for (`rfc2217://`, `spy://`, `loop://`), carries the
-//! bus too. Each call goes through the interpreter and takes some tens of microseconds; a path is faster. While a wait
-//! lasts, the object itself lets go of the GIL, as pyserial does.
+//! bus too. Each call goes through the interpreter, in a thread of its own, and takes some tens of microseconds; a path is
+//! faster. While a wait lasts, the object itself lets go of the GIL, as pyserial does.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use drivebus_line::clock::{monotonic, sleep_until};
 use drivebus_line::{Line, PortError, PortErrorKind};
 use drivebus_rtu::{DataBits, Duration, Instant, Parity, SerialFormat, StopBits};
-use pyo3::exceptions::{PyException, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// Longest wait in one go, so that a signal handler of Python runs soon.
-const SLICE: Duration = Duration::from_millis(50);
+use crate::attendant::{Attendant, Unattended};
+
 /// The time-out of an object that has no descriptor to wait on: how fine its waits are.
 const STEP: Duration = Duration::from_millis(1);
+/// How long the object is given beyond what it is asked to wait. A program may keep the interpreter to itself for seconds.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A port that lives in Python.
 #[derive(Debug)]
 pub(crate) struct PySerialLine {
-    port: Py<PyAny>,
+    object: Arc<Object>,
+    attendant: Attendant,
     name: String,
     format: SerialFormat,
     /// When the last character handed over will have left the wire.
     wire_free: Instant,
-    wait: Wait,
     owned: bool,
     notes: Vec<String>,
+}
+
+/// The object, and how to wait for it.
+#[derive(Debug)]
+struct Object {
+    port: Py<PyAny>,
+    wait: Wait,
 }
 
 /// How to wait for bytes without asking the object for more than it has.
@@ -66,30 +76,24 @@ impl PySerialLine {
     /// # Errors
     ///
     /// [`PortErrorKind::Unsupported`]: the object lacks one of these. [`PortErrorKind::Closed`]: it is not open.
+    /// [`PortErrorKind::Other`]: there is no thread for it.
     pub(crate) fn new(port: &Bound<'_, PyAny>, asked: &SerialFormat, owned: bool) -> Result<Self, PortError> {
-        let name = name_of(port);
-        for attribute in ["read", "write", "in_waiting", "timeout"] {
-            // `in_waiting` of a closed port exists and raises, which is not what is looked for here.
-            if !port.get_type().hasattr(attribute).unwrap_or(false) && !port.hasattr(attribute).unwrap_or(true) {
-                let message = format!(
-                    "it has no `{attribute}`, so it is no port; give a path, a URL or an object like serial.Serial"
-                );
-                return Err(PortError::new(PortErrorKind::Unsupported, name, message));
-            }
-        }
-        if port.getattr("is_open").and_then(|open| open.is_truthy()).is_ok_and(|open| !open) {
-            let message = "it is not open; call its open() first";
-            return Err(PortError::new(PortErrorKind::Closed, name, message));
-        }
-        let wait = Wait::of(port).map_err(|error| lost(&name, &error))?;
-        let format = own_format(port, asked).unwrap_or(*asked);
-        let notes = if format == *asked {
+        let attendant = Attendant::new().map_err(|error| {
+            let message = format!("the system gives no thread in which it could be used ({error})");
+            PortError::new(PortErrorKind::Other, "a Python object", message)
+        })?;
+        let (object, asked) = (port.clone().unbind(), *asked);
+        let (name, wait, format) = port
+            .py()
+            .detach(|| attendant.run(PATIENCE, move |py| look_at(object.bind(py), &asked)))
+            .unwrap_or_else(|why| Err(unattended("a Python object", why)))?;
+        let notes = if format == asked {
             Vec::new()
         } else {
             vec![format!("timed as {format}, as {name} was opened, not as {asked}")]
         };
-        let port = port.clone().unbind();
-        Ok(Self { port, name, format, wire_free: Instant::ZERO, wait, owned, notes })
+        let object = Arc::new(Object { port: port.clone().unbind(), wait });
+        Ok(Self { object, attendant, name, format, wire_free: Instant::ZERO, owned, notes })
     }
 
     /// How the characters of this line look: the object's own settings, where it tells.
@@ -97,19 +101,17 @@ impl PySerialLine {
         self.format
     }
 
-    /// Runs `work` in the interpreter, and sorts what it raises.
-    ///
-    /// `Ok(None)` means that a signal handler of the program raised, as Ctrl-C does: see [`hand_back`].
-    fn attached<T>(&self, work: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> Result<Option<T>, PortError> {
-        let done = Python::try_attach(|py| match work(self.port.bind(py)) {
-            Ok(value) => Ok(Some(value)),
-            Err(error) if error.is_instance_of::<PyException>(py) => Err(lost(&self.name, &error)),
-            Err(_) => {
-                hand_back(py);
-                Ok(None)
-            }
-        });
-        done.unwrap_or_else(|| Err(PortError::new(PortErrorKind::Closed, &self.name, "Python is shutting down")))
+    /// Does `work` with the object; whatever it raises there, it raises because it is gone.
+    fn attended<T: Send + 'static>(
+        &self,
+        patience: Duration,
+        work: impl FnOnce(&Bound<'_, PyAny>, &Wait) -> PyResult<T> + Send + 'static,
+    ) -> Result<T, PortError> {
+        let object = Arc::clone(&self.object);
+        self.attendant
+            .run(patience, move |py| work(object.port.bind(py), &object.wait).map_err(|error| error.to_string()))
+            .map_err(|why| unattended(&self.name, why))?
+            .map_err(|error| lost(&self.name, &error))
     }
 }
 
@@ -119,10 +121,9 @@ impl Line for PySerialLine {
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
-        // After an interruption nobody knows how much was written. The bytes count as sent: the unit ignores half a
-        // frame, and the caller is about to raise what interrupted.
-        self.attached(|port| write_all(port, bytes))?;
-        let starts = self.wire_free.max(monotonic());
+        let copy = bytes.to_vec();
+        let written = self.attended(PATIENCE, move |port, _| write_all(port, &copy).map(|()| monotonic()))?;
+        let starts = self.wire_free.max(written);
         self.wire_free = starts + self.format.chars(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
         Ok(self.wire_free)
     }
@@ -132,11 +133,11 @@ impl Line for PySerialLine {
             sleep_until(until);
             return Ok(0);
         }
-        let count = self.attached(|port| read_some(port, &self.wait, buffer, until))?;
-        Ok(count.unwrap_or_else(|| {
-            sleep_until(until); // 0 means that `until` was reached, so it has to be
-            0
-        }))
+        let room = buffer.len();
+        let patience = until.saturating_duration_since(monotonic()) + PATIENCE;
+        let came = self.attended(patience, move |port, wait| read_some(port, wait, room, until))?;
+        buffer[..came.len()].copy_from_slice(&came);
+        Ok(came.len())
     }
 
     fn sleep(&mut self, until: Instant) {
@@ -158,16 +159,41 @@ impl Line for PySerialLine {
 
 impl Drop for PySerialLine {
     fn drop(&mut self) {
-        // What the object raises now, it raises because it is gone; an interpreter that ends closes it itself.
-        let _ = Python::try_attach(|py| {
-            let port = self.port.bind(py);
-            match &self.wait {
-                _ if self.owned => port.call_method0(intern!(py, "close")).map(drop),
+        let object = Arc::clone(&self.object);
+        let owned = self.owned;
+        let let_go = move |py: Python<'_>| {
+            let port = object.port.bind(py);
+            // What the object raises now, it raises because it is gone.
+            let _ = match &object.wait {
+                _ if owned => port.call_method0(intern!(py, "close")).map(drop),
                 Wait::Select(_) => Ok(()),
                 Wait::Timeout(before) => port.setattr(intern!(py, "timeout"), before),
-            }
-        });
+            };
+        };
+        // Whoever drops it may be attached. An interpreter that ends closes the object itself.
+        let _ = Python::try_attach(|py| py.detach(|| self.attendant.run(PATIENCE, let_go)));
     }
+}
+
+/// What has to be known of a port object before it is used: what people call it, how to wait for it, and its format.
+fn look_at(port: &Bound<'_, PyAny>, asked: &SerialFormat) -> Result<(String, Wait, SerialFormat), PortError> {
+    let name = name_of(port);
+    for attribute in ["read", "write", "in_waiting", "timeout"] {
+        // `in_waiting` of a closed port exists and raises, which is not what is looked for here.
+        if !port.get_type().hasattr(attribute).unwrap_or(false) && !port.hasattr(attribute).unwrap_or(true) {
+            let message = format!(
+                "it has no `{attribute}`, so it is no port; give a path, a URL or an object like serial.Serial"
+            );
+            return Err(PortError::new(PortErrorKind::Unsupported, name, message));
+        }
+    }
+    if port.getattr("is_open").and_then(|open| open.is_truthy()).is_ok_and(|open| !open) {
+        let message = "it is not open; call its open() first";
+        return Err(PortError::new(PortErrorKind::Closed, name, message));
+    }
+    let wait = Wait::of(port).map_err(|error| lost(&name, &error.to_string()))?;
+    let format = own_format(port, asked).unwrap_or(*asked);
+    Ok((name, wait, format))
 }
 
 /// Writes all of `bytes`. `write` returns how many it took, or nothing where it always takes all.
@@ -185,71 +211,70 @@ fn write_all(port: &Bound<'_, PyAny>, bytes: &[u8]) -> PyResult<()> {
     Ok(())
 }
 
-/// What is there, or the first that comes until `until`; 0 when nothing does.
-fn read_some(port: &Bound<'_, PyAny>, wait: &Wait, buffer: &mut [u8], until: Instant) -> PyResult<usize> {
+/// What is there, or the first that comes until `until`, `room` bytes at most; none when nothing does.
+fn read_some(port: &Bound<'_, PyAny>, wait: &Wait, room: usize, until: Instant) -> PyResult<Vec<u8>> {
     let py = port.py();
     loop {
-        let count = read_waiting(port, buffer)?;
-        if count > 0 {
-            return Ok(count);
+        let came = read_waiting(port, room)?;
+        if !came.is_empty() {
+            return Ok(came);
         }
         let left = until.saturating_duration_since(monotonic());
         if left.is_zero() {
-            return Ok(0);
+            return Ok(came);
         }
         match wait {
             Wait::Select(select) => {
-                let seconds = left.min(SLICE).as_secs_f64();
-                let (ready, ..): (Vec<Py<PyAny>>, Py<PyAny>, Py<PyAny>) =
-                    select.call1(py, (vec![port], Vec::<u8>::new(), Vec::<u8>::new(), seconds))?.extract(py)?;
+                let (ready, ..): (Vec<Py<PyAny>>, Py<PyAny>, Py<PyAny>) = select
+                    .call1(py, (vec![port], Vec::<u8>::new(), Vec::<u8>::new(), left.as_secs_f64()))?
+                    .extract(py)?;
                 if !ready.is_empty() {
-                    let count = read_waiting(port, buffer)?;
+                    let came = read_waiting(port, room)?;
                     // Readable and nothing there is the end of the port; its own read says how.
-                    return if count > 0 { Ok(count) } else { read(port, &mut buffer[..1]) };
+                    return if came.is_empty() { read(port, 1) } else { Ok(came) };
                 }
             }
             Wait::Timeout(_) => {
                 // One byte, as pyserial waits for all it is asked for.
-                let (first, rest) = buffer.split_at_mut(1);
-                if read(port, first)? == 1 {
-                    return Ok(1 + read_waiting(port, rest)?);
+                let mut came = read(port, 1)?;
+                if !came.is_empty() {
+                    came.extend(read_waiting(port, room - 1)?);
+                    return Ok(came);
                 }
             }
         }
     }
 }
 
-/// What is there already, without waiting.
-fn read_waiting(port: &Bound<'_, PyAny>, buffer: &mut [u8]) -> PyResult<usize> {
+/// What is there already, `room` bytes at most, without waiting.
+fn read_waiting(port: &Bound<'_, PyAny>, room: usize) -> PyResult<Vec<u8>> {
     let waiting: usize = port.getattr(intern!(port.py(), "in_waiting"))?.extract()?;
-    let count = waiting.min(buffer.len());
-    if count == 0 { Ok(0) } else { read(port, &mut buffer[..count]) }
+    let count = waiting.min(room);
+    if count == 0 { Ok(Vec::new()) } else { read(port, count) }
 }
 
-/// Reads as many bytes as `buffer` holds, or fewer where the object's time-out ends.
-fn read(port: &Bound<'_, PyAny>, buffer: &mut [u8]) -> PyResult<usize> {
-    let bytes = port.call_method1(intern!(port.py(), "read"), (buffer.len(),))?;
+/// Reads `count` bytes, or fewer where the object's time-out ends.
+fn read(port: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<u8>> {
+    let bytes = port.call_method1(intern!(port.py(), "read"), (count,))?;
     let bytes: Cow<'_, [u8]> = bytes.extract()?;
-    let Some(target) = buffer.get_mut(..bytes.len()) else {
-        return Err(PyValueError::new_err(format!("read({}) returned {} bytes", buffer.len(), bytes.len())));
-    };
-    target.copy_from_slice(&bytes);
-    Ok(bytes.len())
-}
-
-/// Makes the interpreter raise again what a signal handler raised in the middle of our call.
-///
-/// A [`Line`] has no way to return it: the port is well, and the bus must not take Ctrl-C for a broken one. The signal is
-/// set once more, and the binding meets it where it looks for signals next, as `KeyboardInterrupt`.
-fn hand_back(py: Python<'_>) {
-    // It can fail only where the module is missing, and then there are no signals either.
-    let _ = py.import(intern!(py, "_thread")).and_then(|module| module.call_method0(intern!(py, "interrupt_main")));
+    if bytes.len() > count {
+        return Err(PyValueError::new_err(format!("read({count}) returned {} bytes", bytes.len())));
+    }
+    Ok(bytes.into_owned())
 }
 
 /// The object failed: most often it was unplugged, or closed by its owner.
-fn lost(name: &str, error: &PyErr) -> PortError {
+fn lost(name: &str, error: &str) -> PortError {
     let message = format!("the port is gone ({error}); open it again, then the bus");
     PortError::new(PortErrorKind::Lost, name, message)
+}
+
+/// The object could not be asked, or does not come back.
+fn unattended(name: &str, why: Unattended) -> PortError {
+    match why {
+        Unattended::Over => PortError::new(PortErrorKind::Closed, name, "Python is shutting down"),
+        Unattended::Late => lost(name, &format!("it does nothing for {} s", PATIENCE.as_secs())),
+    }
 }
 
 /// What people call the port: pyserial keeps the path or URL it was given in `port` and `name`.
