@@ -245,7 +245,12 @@ impl Bus {
     }
 
     /// What one call asks, with the times that hold for it.
-    pub(crate) fn ask<'a>(&self, destination: Destination, request: &'a Request<'a>, options: &CallOptions) -> Ask<'a> {
+    pub(crate) fn ask<'a>(
+        &'a self,
+        destination: Destination,
+        request: &'a Request<'a>,
+        options: &CallOptions,
+    ) -> Ask<'a> {
         let (timeout, gap) = match destination {
             Destination::Broadcast => (self.options.turnaround, Duration::ZERO),
             Destination::Unit(unit) => {
@@ -261,6 +266,7 @@ impl Bus {
             learns: learns && options.timeout.is_none(),
             gap,
             in_doubt: options.in_doubt,
+            yields: (options.priority != Some(Priority::Stop)).then_some(&*self.queue),
         }
     }
 

@@ -8,11 +8,15 @@ use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Mast
 
 use crate::Line;
 use crate::error::{CallError, Failure};
-use crate::queue::LOOK_UP;
+use crate::queue::{LOOK_UP, Queue};
 
 /// How long before an answer can be whole it is waited for again, in characters and on top of them: the first bytes may
 /// have been handed over so much after they came. A receiver hands over what fills its FIFO, a machine wakes up late.
 const EARLY: (u32, Duration) = (2, Duration::from_micros(150));
+
+/// How long a unit that was silent the last time is waited for while a stop waits for the line. A unit answers within
+/// some ten milliseconds; what it says later than this may meet the stop on the wire.
+const STOP_WAITS: Duration = Duration::from_millis(100);
 
 /// One request on its way.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +31,8 @@ pub(crate) struct Ask<'a> {
     pub(crate) gap: Duration,
     /// Whether it goes out at once, even to a unit that may still answer something else.
     pub(crate) in_doubt: bool,
+    /// Where stops wait that go before it, even when it is on its way: its unit was silent the last time.
+    pub(crate) yields: Option<&'a Queue>,
 }
 
 /// When an exchange happened, on the line's clock.
@@ -70,6 +76,7 @@ pub(crate) fn exchange(
 
     let mut pace = line.char_time().map(Pace::new);
     let mut buffer = [0; 256];
+    let mut quiet_since = None;
     // What is queued already is no answer, and the line was not silent while it came: read without waiting.
     let mut until = now;
     loop {
@@ -83,6 +90,9 @@ pub(crate) fn exchange(
             }
         };
         let came = rest.len();
+        if came > 0 {
+            quiet_since = quiet_since.map(|_| now);
+        }
         loop {
             // Whatever there is no room for now, there is after polling.
             rest = &rest[master.receive(now, rest)..];
@@ -90,14 +100,19 @@ pub(crate) fn exchange(
                 Some(Event::Transmit(frame)) => {
                     sent = Some(now);
                     match line.send(frame) {
-                        Ok(end) => master.sent(end),
+                        Ok(end) => {
+                            quiet_since = Some(end);
+                            master.sent(end);
+                        }
                         Err(error) => {
                             master.abort(now);
                             return Err(ask.failed(Failure::Port(error), sent, line.now(), &[]));
                         }
                     }
                 }
-                Some(event) => return conclude(ask, event, sent, now, take),
+                Some(event) => {
+                    return conclude(ask, event, sent, now, take).map_err(|error| unless_given_up(error, give_up));
+                }
                 None if rest.is_empty() => break,
                 None => {}
             }
@@ -108,6 +123,11 @@ pub(crate) fn exchange(
                 master.abort(now);
                 return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
             }
+            let quiet = quiet_since.map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
+            if quiet >= STOP_WAITS && ask.yields.is_some_and(Queue::has_stop) {
+                master.abort(now);
+                return Err(ask.failed(Failure::NoAnswer { timeout: quiet, attempts: 1 }, sent, now, &[]));
+            }
         }
         let wake = now + LOOK_UP;
         until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
@@ -117,6 +137,14 @@ pub(crate) fn exchange(
             until = now;
         }
     }
+}
+
+/// Asks `give_up` where no answer came: time-outs may be shorter than the time between two looks, and retries many.
+fn unless_given_up(mut error: Box<CallError>, give_up: &mut dyn FnMut() -> bool) -> Box<CallError> {
+    if !matches!(error.failure, Failure::Refused { .. }) && give_up() {
+        error.failure = Failure::Interrupted;
+    }
+    error
 }
 
 /// Bytes that come one by one, so that nobody need wake up for each.
@@ -188,4 +216,117 @@ fn conclude(
         }
     };
     Err(ask.failed(failure, sent, ended, raw))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use drivebus_rtu::{SerialFormat, UnitAddress};
+
+    use super::*;
+    use crate::PortError;
+    use crate::crew::Waiter;
+    use crate::queue::Priority;
+
+    /// A line on which nobody answers, or somebody says a byte now and then. Time passes only while it is waited on.
+    #[derive(Debug, Default)]
+    struct Silent {
+        now: Instant,
+        noise: Option<Duration>,
+        sent: bool,
+    }
+
+    impl Line for Silent {
+        fn now(&self) -> Instant {
+            self.now
+        }
+
+        fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
+            self.sent = true;
+            Ok(self.now)
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
+            let before = self.now;
+            self.now = self.now.max(until);
+            match self.noise {
+                Some(each) if self.sent && before + each <= until => {
+                    (self.now, buffer[0]) = (before + each, 0x55);
+                    Ok(1)
+                }
+                _ => Ok(0),
+            }
+        }
+
+        fn sleep(&mut self, until: Instant) {
+            self.now = self.now.max(until);
+        }
+
+        fn name(&self) -> String {
+            "silent".to_owned()
+        }
+    }
+
+    fn read(line: &mut Silent, timeout: u64, yields: Option<&Queue>, give_up: &mut dyn FnMut() -> bool) -> Failure {
+        let request = Request::read(0x2100, 1).unwrap();
+        let ask = Ask {
+            destination: UnitAddress::new(9).unwrap().into(),
+            request: &request,
+            timeout: Duration::from_millis(timeout),
+            learns: false,
+            gap: Duration::ZERO,
+            in_doubt: true,
+            yields,
+        };
+        exchange(line, &mut Master::new(&SerialFormat::DEFAULT), &ask, give_up, &mut |_| ()).unwrap_err().failure
+    }
+
+    fn queue_with(priority: Priority) -> Queue {
+        let queue = Queue::default();
+        let mut state = queue.lock();
+        let ticket = state.order.ticket(priority, None);
+        state.order.wait(ticket, Waiter::Thread(thread::current()));
+        drop(state);
+        queue
+    }
+
+    fn waited(failure: &Failure) -> Duration {
+        match failure {
+            Failure::NoAnswer { timeout, .. } => *timeout,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_stop_that_waits_waits_no_longer_for_a_silent_unit_than_that_might_take() {
+        let cut_short = waited(&read(&mut Silent::default(), 2_000, Some(&queue_with(Priority::Stop)), &mut || false));
+        assert!((STOP_WAITS..STOP_WAITS + LOOK_UP).contains(&cut_short), "{cut_short:?}");
+    }
+
+    #[test]
+    fn nothing_else_cuts_a_wait_short() {
+        for yields in [None, Some(&queue_with(Priority::Write)), Some(&Queue::default())] {
+            let failure = read(&mut Silent::default(), 2_000, yields, &mut || false);
+            assert_eq!(waited(&failure), Duration::from_secs(2));
+        }
+    }
+
+    #[test]
+    fn what_still_comes_is_waited_for() {
+        let mut line = Silent { noise: Some(Duration::from_millis(40)), ..Silent::default() };
+        read(&mut line, 2_000, Some(&queue_with(Priority::Stop)), &mut || false);
+        assert!(line.now >= Instant::ZERO + Duration::from_secs(2), "{:?}", line.now);
+    }
+
+    #[test]
+    fn who_gives_up_is_heard_after_the_shortest_time_out() {
+        let mut asked = 0;
+        let mut give_up = || {
+            asked += 1;
+            true
+        };
+        assert_eq!(read(&mut Silent::default(), 5, None, &mut give_up), Failure::Interrupted);
+        assert_eq!(asked, 1);
+    }
 }

@@ -51,6 +51,11 @@ impl Links {
     pub(crate) fn of(&self, unit: UnitAddress) -> Link {
         self.0.get(&unit).map(Ring::link).unwrap_or_default()
     }
+
+    /// Whether nothing was heard of `unit` when it was asked last, or ever.
+    pub(crate) fn is_silent(&self, unit: UnitAddress) -> bool {
+        self.0.get(&unit).is_none_or(|ring| ring.bits & 1 == 0)
+    }
 }
 
 impl Ring {
@@ -98,6 +103,7 @@ mod tests {
             learns: false,
             gap: Duration::ZERO,
             in_doubt: false,
+            yields: None,
         };
         Err(ask.failed(failure, None, Instant::ZERO, &[]))
     }

@@ -270,6 +270,7 @@ impl Owner {
             Destination::Broadcast => None,
         };
         let ask = &self.within_patience(ask);
+        let ask = &Ask { yields: ask.yields.filter(|_| unit.is_some_and(|unit| self.is_silent(unit))), ..*ask };
         let result = match self.line.as_deref_mut() {
             Some(line) => exchange(line, &mut self.master, ask, give_up, take),
             None => Err(ask.failed(Failure::Closed, None, Instant::ZERO, &[])),
@@ -323,6 +324,10 @@ impl Owner {
             self.line = None;
         }
         result
+    }
+
+    fn is_silent(&self, unit: UnitAddress) -> bool {
+        self.links.lock().unwrap_or_else(PoisonError::into_inner).is_silent(unit)
     }
 
     /// `ask`, with the time-out that its unit's answers have taught, if that is to hold for it and is shorter.

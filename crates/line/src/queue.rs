@@ -146,6 +146,11 @@ impl Queue {
         self.lock().has(thread::current().id())
     }
 
+    /// Whether a stop waits.
+    pub(crate) fn has_stop(&self) -> bool {
+        self.lock().order.has_stop()
+    }
+
     /// How many wait.
     #[cfg(test)]
     pub(crate) fn waiting(&self) -> usize {
