@@ -79,6 +79,11 @@ class BlockingBus:
         """See `BusProtocol`."""
         return self._bus.link(unit)
 
+    @property
+    def line(self) -> object:
+        """See `AwaitableBus`."""
+        return getattr(self._bus, "line", self._bus)
+
     def undisturbed(self) -> AbstractContextManager[BlockingBus]:
         """Itself: no caller can take back what blocks it."""
         return nullcontext(self)

@@ -22,6 +22,7 @@ from drivebus.opening import BusFace, Opening
 from drivebus.poll import Poll
 from drivebus.polling import Sample
 from drivebus.profile import Profile
+from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 
@@ -106,11 +107,18 @@ class Bus(BusFace[_native.Bus]):
     def close(self) -> None:
         """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
 
-        An open `serial.Serial` that was given stays open: it is its owner's.
+        A motor that a block runs over it, in whatever thread, is stopped before. An open `serial.Serial` that was given
+        stays open: it is its owner's.
         """
+        end_over(self.line)
         self._native.close()
         if self._owned is not None:
             self._owned.close()
+
+    @property
+    def line(self) -> object:
+        """What stands for the line: the same for each face of it."""
+        return self._native
 
     def __enter__(self) -> Bus:
         return self

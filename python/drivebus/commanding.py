@@ -78,6 +78,7 @@ class Commanding(Setpoints):
         try:
             if urgent:
                 await self._send(address, words, urgent=True)
+                self._halts[0] += 1
             else:
                 await self._write(address, words, judged=name not in _WHATEVER_IT_IS)
         except LINE_ERRORS as error:
@@ -90,6 +91,7 @@ class Commanding(Setpoints):
                     request=error.request,
                     ended=error.ended,
                 ) from error
+            self._halts[0] += urgent
             raise Unconfirmed(
                 f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
                 f"{await self._state_afterwards(urgent)}. It was not repeated",

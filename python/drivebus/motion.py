@@ -15,6 +15,7 @@ from drivebus.commanding import Commanding
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
 from drivebus.falling import Fall
 from drivebus.looking import Seen
+from drivebus.safeguard import before_start
 from drivebus.values import ControlSource, State, Value
 
 if TYPE_CHECKING:
@@ -235,6 +236,7 @@ class Motion(Commanding):
         frequency = await self.output_frequency() if turning_round else None
         # Who started it so must not be kept from stopping it.
         self._ventured.update([command] if self.unverified else [])
+        before_start()
         # Before it is sent: whoever is interrupted from here on has to end it.
         self._starts[0] += 1
         self._started_as[:] = [State.UNKNOWN if command.startswith("jog") else wanted]

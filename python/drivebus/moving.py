@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager
+from typing import TypeAlias
 
 from drivebus.at_once import at_once
 from drivebus.errors import DrivebusError, Unconfirmed
@@ -14,6 +16,12 @@ __all__ = ["Moving"]
 
 _END_ATTEMPTS = 3
 """How often a stop is sent that is not confirmed, before the drive is told to coast."""
+
+_INTERRUPTED_AT_MOST = 64
+"""How often an attempt that was interrupted before anything was sent counts as none."""
+
+_Outcome: TypeAlias = tuple[DrivebusError | None, BaseException | None]
+"""What is left to raise: why it could not be ended, and what interrupted that."""
 
 
 class Moving:
@@ -33,14 +41,19 @@ class Moving:
         self._end = end
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
         self._elsewhere = drive.over(drive.bus.blocking())
-        self._guard = Guard(self._end_at_once)
+        self._guard = Guard(self._end_at_once, drive.bus.line)
         self._started = False
         self._starts_before = drive._starts[0]
 
     async def begin(self) -> None:
-        """Starts the motor."""
+        """Starts the motor.
+
+        Raises:
+            NotAllowed: Also where the end of the program has begun. Nothing was sent.
+        """
         self._guard.arm()
-        await self._start()
+        with self._guard.beginning():
+            await self._start()
         self._started = True
         self._guard.check()
 
@@ -49,27 +62,40 @@ class Moving:
         if isinstance(reason, GeneratorExit):
             self._leave()
             return
-        with self._drive.bus.undisturbed() as bus:
-            # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
-            # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
-            may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
-            if self._started or (may_turn and self._drive._starts[0] > self._starts_before):
-                failure = await self._stop(bus)
-                if failure is not None and hasattr(reason, "add_note"):
-                    reason.add_note(f"and unit {self._drive.unit} could not be stopped: {failure}")
-            self._guard.disarm()
+        try:
+            with self._keeping_interruptions(), self._drive.bus.undisturbed() as bus:
+                # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
+                # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
+                may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
+                failure = interrupted = None
+                if self._started or (may_turn and self._drive._starts[0] > self._starts_before):
+                    failure, interrupted = await self._stop(bus)
+                    if failure is not None and hasattr(reason, "add_note"):
+                        reason.add_note(f"and unit {self._drive.unit} could not be stopped: {failure}")
+                self._guard.disarm()
+                if interrupted is not None:
+                    raise interrupted
+        except KeyboardInterrupt:
+            # Of several that end the same block, and what ends the program anyway, the first is raised.
+            if isinstance(reason, Exception):
+                raise
 
     async def finish(self) -> None:
         """The block went well. Raises what came of stopping the motor."""
-        with self._drive.bus.undisturbed() as bus:
-            failure = await self._stop(bus)
+        with self._keeping_interruptions(), self._drive.bus.undisturbed() as bus:
+            failure, interrupted = await self._stop(bus)
             self._guard.disarm()
-            if failure is not None:
-                raise failure
+            unwelcome = failure or interrupted
+            if unwelcome is not None:
+                raise unwelcome
 
-    async def _stop(self, bus: AwaitableBus) -> BaseException | None:
+    def _keeping_interruptions(self) -> AbstractContextManager[object]:
+        before = self._drive._halts[0]
+        return self._guard.keeping_interruptions(lambda: self._drive._halts[0] > before)
+
+    async def _stop(self, bus: AwaitableBus) -> _Outcome:
         if not self._guard.begin_to_end():
-            return None
+            return None, None
         try:
             return await self._end_by_all_means(self._drive.over(bus))
         except GeneratorExit:
@@ -84,21 +110,30 @@ class Moving:
             raise failure
 
     def _end_at_once(self) -> BaseException | None:
-        return at_once(self._end_by_all_means(self._elsewhere))
+        with self._keeping_interruptions():
+            failure, interrupted = at_once(self._end_by_all_means(self._elsewhere))
+        return failure or interrupted
 
-    async def _end_by_all_means(self, drive: Operations) -> BaseException | None:
-        """Ends it, or coasts where that fails. Returns what is left to raise: a failure, or a Ctrl-C that came."""
-        interrupted: KeyboardInterrupt | None = None
-        failure: BaseException | None = None
-        for attempt in range(_END_ATTEMPTS + 1):
+    async def _end_by_all_means(self, drive: Operations) -> _Outcome:
+        """Ends it, or coasts where that fails. Returns what is left to raise: a failure, and what interrupted it."""
+        interrupted: BaseException | None = None
+        failure: DrivebusError | None = None
+        attempts = interruptions = 0
+        while attempts <= _END_ATTEMPTS:
+            sent_before = drive._halts[0]
             try:
-                await (self._end(drive) if attempt < _END_ATTEMPTS else drive.coast())
+                await (self._end(drive) if attempts < _END_ATTEMPTS else drive.coast())
             except DrivebusError as error:
                 failure = error
-            except KeyboardInterrupt as error:
+                attempts += 1
+            except GeneratorExit:
+                raise
+            except BaseException as error:
                 # A second Ctrl-C must not leave the motor running: it is raised once the drive was told to stop.
-                interrupted = error
+                interrupted = interrupted or error
+                interruptions += 1
+                # What was interrupted before it was sent was no attempt.
+                attempts += drive._halts[0] > sent_before or interruptions > _INTERRUPTED_AT_MOST
             else:
-                failure = None
-                break
-        return failure or interrupted
+                return None, interrupted
+        return failure, interrupted

@@ -112,6 +112,10 @@ class AwaitableBus(Protocol):
     def closed(self) -> bool:
         """See `BusProtocol`."""
 
+    @property
+    def line(self) -> object:
+        """What stands for the line: the same for each face of it."""
+
     def undisturbed(self) -> AbstractContextManager[AwaitableBus]:
         """The same line for a block in which nothing is given up: a cancellation is raised when the block has ended."""
 

@@ -68,6 +68,7 @@ class Registers:
         self._ventured: set[str] = set()
         self._started_as: list[State] = []
         self._starts = [0]
+        self._halts = [0]
         self._know(profile, checks.flag("unverified", unverified))
 
     def _know(self, profile: ProfileProtocol, unverified: bool) -> None:

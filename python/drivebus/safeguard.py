@@ -4,7 +4,7 @@ Whoever runs a motor inside a block says here how to end it. An exception ends t
 after what does not: a signal that would end the process at once, and threads and generators that nobody ends. What no
 program sees (kill -9, a power cut) is for the drive's own watchdog.
 
-It knows nothing of drives, only what is to be called.
+It knows nothing of drives, only what is to be called, and over which line.
 """
 
 from __future__ import annotations
@@ -16,18 +16,29 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from types import FrameType
 
-__all__ = ["Guard"]
+from drivebus.errors import NotAllowed
+from drivebus.interruptions import Kept
+
+__all__ = ["Guard", "before_start", "end_over"]
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """What ends a process at once unless somebody listens: asked to end, and its terminal closed."""
+
+_PATIENCE = 10.0
+"""Seconds for which a start that is on its way is waited for, so that the stop comes after it."""
 
 _numbers = itertools.count()
 _guards: dict[int, Guard] = {}
 """All that is to be ended, oldest first. Without a lock: a signal handler may interrupt whoever holds one, and a dict
 takes and gives one item at a time."""
+_over: list[bool] = []
+"""Not empty once the end of the program has begun."""
+_starting: ContextVar[Guard | None] = ContextVar("drivebus_starting", default=None)
 
 
 class Guard:
@@ -35,10 +46,12 @@ class Guard:
 
     Args:
         end: Ends it, and returns what is left to raise. Must not mind being called twice, or from another thread.
+        line: What it is ended over: when that is to be closed, it is ended before.
     """
 
-    def __init__(self, end: Callable[[], BaseException | None]) -> None:
+    def __init__(self, end: Callable[[], BaseException | None], line: object = None) -> None:
         self._end = end
+        self._line = line
         self._number = next(_numbers)
         self.in_main_thread = _in_main_thread()
         self.ending = False
@@ -46,15 +59,53 @@ class Guard:
         self.ended_by_others = False
         self._ended = False
         self._ended_for_others = threading.Event()
+        self._on_its_way = False
+        self._begun = threading.Event()
 
     def arm(self) -> None:
-        """From here on it is ended if the program is. In the main thread, signals are listened to as well."""
+        """From here on it is ended if the program is. In the main thread, signals are listened to as well.
+
+        Raises:
+            NotAllowed: The end of the program has begun: nobody would end it.
+        """
         _guards[self._number] = self
+        if _over or sys.is_finalizing():
+            # In this order: either the end of the program finds it, or this finds the end.
+            _guards.pop(self._number, None)
+            raise _too_late()
         # What is registered last is called first: motors stop before anything they were armed after is taken down.
         atexit.unregister(_end_all)
         atexit.register(_end_all)
         if self.in_main_thread:
             _listen()
+
+    @contextmanager
+    def beginning(self) -> Iterator[None]:
+        """A block in which it begins: what starts it asks `before_start`."""
+        token = _starting.set(self)
+        try:
+            yield
+        finally:
+            self._begun.set()
+            _starting.reset(token)
+
+    def may_start(self) -> None:
+        """Called when the start is the next thing to be sent.
+
+        Raises:
+            NotAllowed, SystemExit: The program ends, and this was ended with it. Nothing was sent.
+        """
+        self._on_its_way = True
+        if not (_over or self.ended_by_others):
+            return
+        self._on_its_way = False
+        if _over:
+            raise _too_late()
+        raise SystemExit
+
+    def keeping_interruptions(self, gone_out: Callable[[], bool]) -> Kept:
+        """A block in which what a signal raises is kept until it *gone_out*, as this one's own signals are."""
+        return Kept(lambda: self._ended or gone_out(), _on_signal)
 
     def begin_to_end(self) -> bool:
         """Whether its owner is to end it now: not where the end of the program did. A signal meanwhile waits."""
@@ -66,20 +117,26 @@ class Guard:
         self._ended = True
 
     def check(self) -> None:
-        """Raises SystemExit where the program ends, and did so while this began: its end went out before its start."""
+        """Raises SystemExit where the program ends, and did so while this began: its end may have gone out before."""
         if self.ended_by_others:
             self._ended = False
             raise SystemExit
 
-    def end_for_others(self) -> None:
-        """Ends it from another thread than the one that runs it."""
+    def needs(self, line: object) -> bool:
+        """Whether it is still to be ended, over *line*."""
+        return self._line is line and not self._ended
+
+    def end_for_others(self, when: str = "at the end of the program") -> None:
+        """Ends it from another place than the one that runs it: *when*, for people."""
         self.ended_by_others = True
         try:
+            if self._on_its_way:
+                self._begun.wait(_PATIENCE)
             failure = self._end()
             if failure is None:
                 self._ended = True
             elif not self._ended and sys.stderr is not None:
-                print(f"drivebus: at the end of the program: {failure}", file=sys.stderr)
+                print(f"drivebus: {when}: {failure}", file=sys.stderr)
         finally:
             self._ended_for_others.set()
 
@@ -96,6 +153,25 @@ class Guard:
                 _stop_listening()
         if self.deferred is not None:
             raise self.deferred
+
+
+def before_start() -> None:
+    """To be called before a start is sent: inside a block of `Guard.beginning` it may be too late for one."""
+    guard = _starting.get()
+    if guard is not None:
+        guard.may_start()
+
+
+def end_over(line: object) -> None:
+    """Ends all that is ended over *line*, which is to be closed."""
+    with Kept(lambda: False, _on_signal):
+        for guard in reversed(list(_guards.values())):
+            if guard.needs(line):
+                guard.end_for_others("when the bus was closed")
+
+
+def _too_late() -> NotAllowed:
+    return NotAllowed("the program ends: nothing starts any more, for nobody would stop it. Nothing was sent")
 
 
 def _in_main_thread() -> bool:
@@ -136,9 +212,19 @@ def _on_signal(number: int, _: FrameType | None) -> None:
 
 def _end_all() -> None:
     """What is left when the interpreter ends: blocks in daemon threads, and generators that nobody closed."""
-    for number, guard in reversed(list(_guards.items())):
-        guard.end_for_others()
-        _guards.pop(number, None)
+    _over.append(True)
+    with Kept(lambda: False, _on_signal):
+        for number, guard in reversed(list(_guards.items())):
+            guard.end_for_others()
+            _guards.pop(number, None)
+
+
+def _end_the_rest() -> None:
+    """Called last of all: what was armed when the interpreter had begun to call is not called by it."""
+    _end_all()
+
+
+atexit.register(_end_the_rest)
 
 
 def _forget() -> None:
@@ -146,6 +232,7 @@ def _forget() -> None:
     for guard in _guards.values():
         guard.leave_alone()
     _guards.clear()
+    _over.clear()
     _stop_listening()
 
 

@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import serial
 import serial.rfc2217
@@ -45,6 +46,25 @@ def open_bus(face=drivebus.Bus, **keywords):
     return face(target, **{"timeout": float(timeout), **keywords})
 """
 
+STORM = """
+bus = open_bus()
+drive = bus.drive(1)
+
+def wait_for_the_dead():
+    while True:
+        try:
+            bus.read({dead}, 0x2100)
+        except drivebus.DrivebusError:
+            pass
+
+with bus, drive.running(10.0):
+    threading.Thread(target=wait_for_the_dead, daemon=True).start()
+    say("running")
+    while True:
+        bus.sleep(1)
+"""
+"""Runs a motor beside a thread that waits for a dead unit."""
+
 
 @dataclass
 class Line:
@@ -61,6 +81,10 @@ class Line:
     def told(self) -> list[tuple[float, int]]:
         """When it was told what, on the simulator's clock."""
         return [(at, value) for at, address, value in self.simulator.drive(1).writes() if address == CONTROL]
+
+    def asked(self, unit: int) -> bool:
+        """Whether a program asked *unit*, be it there or not."""
+        return any(who == "master" and data[0] == unit for _, who, data in self.simulator.line.trace())
 
     def start(self, body: str, timeout: float = 2.0) -> Program:
         """Runs *body* in a program of its own."""
@@ -136,7 +160,9 @@ def serial_server(port: str) -> Iterator[str]:
         def serve() -> None:
             client, _ = server.accept()
             with client:
-                manager = serial.rfc2217.PortManager(_Settings(), _Client(client))
+                settings: Any = _Settings()
+                writer: Any = _Client(client)
+                manager = serial.rfc2217.PortManager(settings, writer)
                 answers = threading.Thread(target=hand_on, args=(behind, client, manager.escape))
                 answers.start()
                 hand_on(client, behind, manager.filter)

@@ -21,6 +21,7 @@ from drivebus.figures import Link
 from drivebus.found import Found, Identification
 from drivebus.opening import BusFace, Opening
 from drivebus.profile import Profile
+from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 
@@ -140,10 +141,12 @@ class Bus(BusFace[Line]):
     async def close(self) -> None:
         """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
 
-        What still waits for the line ends with `PortError`.
+        A motor that a block of another task runs over it is stopped before. What still waits for the line ends with
+        `PortError`.
         """
         if not self._is_open:
             return
+        end_over(self.line)
         with self._native.undisturbed() as line:
             await line.close()
             if self._owned is not None:
@@ -201,6 +204,11 @@ class Bus(BusFace[Line]):
         """As `drivebus.Bus.poll`, for `async with` and `async for`. It asks from now on, and keeps no event loop."""
         self._check_open()
         return Poll(self, self._native.native, targets, interval, size)
+
+    @property
+    def line(self) -> object:
+        """What stands for the line: the same for each face of it."""
+        return self._native.native
 
     @contextmanager
     def undisturbed(self) -> Iterator[Bus]:
