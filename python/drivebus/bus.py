@@ -145,9 +145,9 @@ class Bus(BusFace[_native.Bus]):
 
         Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
 
-        While a late answer to an earlier request could pass for the one to this read, a few words more may be asked for,
-        16 at most, and cut off again. A call sends 8 requests at most for each time that it may ask (1 + *retries* of the
-        bus), whatever they are for.
+        While a late answer to an earlier request could pass for the one to this read, a few words more may be asked
+        for, 16 at most, and cut off again. A call sends 8 requests at most for each time that it may ask (1 + *retries*
+        of the bus), whatever they are for.
 
         An *urgent* read overtakes all who wait: for confirming a stop. With *verify* it is asked until the same words
         came twice in a row: against noise that happens to match its CRC, as one damaged answer in 65 536 does.
