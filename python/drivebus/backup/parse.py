@@ -34,6 +34,9 @@ _SHOWN = 100
 _SHOWN_OF_NO_BACKUP = 20
 """The same where no line says that it is one: it may be anything."""
 
+_ANYBODYS = "no TOML, or nothing that a backup has"
+"""Said of a line where nothing says that the file is a backup: it may be anybody's, and none of it is repeated."""
+
 _TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
 _DRIVE: dict[str, tuple[type, str]] = {
     "family": (str, "a text"),
@@ -79,13 +82,23 @@ class _File:
     parameters: list[tuple[int, str, object]] = field(default_factory=list)
     section: str = ""
     tried: set[str] = field(default_factory=set)
+    lacks: list[str] = field(default_factory=list)
+
+    def lack(self, reason: str) -> None:
+        """Notes what a backup has and this file has not."""
+        self.lacks.append(reason)
+        self.wrong.append((1, reason))
 
     def refuse(self, profile: ProfileProtocol | None = None) -> NotAllowed:
         """The error that names each wrong line; *profile* is what they were checked against."""
         self.wrong.sort()
+        is_backup = "family" in self.drive or self.top.get("format") == FORMAT
+        most = _SHOWN if is_backup else _SHOWN_OF_NO_BACKUP
         # What cannot be printed would do something to the terminal that shows it.
-        most = _SHOWN if {"format", "family"} & self.tried else _SHOWN_OF_NO_BACKUP
-        lines = [f"{self.path}:{line}: {printable(reason)}" for line, reason in self.wrong[:most]]
+        lines = [
+            f"{self.path}:{line}: {printable(reason) if is_backup or reason in self.lacks else _ANYBODYS}"
+            for line, reason in self.wrong[:most]
+        ]
         if len(self.wrong) > most:
             lines.append(f"and {len(self.wrong) - most} more")
         read_with = self.drive.get("profile")
@@ -203,9 +216,9 @@ def _check_head(file: _File) -> None:
     given = file.top.get("format")
     if given != FORMAT and (given is not None or "format" not in file.tried):
         what = "no line `format = 1`: it is no backup" if given is None else f"format {given}, which is not known"
-        file.wrong.insert(0, (1, f"the file has {what}"))
+        file.lack(f"the file has {what}")
     if "family" not in file.drive and "family" not in file.tried:
-        file.wrong.append((1, 'the file does not say whose it is: [drive] lacks a line such as family = "gd350"'))
+        file.lack('the file does not say whose it is: [drive] lacks a line such as family = "gd350"')
 
 
 def _parameters(file: _File, profile: ProfileProtocol) -> tuple[dict[str, int], dict[str, int]]:

@@ -11,6 +11,9 @@ use toml::de::{DeArray, DeTable, DeValue, Deserializer, Error};
 use super::problems::MOST;
 use crate::lookup::closest;
 
+/// What each profile has, and hardly another file has both of.
+const OF_EACH: [&str; 2] = ["name", "source"];
+
 /// What is wrong with `text` as a `T`: the place in it, and the reason. Nothing if it is one.
 pub(super) fn problems<T: DeserializeOwned>(text: &str) -> Vec<(usize, String)> {
     let (mut table, errors) = DeTable::parse_recoverable(text);
@@ -18,6 +21,13 @@ pub(super) fn problems<T: DeserializeOwned>(text: &str) -> Vec<(usize, String)> 
     if let Some(first) = errors.first() {
         // What the parser says after its first mistake may only follow from that.
         return vec![(place(first), in_words(first.message()))];
+    }
+    // What says neither its name nor its source may be anybody's file: nothing of it is repeated.
+    let lacks = |wanted: &str| !table.get_ref().keys().any(|key| key.get_ref() == wanted);
+    let lacking: Vec<_> =
+        OF_EACH.into_iter().filter(|key| lacks(key)).map(|key| (0, missing(&format!("\"{key}\"")))).collect();
+    if !lacking.is_empty() {
+        return lacking;
     }
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut gone: Vec<String> = Vec::new();

@@ -63,6 +63,12 @@ fn headers(file: &File, columns: &Columns, reader: &mut csv::Reader<&[u8]>) -> R
         let by = if divider == ';' { "semicolons" } else { "tabs" };
         return Err(file.broken(1, format!("the columns are divided by {by}; save the table with commas between them")));
     }
+    // A file that is no such table may be anybody's: nothing of it is repeated.
+    let known = headers.iter().filter(|header| all().any(|column| column == header)).count();
+    if known < 2 || 2 * known < headers.len() {
+        let columns = columns.required.join(", ");
+        return Err(file.broken(1, format!("this is no such table: its first line has to name its columns, {columns}")));
+    }
     if let Some(surplus) = headers.iter().find(|header| !all().any(|known| known == header)) {
         let closest = closest(surplus, all().copied()).unwrap_or_default();
         return Err(file.broken(1, format!("unknown column \"{surplus}\"; the closest is \"{closest}\"")));
