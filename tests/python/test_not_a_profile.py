@@ -36,7 +36,7 @@ HEAD = 'name = "ours"\nversion = 1\nsource = "notes"\n[overlay]\nprofile = "gd35
 FILES = ("profile.toml", "registers.csv", "parameters.csv", "faults.csv")
 
 
-@pytest.fixture(params=OTHERS.values(), ids=OTHERS.keys())
+@pytest.fixture(params=list(OTHERS.values()), ids=list(OTHERS))
 def other(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     path = tmp_path / "other"
     path.write_text(str(request.param))

@@ -96,8 +96,8 @@ class _Commands(click.Group):
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
     "Options before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
-    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is "
-    "not a safety function: an emergency stop is a wire.",
+    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_READ_ONLY, DRIVEBUS_VARIANT, "
+    "DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
@@ -161,6 +161,12 @@ class _Commands(click.Group):
     help="Use what no document of this very family proves: rows and rules marked unverified or assumed.",
 )
 @click.option(
+    "--read-only",
+    is_flag=True,
+    envvar="DRIVEBUS_READ_ONLY",
+    help="Only look: what would write to a drive, a stop too, is refused before anything is sent.",
+)
+@click.option(
     "--variant",
     "variants",
     multiple=True,
@@ -183,6 +189,7 @@ def cli(
     profile: str | None,
     trust_profile: bool,
     unverified: bool,
+    read_only: bool,
     variants: dict[str, str],
     as_json: bool,
 ) -> None:
@@ -191,7 +198,9 @@ def cli(
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
     out = Output(as_json)
-    context.obj = Session(port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile)
+    context.obj = Session(
+        port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile, read_only
+    )
 
 
 for module in (look, watch, explain, doctor, move, backup, frames, profiles, tools):

@@ -84,6 +84,8 @@ def restore(
     Writes only what differs, to the memory that outlives the power, and reads each back. Interrupted, the same command
     goes on where it was. Exit code 1: something was not restored.
     """
+    if not dry_run:
+        session.will_write()
     kept = _load(session, file)
     options: dict[str, Any] = {
         "groups": groups or None,

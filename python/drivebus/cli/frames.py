@@ -10,8 +10,11 @@ from drivebus.cli.session import Session, pass_session, yes_option
 
 __all__ = ["COMMANDS"]
 
-_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x08})
-"""Function codes that change nothing in a unit."""
+_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x08, 0x0B, 0x0C, 0x11, 0x14, 0x18})
+"""Function codes that change nothing in a unit, as the core has them; of 08H, most of its sub-functions."""
+
+_DIAGNOSTICS = frozenset({0x00, 0x02, *range(0x0B, 0x13)})
+"""Sub-functions of 08H that only tell something."""
 
 
 @click.command()
@@ -34,6 +37,9 @@ def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None
     if not force and len(body) > 4 and _framed(body[:-2]) == body:
         asked = body[:-2].hex(" ").upper()
         raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added: drivebus raw {asked}")
+    diagnoses = pdu[0] != 0x08 or int.from_bytes(pdu[1:3], "big") in _DIAGNOSTICS
+    if pdu[0] not in _READS or not diagnoses:
+        session.will_write()
     with session.bus() as bus:
         if session.profile is not None:
             # From now on the bus knows what the unit is, and refuses what would be no command of its family.

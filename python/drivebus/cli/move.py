@@ -38,6 +38,7 @@ class _Run(click.Command):
 @pass_session
 def run(session: Session, hz: float | None, reverse: bool, wait: float | None, force: bool, yes: bool) -> None:
     """Start the motor, at HZ if given. It keeps running when this command has ended."""
+    session.will_write()
     way = "in reverse" if reverse else "forward"
     speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
     with session.drive() as drive:
@@ -53,6 +54,7 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 @pass_session
 def stop(session: Session, wait: float | None) -> None:
     """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
+    session.will_write()
     with session.drive_to_halt("stop") as drive:
         drive.stop()
         if wait is not None:
@@ -64,6 +66,7 @@ def stop(session: Session, wait: float | None) -> None:
 @pass_session
 def coast(session: Session) -> None:
     """Take the voltage off the motor; it turns on until friction ends it. Asks nothing."""
+    session.will_write()
     with session.drive_to_halt("coast") as drive:
         drive.coast()
         _done(session, drive, "coast")
@@ -77,6 +80,7 @@ def coast(session: Session) -> None:
 @pass_session
 def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool) -> None:
     """Jog the motor at the drive's jog frequency, and end the jog whatever happens: Ctrl-C, a closed terminal."""
+    session.will_write()
     way = "in reverse" if reverse else "forward"
     with session.drive() as drive:
         session.ask(f"This jogs the motor {way} for {seconds:g} s", yes)
@@ -90,6 +94,7 @@ def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool)
 @pass_session
 def reset(session: Session, yes: bool) -> None:
     """Reset a fault whose cause is gone. A drive whose run command still stands may start again."""
+    session.will_write()
     with session.drive() as drive:
         session.ask("This resets the fault; a drive that is still told to run may start", yes)
         drive.reset_fault()
@@ -102,6 +107,7 @@ def reset(session: Session, yes: bool) -> None:
 @pass_session
 def prepare(session: Session, store: bool, yes: bool) -> None:
     """Set the drive to obey the bus, and show what is set. Writes only what differs; moves nothing by itself."""
+    session.will_write()
     with session.drive() as drive:
         session.ask_if_running(drive, "this takes its commands and its setpoint from the bus", yes)
         before = drive.check_control()
@@ -127,6 +133,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
     All are checked before the first is sent. Command registers are refused: `run`, `stop` and the like are for them.
     While the motor turns, it asks first.
     """
+    session.will_write()
     asked = [names.parse_assignment(text) for text in assignments]
     with session.drive() as drive:
         wanted: dict[str, Any] = {}

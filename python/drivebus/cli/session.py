@@ -67,6 +67,7 @@ class Session:
         unverified: Whether what no document of the very family proves may be used.
         variants: What parameters of the drive make of its registers, by name.
         trust_profile: Whether the profile is meant, whatever the drive says of itself.
+        read_only: Whether nothing may be written to a drive.
     """
 
     port: str | None
@@ -79,6 +80,7 @@ class Session:
     unverified: bool = False
     variants: Mapping[str, str] = field(default_factory=dict)
     trust_profile: bool = False
+    read_only: bool = False
 
     @property
     def direction(self) -> dict[str, object] | None:
@@ -97,6 +99,7 @@ class Session:
             "parity": parity,
             "stopbits": int(stop),
             "rs485": self.direction,
+            "read_only": self.read_only,
             **options,
         }
         with drivebus.Bus(self.port, **settings) as bus:
@@ -132,6 +135,17 @@ class Session:
             unverified=self.unverified,
             variants=self.variants or None,
             trust_profile=self.trust_profile,
+        )
+
+    def will_write(self) -> None:
+        """Refuses a command that writes where only looking was asked for, before anything is opened."""
+        if not self.read_only:
+            return
+        name = click.get_current_context().info_name
+        halt = " If it has to stand now, use the emergency stop." if name in ("stop", "coast") else ""
+        raise drivebus.NotAllowed(
+            f"`{name}` writes to the drive, and --read-only says that nothing may; nothing was sent. Say it without "
+            f"that switch; where the environment has it, with DRIVEBUS_READ_ONLY=0.{halt}"
         )
 
     def known_profile(self) -> drivebus.Profile:
