@@ -10,18 +10,29 @@ The line keeps real character times, in real time or in virtual time. `Simulator
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
+from typing import TypeVar
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat, SimulatedLine
-from drivebus.errors import NotAllowed
+from drivebus.errors import DrivebusWarning, NotAllowed, PortError, level_of_the_program
 from drivebus.profile import Profile, profiles
 
 __all__ = ["FAULT_KINDS", "SimulatedDrive", "SimulatedLine", "Simulator", "check_faults"]
 
 FAULT_KINDS = _native.fault_kinds()
 """What can go wrong with an answer, by name: `"flip_bit"`, `"lose_byte"`, ..."""
+
+
+SERVED = ("pty", "tcp", "process")
+"""What a simulator is served by where nothing is said: the first that the system has."""
+
+_IN_WORDS = {"pty": "pseudo-terminal", "tcp": "TCP port", "process": "simulation in this process"}
+_SERVED_BY = {"pty": "by a pseudo-terminal", "tcp": "over TCP", "process": "in this process only"}
+
+_T = TypeVar("_T")
 
 
 class SimulatedDrive:
@@ -146,14 +157,16 @@ class Simulator:
         bytesize: 7 or 8.
         silence: `"spec"`, `"characters"` or seconds, as for `drivebus.SerialFormat`.
         seed: Makes every random choice repeatable.
-        transport: `"pty"` (a pseudo-terminal, for any program), `"tcp"` (RTU over TCP on 127.0.0.1) or `"process"`
-            (only for `drivebus.Bus(simulator)`).
+        transport: `"pty"` (a pseudo-terminal, for any program), `"tcp"` (RTU over TCP on 127.0.0.1), `"process"`
+            (only for `drivebus.Bus(simulator)`), or `"auto"`: the first of them that the system has, with a
+            `DrivebusWarning` where that is not the first.
         clock: `"real"`, or `"virtual"` (only with `"process"`): time jumps to what happens next, nobody waits.
         strict_silence: Whether drives ignore requests that come before the silence is over, as real ones do.
         faults: The share (0.0..1.0) of answers that each kind of fault hits, such as `{"flip_bit": 0.02}`;
             `"all"` is every kind but `"unplug"`. docs/simulator.md says what each does.
         echo: Whether the adapter hands back what it sends.
-        link: A symbolic link that is kept leading to the pseudo-terminal, whatever name `line.replug()` gave it.
+        link: A symbolic link that is kept leading to the pseudo-terminal, whatever name `line.replug()` gave it. With
+            it `"auto"` means `"pty"`.
         fifo: After how many characters of an answer a pseudo-terminal or TCP port hands them over, 1..256, as the FIFO
             of a UART does; the end of an answer comes at once. 1: each character at its moment.
 
@@ -163,7 +176,7 @@ class Simulator:
 
     Attributes:
         format: The `SerialFormat` of the line.
-        transport: As above.
+        transport: As above: what it is served by.
         seed: As above: the same seed, arguments and requests give the same run in virtual time.
     """
 
@@ -179,7 +192,7 @@ class Simulator:
         bytesize: int = 8,
         silence: str | float = "spec",
         seed: int = 0,
-        transport: str = "pty",
+        transport: str = "auto",
         clock: str = "real",
         strict_silence: bool = False,
         faults: Mapping[str, float] | None = None,
@@ -187,7 +200,7 @@ class Simulator:
         link: str | os.PathLike[str] | None = None,
         fifo: int = 8,
     ) -> None:
-        checks.one_of("transport", transport, ("pty", "tcp", "process"))
+        checks.one_of("transport", transport, ("auto", "pty", "tcp", "process"))
         checks.one_of("clock", clock, ("real", "virtual"))
         if clock == "virtual" and transport != "process":
             raise NotAllowed(
@@ -195,23 +208,28 @@ class Simulator:
             )
         if link is not None:
             link = checks.path("link", link)
-            if transport != "pty":
+            if transport not in ("auto", "pty"):
                 raise NotAllowed(f'link {link!r} leads to a pseudo-terminal: it needs transport "pty"')
         _check_units(units)
         rates = check_faults(faults or {}, transport)
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
-        self.transport = transport
         self.seed = checks.whole("seed", seed, 0, 2**64 - 1)
-        self._native = _native.Simulator(
-            units,
-            self.format,
-            seed=self.seed,
-            transport=transport,
-            realtime=clock == "real",
-            strict_silence=strict_silence,
-            link=link,
-            fifo=checks.whole("fifo", fifo, 1, 256),
-        )
+        fifo = checks.whole("fifo", fifo, 1, 256)
+
+        def served(by: str) -> _native.Simulator:
+            return _native.Simulator(
+                units,
+                self.format,
+                seed=self.seed,
+                transport=by,
+                realtime=clock == "real",
+                strict_silence=strict_silence,
+                link=link,
+                fifo=fifo,
+            )
+
+        anything = SERVED if link is None else ("pty",)
+        self.transport, self._native = first_served(anything if transport == "auto" else (transport,), served)
         self.line.set_faults(**rates)
         self.line.echo = echo
 
@@ -251,6 +269,28 @@ class Simulator:
 
     def __repr__(self) -> str:
         return f"<Simulator on {self.port}>"
+
+
+def first_served(transports: Sequence[str], served: Callable[[str], _T]) -> tuple[str, _T]:
+    """The first of *transports* that the system has, and what *served* made by it; says so where it is not the first.
+
+    Raises:
+        PortError, NotAllowed: The system has none of them; as the last one said.
+    """
+    missing: list[str] = []
+    for transport in transports:
+        try:
+            made = served(transport)
+        except (PortError, NotAllowed) as error:
+            if transport == transports[-1]:
+                raise
+            missing.append(f"no {_IN_WORDS[transport]} ({error})")
+        else:
+            if missing:
+                text = f"{', '.join(missing)}: the simulator is served {_SERVED_BY[transport]}"
+                warnings.warn(text, DrivebusWarning, stacklevel=level_of_the_program())
+            return transport, made
+    raise NotAllowed("no transport was given")
 
 
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:

@@ -1,11 +1,9 @@
-"""The demonstration: a whole job on a simulated GD350 behind a pseudo-terminal, at the speed of a real wire.
+"""The demonstration: a whole job on a simulated GD350 behind a port, at the speed of a real wire.
 
 It uses the public API as any program would, and ends well only if everything it says did happen.
 """
 
 from __future__ import annotations
-
-import sys
 
 import click
 from rich.progress import BarColumn, Progress, TextColumn
@@ -29,12 +27,11 @@ def run(out: Output) -> None:
         DrivebusError: Something did not hold, by whose fault it was.
         ClickException: The drive did not behave as it should; exit code 1.
     """
-    transport = "tcp" if sys.platform == "win32" else "pty"
-    with (
-        drivebus.Simulator({1: "gd350"}, baudrate=19200, parity="E", transport=transport) as simulator,
-        drivebus.Bus(simulator.port, baudrate=19200, parity="E") as bus,
-    ):
-        _Job(out, simulator, bus).whole()
+    with drivebus.Simulator({1: "gd350"}, baudrate=19200, parity="E") as simulator:
+        # As any other program would, where one could.
+        port = simulator if simulator.transport == "process" else simulator.port
+        with drivebus.Bus(port, baudrate=19200, parity="E") as bus:
+            _Job(out, simulator, bus).whole()
 
 
 class _Job:

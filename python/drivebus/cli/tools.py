@@ -27,7 +27,13 @@ __all__ = ["COMMANDS"]
     shell_complete=complete_units,
     help=f"Such as 1=gd350,2=vfd500. There are {', '.join(drivebus.profiles())}.",
 )
-@click.option("--transport", type=click.Choice(["pty", "tcp"]), default="pty", show_default=True)
+@click.option(
+    "--transport",
+    type=click.Choice(["auto", "pty", "tcp"]),
+    default="auto",
+    show_default=True,
+    help="A pseudo-terminal, RTU over TCP, or the first of them that this system has.",
+)
 @click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes chance repeatable.")
 @click.option(
     "--faults", type=click.FloatRange(0, 1), metavar="RATE", help="Share of answers that each kind of fault hits."
@@ -68,6 +74,10 @@ def sim(
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     with simulator:
+        if simulator.transport == "process":
+            raise drivebus.PortError(
+                "nothing that this system has is a port to the simulated line: no other program can open it"
+            )
         try:
             # Whoever reads the port may end it at once.
             if session.out.as_json:
