@@ -340,7 +340,7 @@ class Profile:
     def max_words(self) -> int:
         """Most words in one read or write."""
     def role(self, role: str, /) -> str | None:
-        """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `deceleration`, `setpoints.torque` …"""
+        """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `deceleration`, one of `setpoints`."""
     def status_words(self) -> list[str]:
         """The words whose bit fields tell more of the state."""
     def reports_as(self) -> list[str]:

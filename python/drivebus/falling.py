@@ -2,8 +2,8 @@
 
 A drive that ramps down says "running" until it stands. That its frequency falls proves nothing: it also falls in a
 reversal, at a limit of the current, behind a controller, to a setpoint that was lowered, or while a turning motor is
-caught, and each of these may end anywhere or go on through zero. Two things do prove it. One is standstill. The other is
-a fall that began when the stop was sent, from the setpoint at which the motor ran, along the ramp that is set in the
+caught, and each of these may end anywhere or go on through zero. Two things do prove it. One is standstill. The other
+is a fall that began when the stop was sent, from the setpoint at which the motor ran, along the ramp that is set in the
 drive. Whether anybody else may have told it to slow down is for who asks.
 """
 
@@ -63,7 +63,7 @@ class Fall:
         self._longest = confirmed + _LONGEST
         self._began = max(sent, confirmed - _EXCHANGE), confirmed + _DELAY
         self._lowest = math.inf
-        self._ran = False
+        self._went_on = False
         self._rests_since: float | None = None
         self._looks: list[_Look] = []
         self._off = False
@@ -72,16 +72,16 @@ class Fall:
         """Whether it is looked at beyond its time: others who wait for the line then have their turn."""
         return now > self._due
 
-    def runs(self) -> None:
-        """It runs."""
-        self._ran, self._rests_since = True, None
+    def goes_on(self) -> None:
+        """It is not at rest."""
+        self._went_on, self._rests_since = True, None
 
     def rests(self, now: float) -> bool:
         """It is at rest. Whether that is its standstill, and no passage through zero."""
         if self._rests_since is None:
             self._rests_since = now
             self.until = max(self.until, now + 2 * _AT_REST)
-        return not self._ran or now - self._rests_since >= _AT_REST
+        return not self._went_on or now - self._rests_since >= _AT_REST
 
     def see(self, hz: float, setpoint: float, asked: float, answered: float) -> None:
         """Takes the frequency and the setpoint in force of one look into account, both in Hz."""
@@ -96,8 +96,7 @@ class Fall:
         return self._seen_for(_LONG_ENOUGH, 2 * _WOBBLE)
 
     def goes_along(self, slope: float) -> bool:
-        """Whether enough was seen, and each look shows the frequency where a ramp of *slope* Hz/s takes it from the
-        setpoint, begun with the stop."""
+        """Whether enough was seen, and all of it where a ramp of *slope* Hz/s goes that began with the stop."""
         first = self._looks[0]
         self._longest = max(self._longest, self._began[1] + 1.5 * first.hz / slope)
         if self._off or not self._seen_for(_LONG_ENOUGH, _FAR_ENOUGH):

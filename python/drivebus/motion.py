@@ -112,12 +112,13 @@ class Motion(Commanding):
     async def stop(self, *, confirm: float = 1.0, unverified: bool = False) -> None:
         """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
 
-        Returns after half a second and a hertz of the drive's own ramp, where a motor ran at its setpoint and only the bus
-        tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped` waits for
-        that in any case. Where the family has no state that may be used, when the drive has confirmed the command.
+        Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
+        the bus tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped`
+        waits for that in any case. Where the family has no state that may be used, returns when the drive has confirmed
+        the command.
 
-        A frequency that falls is looked at beyond *confirm*: for as long as it falls, and a minute at most, or where the
-        drive's ramp is known half as long again as that takes. A family without a frequency is looked at for *confirm*.
+        A frequency that falls is looked at beyond *confirm*: for as long as it falls, and a minute at most, or where
+        the drive's ramp is known half as long again as that takes. A drive that tells none is looked at for *confirm*.
 
         It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
         seems deaf too. Sent once.
@@ -262,29 +263,35 @@ class Motion(Commanding):
         if drive._evidence.without_state() is not None:
             return  # its confirmation is all there is
         fall = Fall(sent, drive.bus.now(), confirm)
-        told_by_others = command != "stop"  # what coasts has no ramp, and a jog is not at its setpoint
+        # What coasts has no ramp, and what jogs is not at its setpoint.
+        by_ramp = command == "stop"
         ramp: _Ramp | None = None
 
         async def shows(seen: Seen) -> bool:
-            nonlocal told_by_others, ramp
+            nonlocal by_ramp, ramp
             asked = drive.bus.now()
+            if seen.state.at_rest:
+                return fall.rests(asked)
+            fall.goes_on()
             if not seen.state.running:
-                return seen.state.at_rest and fall.rests(asked)
-            fall.runs()
+                return False
             urgent = not fall.is_overdue(asked)
             frequency, setpoint = await drive._frequencies(urgent=urgent)
             if frequency is None:
                 return False
             fall.see(frequency, setpoint, asked, drive.bus.now())
-            elsewhere = seen.source not in (ControlSource.COMMUNICATION, None)
-            told_by_others |= elsewhere or drive._started_as not in ([], [seen.state])
+            by_ramp &= seen.source in (ControlSource.COMMUNICATION, None) and drive._turns_as_started(seen.state)
             if ramp is None and fall.is_worth_asking():
                 ramp = await drive._ramp(urgent=urgent)
             if ramp is None or ramp.slope is None:
                 return False
-            return fall.goes_along(ramp.slope) and ramp.only_by_bus and not told_by_others
+            return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
 
         await drive._confirm(command, shows, confirm, fall)
+
+    def _turns_as_started(self, state: State) -> bool:
+        """Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog."""
+        return self._started_as in ([], [state])
 
     def _halting(self, command: str) -> Self:
         """Itself; where a start was forced on what is not verified, as *command* is, with the same trust."""

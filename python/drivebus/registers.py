@@ -66,6 +66,7 @@ class Registers:
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}
         self._ventured: set[str] = set()
+        # How it was started here last, if it was; unknown after a jog or a raw write. Views of the unit share the list.
         self._started_as: list[State] = []
         self._starts = [0]
         self._halts = [0]

@@ -1,9 +1,9 @@
 """What else makes a frequency fall: a drive that ignores a stop meanwhile is never taken for one that obeys it.
 
-Each row is a motor that slows down for a reason of its own when the stop comes. Once its drive ignores the stop: nothing
-may prove it. Once it obeys, and ramps down from where it is: that is proved, and the table says how soon. The slave is
-made by hand and keeps its own motor; words, codes and parameters are those of the GD350 manual, chapter 9.4: P00.12 is
-the time from P00.03 to 0 Hz, here 10 s for 50 Hz, so that the drive's own ramp is 5 Hz/s.
+Each row is a motor that slows down for a reason of its own when the stop comes. Once its drive ignores the stop, and
+nothing may prove it. Once it obeys, and ramps down from where it is: that is proved, and soon where nothing else goes
+on. The slave is made by hand and keeps its own motor; words, codes and parameters are those of the GD350 manual, chapter
+9.4: P00.12 is the time from P00.03 to 0 Hz, here 10 s for 50 Hz, so that the drive's own ramp is 5 Hz/s.
 """
 
 from __future__ import annotations
@@ -89,9 +89,7 @@ EXPLAINED = {
     "another bus that commands": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0002: 1}),
     "terminals that command": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0001: 1}),
     "a step speed": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0006: 6}),
-    "a setpoint that another master lowers": Explained(
-        along_the_ramp(0.0, 50.0, 10.0), [(0.0, 50.0), (0.001, 10.0)]
-    ),
+    "a setpoint that another master lowers": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0.0, 50.0), (0.001, 10.0)]),
     "an upper limit that was lowered": Explained(along_the_ramp(-0.15, 50.0, 10.0), [(0, 50.0)]),
     "a dip of the mains": Explained([(0.0, 50.0), (1.0, 42.0), (2.0, 42.0), (4.0, 50.0)], [(0, 50.0)]),
     "a dip of the mains to nothing": Explained([(0.0, 50.0), (5.0, 0.0), (9.0, 0.0), (15.0, 50.0)], [(0, 50.0)]),
@@ -150,7 +148,8 @@ class Slave:
         return self.read(unit, address, count), self.clock - EXCHANGE, self.clock
 
     def write(self, _: int, address: int, value: int | Sequence[int], /, **__: object) -> None:
-        assert address == COMMAND and isinstance(value, int)
+        assert address == COMMAND
+        assert isinstance(value, int)
         self.clock += EXCHANGE / 2
         self._heard = self.clock if self._heard is None else self._heard
         self.commands.append(value)
@@ -214,12 +213,12 @@ class Awaited:
         return nullcontext(self)
 
 
-def stop_at_once(slave: Slave, **how: float) -> None:
-    drivebus.Drive(slave, 1, Profile.builtin("gd350"), 0x01A0).stop(**how)
+def stop_at_once(slave: Slave, confirm: float = 1.0) -> None:
+    drivebus.Drive(slave, 1, Profile.builtin("gd350"), 0x01A0).stop(confirm=confirm)
 
 
-def stop_awaited(slave: Slave, **how: float) -> None:
-    asyncio.run(drivebus.aio.Drive(Awaited(slave), 1, Profile.builtin("gd350"), 0x01A0).stop(**how))  # type: ignore[arg-type]
+def stop_awaited(slave: Slave) -> None:
+    asyncio.run(drivebus.aio.Drive(Awaited(slave), 1, Profile.builtin("gd350"), 0x01A0).stop())
 
 
 @pytest.fixture(params=[stop_at_once, stop_awaited], ids=["at once", "awaited"])

@@ -1,8 +1,8 @@
 """What proves that a stop works: standstill, or a fall that began with the stop and goes along the drive's own ramp.
 
-A frequency also falls to a lower setpoint, in a reversal, and to the jog frequency after a jog that caught a motor which
-turned. A drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not pass
-for one that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz. `test_stop_explained` has more that
+A frequency also falls to a lower setpoint, in a reversal, and to the jog frequency after a jog that caught a motor
+which turned. A drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not
+pass for one that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz. `test_stop_explained` has more that
 makes a frequency fall.
 """
 
@@ -53,6 +53,11 @@ def asked_after(simulator: Simulator, command: int) -> list[int]:
     return [int.from_bytes(frame[2:4], "big") for frame in frames[last + 1 :]]
 
 
+def a_second(drive: Drive) -> Drive:
+    """The same unit on the same line, by who knows nothing of the first."""
+    return Drive(drive.bus, drive.unit, drive.profile, 0x01A0)
+
+
 def at_speed(drive: Drive, hz: float = 50.0) -> None:
     drive.run(hz)
     drive.wait_for_speed(timeout=30)
@@ -77,7 +82,7 @@ class TestTheUsualCase:
     def test_a_stop_that_who_knows_nothing_of_the_start_gives(self, simulator: Simulator, drive: Drive) -> None:
         """As `drivebus stop` in another terminal."""
         at_speed(drive)
-        drive.bus.drive(1).stop()
+        a_second(drive).stop()
         assert simulator.drive(1).frequency > 46.0
 
     def test_a_stop_while_it_gets_faster(self, drive: Drive) -> None:
@@ -136,7 +141,7 @@ class TestAFallThatProvesNothing:
 
     @pytest.mark.parametrize("who", ["the same", "another"])
     def test_a_reversal_of_a_drive_that_is_set_as_it_should_be(
-        self, simulator: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch, who: str
+        self, drive: Drive, monkeypatch: pytest.MonkeyPatch, who: str
     ) -> None:
         """It confirms the stop, and nothing that it says speaks against it."""
         at_speed(drive, 30.0)
@@ -150,7 +155,7 @@ class TestAFallThatProvesNothing:
             else:
                 hear(unit, address, value, **how)  # type: ignore[arg-type]
 
-        teller = drive if who == "the same" else drive.bus.drive(1)
+        teller = drive if who == "the same" else a_second(drive)
         monkeypatch.setattr(drive.bus, "write", ignore_stops)
         with pytest.raises(Unconfirmed, match=r"stop was sent.*the motor may still turn.*reverse"):
             teller.stop()
@@ -354,7 +359,7 @@ class TestABlockThatDidNotStartTheMotor:
 
 
 class TestAMotorThatRunsInAFault:
-    """A VFD500 that keeps running in a fault: bits 0 and 3 of status word 1, and 3 in bits 5 and 4. Its manual, p. 96."""
+    """A VFD500 that keeps running in a fault: bits 0 and 3 of status word 1, 3 in bits 5 and 4 (its manual, p. 96)."""
 
     COMMANDS, STATUS = 0x7000, 0x1B12
     RUNS_ON = 0x0039

@@ -15,7 +15,7 @@ import drivebus
 from drivebus import Drive, Profile
 
 CONTROL, SETPOINT, STATE, IDENTIFICATION, FREQUENCY = 0x2000, 0x2001, 0x2100, 0x2103, 0x3000
-MAXIMUM, FREQUENCY_SOURCE, ACCELERATION = 0x0003, 0x0006, 0x000B
+SOURCE, MAXIMUM, FREQUENCY_SOURCE, ACCELERATION, DECELERATION = 0x0001, 0x0003, 0x0006, 0x000B, 0x000C
 RAM = 0x8000
 FORWARD, STOPPED = 1, 3
 STOP = 5
@@ -175,18 +175,20 @@ class TestWhatGoesFirst:
         assert [how["urgent"] for _, _, how in bus.asked] == [True, True]
 
     def test_the_frequency_that_shows_a_ramp(self, bus: StandIn, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
-        # The state word says forward until the ramp is over, and the frequency falls with every look.
-        monkeypatch.setattr(bus, "words", {STATE: 1, STATE + 1: COMMUNICATION, FREQUENCY: 1000, FREQUENCY + 1: 1000})
-        take = bus._take
+        # The state word says forward until the ramp is over: 10 s (P00.12) from 50 Hz (P00.03).
+        bus.words |= {SOURCE: 2, DECELERATION: 100, FREQUENCY + 1: 1000}
+        take, sent = bus._take, bus.clock
 
         def slow_down(what: str, address: int, **how: object) -> None:
             take(what, address, **how)
-            bus.words[STATE] = 1
-            bus.words[FREQUENCY] -= 1
+            bus.words |= {STATE: FORWARD, FREQUENCY: 1000 - round(500 * (bus.clock - sent))}
 
         monkeypatch.setattr(bus, "_take", slow_down)
         drive.stop()
-        assert {address for address, _ in bus.calls("read")} == {STATE, FREQUENCY}
+        assert bus.clock < sent + 0.6
+        read = [address for address, _ in bus.calls("read")]
+        assert set(read) == {STATE, FREQUENCY, SOURCE, FREQUENCY_SOURCE, DECELERATION}
+        assert [read.count(once) for once in (SOURCE, FREQUENCY_SOURCE, DECELERATION)] == [1, 1, 1]
         assert all(how["urgent"] for _, _, how in bus.asked)
 
     def test_looks_beyond_their_time_do_not(self, bus: StandIn, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,7 +197,8 @@ class TestWhatGoesFirst:
 
         def slow_down(what: str, address: int, **how: object) -> None:
             take(what, address, **how)
-            bus.words |= {STATE: FORWARD, FREQUENCY: bus.words[FREQUENCY] - 10, FREQUENCY + 1: 1000}
+            left = max(0, bus.words[FREQUENCY] - 10)
+            bus.words |= {STATE: FORWARD if left else STOPPED, FREQUENCY: left, FREQUENCY + 1: 1000}
 
         bus.words[FREQUENCY] = 5000
         monkeypatch.setattr(bus, "_take", slow_down)
