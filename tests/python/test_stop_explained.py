@@ -2,8 +2,8 @@
 
 Each row is a motor that slows down for a reason of its own when the stop comes. Once its drive ignores the stop, and
 nothing may prove it. Once it obeys, and ramps down from where it is: that is proved, and soon where nothing else goes
-on. The slave is made by hand and keeps its own motor; words, codes and parameters are those of the GD350 manual, chapter
-9.4: P00.12 is the time from P00.03 to 0 Hz, here 10 s for 50 Hz, so that the drive's own ramp is 5 Hz/s.
+on. The slave is made by hand and keeps its own motor; words, codes and parameters are those of the GD350 manual,
+chapter 9.4: P00.12 is the time from P00.03 to 0 Hz, here 10 s for 50 Hz, so that the drive's own ramp is 5 Hz/s.
 """
 
 from __future__ import annotations

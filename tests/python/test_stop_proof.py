@@ -2,8 +2,8 @@
 
 A frequency also falls to a lower setpoint, in a reversal, and to the jog frequency after a jog that caught a motor
 which turned. A drive that confirms a stop and does not obey it (its commands come by another bus, say: P00.02) must not
-pass for one that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz. `test_stop_explained` has more that
-makes a frequency fall.
+pass for one that stops. Ramps and jog of the simulated GD350: 10 s for 50 Hz, and 5 Hz. `test_stop_explained` has more
+that makes a frequency fall.
 """
 
 from __future__ import annotations
