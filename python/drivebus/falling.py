@@ -54,11 +54,13 @@ class Fall:
     Attributes:
         until: Until when it is worth another look.
         frequency: The one seen last, in Hz; None if none was.
+        seen_at: When that was.
     """
 
     def __init__(self, sent: float, confirmed: float, within: float) -> None:
         self.until = self._due = confirmed + within
         self.frequency: float | None = None
+        self.seen_at = confirmed
         self._patience = max(PATIENCE, within)
         self._longest = confirmed + _LONGEST
         self._began = max(sent, confirmed - _EXCHANGE), confirmed + _DELAY
@@ -85,7 +87,7 @@ class Fall:
 
     def see(self, hz: float, setpoint: float, asked: float, answered: float) -> None:
         """Takes the frequency and the setpoint in force of one look into account, both in Hz."""
-        self.frequency = hz
+        self.frequency, self.seen_at = hz, answered
         if hz < self._lowest and self._looks:
             self.until = max(self._due, min(answered + self._patience, self._longest))
         self._lowest = min(self._lowest, hz)

@@ -283,6 +283,8 @@ class Motion(Commanding):
             by_ramp &= seen.source in (ControlSource.COMMUNICATION, None) and drive._turns_as_started(seen.state)
             if ramp is None and fall.is_worth_asking():
                 ramp = await drive._ramp(urgent=urgent)
+                # One that is slow to say nothing of it has still been falling meanwhile.
+                fall.until += drive.bus.now() - fall.seen_at
             if ramp is None or ramp.slope is None:
                 return False
             return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
@@ -317,8 +319,8 @@ class Motion(Commanding):
         readable = self._evidence.readable([*codes, *(name for name in (time, start) if name)])
         try:
             told = await self._told(readable, urgent=urgent)
-        except Refused:
-            told = {}
+        except (NoAnswer, BadAnswer, Refused):
+            told = {}  # then its standstill has to prove it
         seconds, hz = float(told.get(time or "", 0.0)), float(told.get(start or "", 0.0))
         only_by_bus = bool(wanted) and all(told.get(row["code"]) == row["value"] for row in wanted)
         return _Ramp(hz / seconds if hz > 0 and seconds > 0 else None, only_by_bus)

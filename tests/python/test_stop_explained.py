@@ -115,6 +115,8 @@ class Slave:
     Attributes:
         commands: The words that came, in order.
         clock: Seconds.
+        failure: What a read of a parameter raises, if it does, and
+        failure_takes: after how many seconds.
     """
 
     reconnects = 0
@@ -127,6 +129,8 @@ class Slave:
         self._heard: float | None = None
         self._ramp: tuple[float, float] | None = None
         self._off = False
+        self.failure: drivebus.DrivebusError | None = None
+        self.failure_takes = 0.0
         self._parameters = {0x0001: 2, 0x0002: 0, 0x0003: 5000, 0x0006: 8, 0x000C: 100} | explained.parameters
 
     def now(self) -> float:
@@ -139,6 +143,9 @@ class Slave:
         return drivebus.Link(0, 10)
 
     def read(self, _: int, address: int, count: int = 1, /, **__: object) -> list[int]:
+        if self.failure is not None and address < COMMAND:
+            self.clock += self.failure_takes
+            raise self.failure
         self.clock += EXCHANGE / 2
         words = [self._word(address + offset) for offset in range(count)]
         self.clock += EXCHANGE / 2
@@ -268,6 +275,26 @@ def test_an_honest_stop_is_proved_soon(stop: Callable[..., None], reason: str, s
     begun = slave.now()
     stop(slave)
     assert soonest < slave.now() - begun < latest
+
+
+@pytest.mark.parametrize(
+    ("failure", "takes"),
+    [
+        (drivebus.Refused("locked", code=9), EXCHANGE),
+        (drivebus.NoAnswer("silent", started=1.0), 4.5),
+        (drivebus.BadAnswer("noise", started=1.0), 1.5),
+    ],
+    ids=["refused", "silent", "spoilt"],
+)
+@pytest.mark.parametrize("obeys", [False, True])
+def test_a_drive_that_does_not_tell_how_it_is_set_is_proved_by_its_standstill(
+    stop: Callable[..., None], failure: drivebus.DrivebusError, takes: float, obeys: bool
+) -> None:
+    slave = Slave(Explained([(0.0, 50.0)] if obeys else along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)]), obeys=obeys)
+    slave.failure, slave.failure_takes = failure, takes
+    with nullcontext() if obeys else pytest.raises(Unconfirmed):
+        stop(slave)
+    assert slave.stands == obeys
 
 
 @given(
