@@ -93,7 +93,8 @@ impl Asked {
         let right = match (answer.first(), self.length) {
             (Some(&came), _) if came == function | 0x80 && answer.len() == 2 => return Verdict::Refusal,
             (Some(&came), _) if came != function => false,
-            (Some(_), Length::Any) => true,
+            (Some(_), Length::Any) => fits(&self.pdu, answer),
+            // Who gives a length knows better.
             (Some(_), Length::Given(len)) => usize::from(len) == answer.len(),
             (Some(3), Length::Named) => {
                 let bytes = 2 * word(&self.pdu, 3);
@@ -181,5 +182,39 @@ mod tests {
         let stream = [&read[..], &[0xFF], &answer[..], &[0x00], &echo[..]].concat();
         let heard = frames_in(&stream);
         assert_eq!(heard, [Ok(&read[..]), Err(0xFF), Ok(&answer[..]), Err(0x00), Ok(&echo[..])]);
+    }
+}
+
+/// Whether the specification lets `answer` be one to `asked`, both of the same function, which is the caller's own PDU.
+///
+/// Of a request that is not as the specification says, nothing is said.
+fn fits(asked: &[u8], answer: &[u8]) -> bool {
+    let counted =
+        |bytes: usize| !(1..=251).contains(&bytes) || (answer.len() == 2 + bytes && usize::from(answer[1]) == bytes);
+    let own_count = || answer.len() >= 2 && usize::from(answer[1]) == answer.len() - 2;
+    let back = |count: usize, len: usize| answer.len() == len && answer[..=count] == asked[..=count];
+    let is_whole = |at: usize| asked.len() > at && usize::from(asked[at]) == asked.len() - at - 1;
+    match (asked[0], asked.len()) {
+        (1 | 2, 5) => counted(word(asked, 3).div_ceil(8)),
+        (4, 5) => counted(2 * word(asked, 3)),
+        (7, 1) => answer.len() == 2,
+        (5, 5) => back(4, 5),
+        (8, 5) if [0, 1, 3, 10, 20].contains(&word(asked, 1)) => back(4, 5),
+        (8, 5) => back(2, 5),
+        (0x0B, 1) => answer.len() == 5,
+        (0x0C | 0x11, 1) => own_count(),
+        (0x0F, _) if is_whole(5) => back(4, 5),
+        (0x14, _) if is_whole(1) && (asked.len() - 2).is_multiple_of(7) => {
+            counted(asked[2..].chunks(7).map(|record| 2 + 2 * word(record, 5)).sum())
+        }
+        (0x15, len) if is_whole(1) => back(6.min(len - 1), len),
+        (0x16, 7) => back(6, 7),
+        (0x17, _) if is_whole(9) => counted(2 * word(asked, 3)),
+        (0x18, 3) => {
+            answer.len() >= 5 && word(answer, 1) == answer.len() - 3 && 2 * word(answer, 3) == answer.len() - 5
+        }
+        (0x2B, 4) if asked[1] == 0x0E => answer.len() >= 3 && answer[1..3] == asked[1..3],
+        (0x2B, 2..) => answer.get(1) == asked.get(1),
+        _ => true,
     }
 }

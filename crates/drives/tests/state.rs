@@ -86,8 +86,7 @@ fn of_the_shipped_profiles_only_one_word_says_two_things() {
         let Some(word) = profile.state_word() else { continue };
         let fits = |raw: u16, rule: &StateRule| raw & rule.mask == rule.value;
         for raw in 0..=u16::MAX {
-            let said: Vec<State> =
-                word.rules.iter().filter(|&rule| fits(raw, rule)).map(|rule| rule.state).collect();
+            let said: Vec<State> = word.rules.iter().filter(|&rule| fits(raw, rule)).map(|rule| rule.state).collect();
             let runs = said.iter().any(|state| state.is_running());
             assert_eq!(profile.state(raw).is_running(), runs, "{name}: {raw:04X}H is {said:?}");
             assert!(said.len() < 2 || name == "vfd500", "{name}: {raw:04X}H is {said:?}");

@@ -341,10 +341,10 @@ impl Doubts {
         self.forgotten.contains(unit) && now < self.forgotten_until
     }
 
-    /// What may still come of `unit`, in order or not.
+    /// What may still come of `unit`, in order or not. Echoes aside: they can be mistaken for nothing but echoes.
     fn possible(&self, now: Instant, unit: UnitAddress) -> impl Iterator<Item = &Open> {
         let in_doubt = self.contains(now, unit);
-        self.of(unit).filter(move |open| in_doubt || !open.is_past(now))
+        self.of(unit).filter(move |open| !open.expected.is_echo() && (in_doubt || !open.is_past(now)))
     }
 
     fn of(&self, unit: UnitAddress) -> impl Iterator<Item = &Open> {

@@ -7,7 +7,7 @@
 //! | 04H | | byte count: two for each word asked |
 //! | 05H | address and value | |
 //! | 07H | | one byte |
-//! | 08H | sub-function; 01H, 03H, 0AH and 14H also the data | one word |
+//! | 08H | sub-function; 00H, 01H, 03H, 0AH and 14H also the data | one word |
 //! | 0BH | | two words |
 //! | 0CH, 11H | | byte count, whatever it is |
 //! | 0FH | address and quantity | |
@@ -94,7 +94,7 @@ impl Shape {
             [0x01 | 0x02, _, _, c1, c0] => free.and_bytes(u16::from_be_bytes([c1, c0]).div_ceil(8)),
             [0x04, _, _, c1, c0] => free.and_bytes(u16::from_be_bytes([c1, c0]).saturating_mul(2)),
             [0x07] => free.and(Rest::Length(2)),
-            [0x05, _, _, _, _] | [0x08, 0, 0x01 | 0x03 | 0x0A | 0x14, _, _] => Self::repeating(data, 4, 5),
+            [0x05, _, _, _, _] | [0x08, 0, 0x00 | 0x01 | 0x03 | 0x0A | 0x14, _, _] => Self::repeating(data, 4, 5),
             [0x08, _, _, _, _] => Self::repeating(data, 2, 5),
             [0x0B] => free.and(Rest::Length(5)),
             [0x0C | 0x11] => free.and(Rest::Counted),

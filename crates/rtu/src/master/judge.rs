@@ -47,7 +47,7 @@ impl Master {
                             self.tally.add_late();
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
-                        Ok(Answer::Exception { code, .. }) if apart && expected.is_read() => {
+                        Ok(Answer::Exception { code, .. }) if apart && doubted && expected.is_read() => {
                             self.state = State::Idle;
                             self.doubts.hear(&self.framer.frame(range.clone()));
                             self.doubts.left_open(now, unit, expected, timeout);
