@@ -56,6 +56,43 @@ fn a_unit_that_knows_no_echo_is_asked_when_first_contact_is_over() {
     assert!(rig.wire.lock().unwrap().now.as_nanos() < 1_100_000_000, "within a tenth of a second more");
 }
 
+/// A unit that knows no echo, a port that was just opened, and one answer that comes 1.4 time-outs late.
+#[test]
+fn a_unit_without_an_echo_is_right_again_with_the_next_call() {
+    for (retries, failures) in [(0, 1), (2, 0)] {
+        let mut reads = 0;
+        let rig = Rig::fresh(
+            |_, _| Vec::new(),
+            move |_, request| {
+                reads += u32::from(request[1] == 3);
+                match (request[1], reads) {
+                    (8, _) => Vec::new(),
+                    // The first one is the look at the adapter.
+                    (_, 2) => after(millis(700), &right(request)),
+                    _ => at_once(&right(request)),
+                }
+            },
+        );
+        let options = CallOptions { retries: Some(retries), ..CallOptions::default() };
+        let mut failed = 0;
+        for address in 100..120 {
+            let (read, mut came) = (Request::read(address, 1).unwrap(), Vec::new());
+            let result = rig.call(unit(1).into(), &read, options, &mut || false, &mut |answer| {
+                if let Answer::Read { words, .. } = answer {
+                    came = words.iter().collect();
+                }
+            });
+            failed += u32::from(result.is_err());
+            assert!(result.is_err() || came == [address], "{came:?}, not {address}");
+        }
+        assert!(failed <= failures, "{failed} of 20 calls failed with {retries} retries");
+        let end = rig.wire.lock().unwrap().now;
+        // Half a second for an echo in vain and the rest of first contact, then the late answer, then nineteen in time.
+        assert!(end.as_nanos() < 3_000_000_000, "{retries} retries: {end:?}");
+        assert!(rig.bus.stats().total.requests <= 24, "{:?}", rig.bus.stats());
+    }
+}
+
 #[test]
 fn a_read_that_can_be_told_apart_needs_nothing_before_it() {
     let rig = Rig::new(mute(2));
