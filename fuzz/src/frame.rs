@@ -117,7 +117,7 @@ fn check_verdict(head: &[u8], tail: &[u8]) {
         let asked = Asked { pdu: head.to_vec(), length: if nameless { Length::Any } else { length } };
         // The same words back, an exception, and whatever the input has.
         for pdu in [tail, head, &[head[0] | 0x80, len]] {
-            let judged = match request.expected().judge(pdu) {
+            let judged = match request.judge(pdu) {
                 Ok(Answer::Exception { function, code, .. }) => {
                     assert_eq!([function | 0x80, code.0], pdu);
                     Verdict::Refusal

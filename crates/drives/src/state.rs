@@ -89,7 +89,7 @@ impl StateWord {
             return running.state;
         }
         match fitting.next() {
-            Some(rule) if rule.state.is_at_rest() && self.may_run(raw, rule) => State::Unknown,
+            Some(rule) if rule.state.is_at_rest() && self.may_run(raw, *rule) => State::Unknown,
             Some(rule) => rule.state,
             None => State::Unknown,
         }
@@ -102,7 +102,7 @@ impl StateWord {
 
     /// Whether `raw`, of which `rule` says that the motor rests, has the bits by which a running motor is told
     /// from a stopped one. Bits of the rule itself do not count: where it fits, they mean what it says.
-    fn may_run(&self, raw: u16, rule: &StateRule) -> bool {
+    fn may_run(&self, raw: u16, rule: StateRule) -> bool {
         let of = |wanted: fn(State) -> bool| self.rules.iter().filter(move |rule| wanted(rule.state));
         of(State::is_running).any(|running| {
             of(|state| state == State::Stopped).any(|stopped| {
@@ -114,7 +114,7 @@ impl StateWord {
 }
 
 impl StateRule {
-    fn fits(&self, raw: u16) -> bool {
+    fn fits(self, raw: u16) -> bool {
         raw & self.mask == self.value
     }
 }

@@ -70,9 +70,13 @@ pub(crate) fn decode_answer<'py>(
     let (asked, came) = (asked.as_bytes(), came.as_bytes());
     let request = Frame::parse(asked).map_err(refuse)?;
     let unit = UnitAddress::new(request.address()).map_err(refuse)?;
-    let expected = Request::parse(request.pdu()).map_err(refuse)?.expected();
+    let request = Request::parse(request.pdu()).map_err(refuse)?;
     let answer = Frame::parse(came).map_err(|error| frame_error(error, came))?;
-    match expected.judge_frame(unit, &answer) {
+    let judged = request.expected().judge_frame(unit, &answer);
+    match judged.and_then(|by_itself| match by_itself {
+        Answer::Custom { .. } => request.judge(answer.pdu()),
+        named => Ok(named),
+    }) {
         Ok(Answer::Read { words, .. }) => PyList::new(py, words.iter()).map(Some),
         Ok(Answer::Exception { function, code, .. }) => {
             let message = format!("unit {unit} refused function {function:02X}H with exception {:02X}H", code.0);

@@ -216,7 +216,7 @@ enum Kind {
     WriteSingle { address: u16, value: u16 },
     Echo { data: u16 },
     WriteMultiple { address: u16, count: u16 },
-    Custom { function: u8, answer: AnswerLength, shape: Shape },
+    Custom { function: u8, answer: AnswerLength },
 }
 
 impl Expected {
@@ -230,14 +230,7 @@ impl Expected {
             Request::Echo { data } => Kind::Echo { data },
             #[expect(clippy::cast_possible_truncation, reason = "at most 123 words")]
             Request::WriteMultiple { address, words } => Kind::WriteMultiple { address, count: words.len() as u16 },
-            Request::Custom { pdu, answer } => {
-                // Who says how long the answer is knows a unit that the specification may not know.
-                let shape = match answer {
-                    AnswerLength::BySilence => Shape::of_answer_to(pdu),
-                    AnswerLength::Bytes(_) => Shape::FREE,
-                };
-                Kind::Custom { function: request.function(), answer, shape }
-            }
+            Request::Custom { answer, .. } => Kind::Custom { function: request.function(), answer },
         })
     }
 
@@ -267,6 +260,19 @@ impl Expected {
         match self.length() {
             AnswerLength::Bytes(pdu) => Some(AROUND_PDU + pdu as usize),
             AnswerLength::BySilence => None,
+        }
+    }
+
+    /// Whether the specification says more of the answer to `asked`, the PDU of the request: checks `pdu` against that.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError`]: it is not as the specification says.
+    pub(crate) fn check_custom(self, asked: &[u8], pdu: &[u8]) -> Result<(), AnswerError> {
+        match self.0 {
+            // Who says how long the answer is knows a unit that the specification may not know.
+            Kind::Custom { answer: AnswerLength::BySilence, .. } => Shape::of_answer_to(asked).check(pdu),
+            _ => Ok(()),
         }
     }
 
@@ -318,7 +324,8 @@ impl Expected {
         self.judge(frame.pdu())
     }
 
-    /// `pdu` as the answer that was expected, or as the refusal of it.
+    /// `pdu` as the answer that was expected, or as the refusal of it. Of a custom request more is known than this:
+    /// [`Request::judge`].
     ///
     /// # Errors
     ///
@@ -330,12 +337,12 @@ impl Expected {
         if came & !EXCEPTION_BIT != self.function() {
             return Err(AnswerError::Function { asked: self.function(), came });
         }
-        if let (Kind::Custom { answer, shape, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
+        if let (Kind::Custom { answer, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
             return match answer {
                 AnswerLength::Bytes(len) if usize::from(len) != pdu.len() => {
                     Err(AnswerError::Length { len: pdu.len() })
                 }
-                _ => shape.check(pdu).map(|()| Answer::Custom { pdu }),
+                _ => Ok(Answer::Custom { pdu }),
             };
         }
         let answer = Answer::parse(pdu)?;

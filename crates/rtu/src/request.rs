@@ -5,7 +5,7 @@
 use core::fmt;
 
 use crate::Words;
-use crate::answer::Expected;
+use crate::answer::{Answer, AnswerError, Expected};
 use crate::frame::AROUND_PDU;
 
 /// Most bytes of a PDU: 256 of the ADU less address and CRC.
@@ -200,6 +200,20 @@ impl<'a> Request<'a> {
     /// What a right answer must look like, without borrowing from the request.
     pub fn expected(&self) -> Expected {
         Expected::of(self)
+    }
+
+    /// `pdu` as the answer to this request, or as the refusal of it. The answer to a custom request whose length is not
+    /// given is held to what the specification says of its function.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError`]: it answers something else.
+    pub fn judge<'p>(&self, pdu: &'p [u8]) -> Result<Answer<'p>, AnswerError> {
+        let answer = self.expected().judge(pdu)?;
+        if let (Self::Custom { pdu: asked, .. }, Answer::Custom { .. }) = (self, answer) {
+            self.expected().check_custom(asked, pdu)?;
+        }
+        Ok(answer)
     }
 
     /// How many bytes the request has on the wire, with address and CRC.

@@ -39,10 +39,10 @@ fn bytes(text: &str) -> Vec<u8> {
 fn what_the_specification_prints_is_taken_and_what_it_excludes_is_not() {
     for Function { what, request, answer, wrong, .. } in functions() {
         let (request, answer) = (bytes(&request), bytes(&answer));
-        let expected = Request::parse(&request).unwrap().expected();
-        assert!(expected.judge(&answer).is_ok(), "{what}");
+        let asked = Request::parse(&request).unwrap();
+        assert!(asked.judge(&answer).is_ok(), "{what}");
         for wrong in wrong {
-            assert!(expected.judge(&bytes(&wrong)).is_err(), "{what}: {wrong}");
+            assert!(asked.judge(&bytes(&wrong)).is_err(), "{what}: {wrong}");
         }
     }
 }
@@ -53,7 +53,7 @@ fn who_gives_the_length_of_the_answer_is_held_to_that_alone() {
         let request = bytes(&request);
         for wrong in wrong.iter().map(|wrong| bytes(wrong)) {
             let length = AnswerLength::Bytes(u8::try_from(wrong.len()).unwrap());
-            let taken = Request::custom(&request, length).unwrap().expected();
+            let taken = Request::custom(&request, length).unwrap();
             if wrong[0] == request[0] {
                 assert!(matches!(taken.judge(&wrong), Ok(Answer::Custom { .. })), "{what}");
             }
@@ -68,11 +68,11 @@ proptest! {
         let [a1, a0] = address.to_be_bytes();
         let [c1, c0] = count.to_be_bytes();
         let request = [function, a1, a0, c1, c0];
-        let expected = Request::parse(&request).unwrap().expected();
+        let asked = Request::parse(&request).unwrap();
         let right = u8::try_from(count / 8 + u16::from(count % 8 > 0)).unwrap();
         for came in [bytes, right] {
             let answer = [&[function, came][..], &vec![0x55; usize::from(came)]].concat();
-            prop_assert_eq!(expected.judge(&answer).is_ok(), came == right);
+            prop_assert_eq!(asked.judge(&answer).is_ok(), came == right);
         }
     }
 
@@ -83,7 +83,7 @@ proptest! {
         answer in proptest::collection::vec(any::<u8>(), 0..253),
     ) {
         if let Ok(request) = Request::parse(&request) {
-            let _ = request.expected().judge(&answer);
+            let _ = request.judge(&answer);
         }
     }
 }

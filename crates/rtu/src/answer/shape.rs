@@ -84,7 +84,7 @@ impl fmt::Display for Head {
 
 impl Shape {
     /// Any answer will do.
-    pub(super) const FREE: Self = Self { repeats: Head { bytes: [0; MOST], len: 0 }, rest: Rest::Free };
+    const FREE: Self = Self { repeats: Head { bytes: [0; MOST], len: 0 }, rest: Rest::Free };
 
     /// What the answer to the request `pdu` must look like.
     pub(super) fn of_answer_to(pdu: &[u8]) -> Self {

@@ -33,7 +33,8 @@ impl Master {
                     self.framer.forget_own();
                 }
                 Step::Frame(range) => {
-                    let judged = expected.judge_frame(unit, &self.framer.frame(range.clone()));
+                    let frame = self.framer.frame(range.clone());
+                    let judged = expected.judge_frame(unit, &frame).and_then(|answer| self.check(expected, answer));
                     let doubted = self.in_quarantine(now, unit);
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
@@ -94,10 +95,18 @@ impl Master {
     fn tell(&self, expected: Expected, range: Range<usize>) -> Event<'_> {
         let frame = self.framer.frame(range);
         // Judged again, because the first verdict could not be kept beside the change of state.
-        match expected.judge(frame.pdu()) {
+        match expected.judge(frame.pdu()).and_then(|answer| self.check(expected, answer)) {
             Ok(answer) => Event::Answer(answer),
             Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
         }
+    }
+
+    /// `answer`, if it is all that the specification says of the answer to the request in flight.
+    fn check<'a>(&self, expected: Expected, answer: Answer<'a>) -> Result<Answer<'a>, AnswerError> {
+        if let (Answer::Custom { pdu, .. }, [_, asked @ .., _, _]) = (answer, self.request.as_bytes()) {
+            expected.check_custom(asked, pdu)?;
+        }
+        Ok(answer)
     }
 
     /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
