@@ -229,7 +229,7 @@ fn a_refusal_of_the_echo_is_no_proof_at_first_contact() {
         },
     );
     assert_eq!(rig.read(200, 1).unwrap(), [200]);
-    assert!(rig.wire.lock().unwrap().now >= drivebus_rtu::Instant::ZERO + FIRST_CONTACT);
+    assert!(rig.wire.lock().unwrap().now >= Instant::ZERO + FIRST_CONTACT);
 }
 
 /// Another drive in the place of the one that was there: what the old one knew, the new one may not.
