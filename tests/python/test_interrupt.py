@@ -50,3 +50,29 @@ def test_ctrl_c_ends_a_wait_and_leaves_the_port_usable(transport: str, wait: str
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=False)
     assert done.stdout.splitlines() == ["interrupted", "[416]"], done.stderr
     assert done.returncode == 0
+
+
+SHORT = """
+import os, signal, threading, time, drivebus
+
+with drivebus.Simulator({1: "gd350"}) as simulator, drivebus.Bus(simulator, timeout=0.04, retries=100) as bus:
+    bus.echo(1)
+    bus.read(1, 0x2103)
+    simulator.line.drop_answers(1000)
+
+    def interrupt():
+        while bus.stats().retries < 5:
+            time.sleep(0.001)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt, daemon=True).start()
+    try:
+        bus.read(1, 0x2103)
+    except (KeyboardInterrupt, drivebus.NoAnswer) as error:
+        print(type(error).__name__, bus.stats().retries < 50)
+"""
+
+
+def test_ctrl_c_is_heard_between_attempts_that_are_short() -> None:
+    done = subprocess.run([sys.executable, "-c", SHORT], capture_output=True, text=True, timeout=100, check=False)
+    assert done.stdout.splitlines() == ["KeyboardInterrupt True"], done.stderr

@@ -192,7 +192,7 @@ impl Bus {
     /// From inside a `give_up`, the call that asks it closes the line when it ends.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);
-        // What a thread of the parent held when this child was forked, nobody here lets go.
+        // What a thread of the parent held, nobody here lets go.
         if !self.opened_by.is_current() {
             return;
         }
@@ -224,10 +224,12 @@ impl Bus {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let ask = self.ask(destination, request, &options);
         if !self.opened_by.is_current() {
-            return Err(ask.failed(Failure::Forked, None, Instant::ZERO, &[]));
+            // What a thread of the parent held when this child was forked, nobody here lets go: nothing is looked up.
+            let ask = self.ask_as(UnitOptions::default(), destination, request, &options);
+            return Err(ask.failed(Failure::Forked, None, None, &[]));
         }
+        let ask = self.ask(destination, request, &options);
         if self.options.read_only && request.is_write() {
             return Err(ask.failed(Failure::ReadOnly { function: request.function() }, None, self.now_if_known(), &[]));
         }
@@ -240,8 +242,12 @@ impl Bus {
     }
 
     /// Sets what `unit` needs otherwise than the bus, for every call from now on.
+    ///
+    /// In a forked child nothing is set: it makes no calls.
     pub fn configure(&self, unit: UnitAddress, options: UnitOptions) {
-        self.units().insert(unit, options);
+        if self.opened_by.is_current() {
+            self.units().insert(unit, options);
+        }
     }
 
     /// What one call asks, with the times that hold for it.
@@ -251,12 +257,23 @@ impl Bus {
         request: &'a Request<'a>,
         options: &CallOptions,
     ) -> Ask<'a> {
+        let set = match destination {
+            Destination::Broadcast => UnitOptions::default(),
+            Destination::Unit(unit) => self.units().get(&unit).copied().unwrap_or_default(),
+        };
+        self.ask_as(set, destination, request, options)
+    }
+
+    fn ask_as<'a>(
+        &'a self,
+        set: UnitOptions,
+        destination: Destination,
+        request: &'a Request<'a>,
+        options: &CallOptions,
+    ) -> Ask<'a> {
         let (timeout, gap) = match destination {
             Destination::Broadcast => (self.options.turnaround, Duration::ZERO),
-            Destination::Unit(unit) => {
-                let set = self.units().get(&unit).copied().unwrap_or_default();
-                (set.timeout.unwrap_or(self.options.timeout), set.gap.unwrap_or_default())
-            }
+            Destination::Unit(_) => (set.timeout.unwrap_or(self.options.timeout), set.gap.unwrap_or_default()),
         };
         let learns = self.options.learn_timeout || options.priority == Some(Priority::Poll);
         Ask {
@@ -288,14 +305,15 @@ impl Bus {
         self.words.next()
     }
 
-    /// Now, on the line's clock.
+    /// Now, on the line's clock; its start in a forked child, where only the line of the parent knows.
     pub fn now(&self) -> Instant {
-        self.clock.now().unwrap_or_else(|| self.lock().now())
+        let asked = || if self.opened_by.is_current() { self.lock().now() } else { Instant::ZERO };
+        self.clock.now().unwrap_or_else(asked)
     }
 
-    /// As [`now`](Self::now), without waiting for who uses the line: zero where only the line knows, and it is in use.
-    pub(crate) fn now_if_known(&self) -> Instant {
-        self.clock.now().or_else(|| self.owner.try_lock().ok().map(|owner| owner.now())).unwrap_or_default()
+    /// As [`now`](Self::now), without waiting for who uses the line: `None` where only the line knows, and it is in use.
+    pub(crate) fn now_if_known(&self) -> Option<Instant> {
+        self.clock.now().or_else(|| self.owner.try_lock().ok().map(|owner| owner.now()))
     }
 
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
@@ -322,8 +340,11 @@ impl Bus {
         }
     }
 
-    /// What has happened so far.
+    /// What has happened so far; nothing in a forked child, whose parent's it is.
     pub fn stats(&self) -> Stats {
+        if !self.opened_by.is_current() {
+            return Stats::default(); // a thread of the parent's may have held it
+        }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -331,6 +352,9 @@ impl Bus {
     ///
     /// While somebody waits on the line, what it said last.
     pub fn notes(&self) -> Vec<String> {
+        if !self.opened_by.is_current() {
+            return Vec::new(); // a thread of the parent's may have held them
+        }
         let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
         if let Ok(mut owner) = self.owner.try_lock()
             && let Some(line) = owner.line()

@@ -119,9 +119,11 @@ impl<'b, 'r> Call<'b, 'r> {
             let mut owner = self.bus.lock();
             match &result {
                 Ok(done) => owner.dead.answered(unit, done.ended),
-                Err(error) if is_silence(&error.failure) => owner.dead.silent(unit, error.ended),
-                Err(error) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, error.ended),
-                Err(_) => {}
+                Err(error) => match error.ended {
+                    Some(ended) if is_silence(&error.failure) => owner.dead.silent(unit, ended),
+                    Some(ended) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, ended),
+                    _ => {}
+                },
             }
         }
         result.map_err(|mut error| {

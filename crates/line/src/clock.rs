@@ -8,7 +8,7 @@ use std::thread;
 
 use drivebus_rtu::{Duration, Instant};
 
-use crate::punctual::spin;
+use crate::punctual::{PUNCTUAL, Wait};
 
 /// Now, in nanoseconds of the system's monotonic clock.
 ///
@@ -30,9 +30,9 @@ pub fn monotonic() -> Instant {
 /// Blocks the thread until `until`, and never wakes it earlier.
 pub fn sleep_until(until: Instant) {
     let left = until.saturating_duration_since(monotonic());
-    let spin = spin();
-    if left > spin {
-        thread::sleep(left.saturating_sub(spin));
+    if left > PUNCTUAL {
+        let wait = Wait::begin();
+        thread::sleep(left.saturating_sub(wait.spin()));
     }
     while monotonic() < until {
         std::hint::spin_loop();
@@ -53,10 +53,14 @@ pub(crate) fn wait_for(
     /// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take at most 24 days.
     const TURN: Duration = Duration::from_secs(3_600);
 
-    let spin = spin();
+    let mut wait = None;
     loop {
         let left = until.saturating_duration_since(monotonic());
-        let in_kernel = left.saturating_sub(spin).min(TURN);
+        let in_kernel = if left > PUNCTUAL {
+            left.saturating_sub(wait.get_or_insert_with(Wait::begin).spin()).min(TURN)
+        } else {
+            Duration::ZERO
+        };
         let timeout = Timespec::try_from(in_kernel).unwrap_or_default(); // cannot fail: at most an hour
         let mut descriptors = [PollFd::from_borrowed_fd(descriptor, events)];
         match poll(&mut descriptors, Some(&timeout)) {

@@ -139,7 +139,8 @@ impl Course {
         };
         let is_over = (cost > 0 && self.left == 0) || self.attempts > self.asked.saturating_add(PROBED_IN_VAIN);
         self.left = self.left.saturating_sub(cost);
-        !is_over && self.requests > 0 && is_passing(&error.failure) && self.is_in_time(error.ended)
+        let in_time = error.ended.is_some_and(|ended| self.is_in_time(ended));
+        !is_over && self.requests > 0 && is_passing(&error.failure) && in_time
     }
 }
 

@@ -1,7 +1,7 @@
 //! Work that waits in the queue of a bus without a thread, and the bus's own threads that carry it out: how many there
 //! are, who is on the way, and what each does next. What it is that they carry out stands in `errand`.
 
-use std::sync::{Arc, PoisonError, Weak};
+use std::sync::{Arc, MutexGuard, PoisonError, Weak};
 use std::thread::{self, Thread};
 use std::time::Duration;
 
@@ -34,10 +34,14 @@ impl Waiter {
     }
 }
 
+/// Makes a thread that works for a bus; whether the system gave one.
+type Spawn = fn(Weak<Bus>) -> bool;
+
 /// The crew of one bus.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Crew {
     bus: Weak<Bus>,
+    spawn: Spawn,
     threads: usize,
     /// Threads that wait to be called.
     idle: usize,
@@ -46,6 +50,16 @@ pub(crate) struct Crew {
     /// Whether one is on its way to look who is next.
     called: bool,
     dismissed: bool,
+}
+
+impl Default for Crew {
+    fn default() -> Self {
+        let spawn: Spawn = |bus| {
+            let thread = thread::Builder::new().name(String::from("drivebus-worker"));
+            thread.spawn(move || errand::work(&bus)).is_ok()
+        };
+        Self { bus: Weak::new(), spawn, threads: 0, idle: 0, woken: 0, called: false, dismissed: false }
+    }
 }
 
 impl Crew {
@@ -69,20 +83,11 @@ impl Crew {
             self.called = true;
             return true;
         }
-        if self.threads < MOST || is_stop {
-            let bus = Weak::clone(&self.bus);
-            let thread = thread::Builder::new().name(String::from("drivebus-worker"));
-            if thread.spawn(move || errand::work(&bus)).is_ok() {
-                self.threads += 1;
-                self.called = true;
-            }
+        if (self.threads < MOST || is_stop) && (self.spawn)(Weak::clone(&self.bus)) {
+            self.threads += 1;
+            self.called = true;
         }
         false
-    }
-
-    /// Whoever has the turn will look who is next when it has ended.
-    pub(crate) fn comes_back(&mut self) {
-        self.called = true;
     }
 
     /// Somebody looks who is next.
@@ -141,7 +146,7 @@ impl Queue {
         state.crew.belongs_to(crew);
         let ticket = state.order.ticket(priority, unit);
         state.order.wait(ticket, Waiter::Work(work));
-        self.call_next(&mut state);
+        self.call_next(state);
         Ok(ticket)
     }
 
@@ -149,7 +154,7 @@ impl Queue {
     pub(crate) fn take_back(&self, ticket: Ticket) -> Option<Errand> {
         let mut state = self.lock();
         let waiter = state.order.leave(ticket);
-        self.call_next(&mut state);
+        self.call_next(state);
         waiter.and_then(Waiter::into_work)
     }
 
@@ -173,7 +178,7 @@ impl Queue {
         loop {
             state.crew.has_come();
             if let Some((ticket, work)) = state.take_work() {
-                return Some((Turn { queue: self, ticket, of_crew: true }, work));
+                return Some((Turn { queue: self, ticket }, work));
             }
             let is_needed = state.order.waiting().any(|waiter| matches!(waiter, Waiter::Work(_)));
             if state.crew.is_dismissed() || (waited && !is_needed) {
@@ -192,14 +197,18 @@ impl Queue {
     pub(crate) fn leave_crew(&self) {
         let mut state = self.lock();
         state.crew.has_left();
-        self.call_next(&mut state);
+        self.call_next(state);
     }
 
     /// Wakes who is next, if the line is free. It looks for itself whether it still is.
-    pub(crate) fn call_next(&self, state: &mut State) {
+    ///
+    /// Nobody counts on a thread that has had its turn and comes back: first it tells what came of it, and who is told may
+    /// take long.
+    pub(crate) fn call_next(&self, mut state: MutexGuard<'_, State>) {
         if state.owner.is_some() {
             return;
         }
+        let mut refused = Vec::new();
         match state.order.next() {
             Some(Waiter::Thread(thread)) => thread.unpark(),
             Some(Waiter::Work(_)) => {
@@ -209,11 +218,17 @@ impl Queue {
                 }
                 if state.crew.is_empty() {
                     // The system gives no thread: who waits is told so, instead of waiting for ever.
-                    state.order.dismiss(|waiter| matches!(waiter, Waiter::Work(_)));
+                    refused = state.order.dismiss(|waiter| matches!(waiter, Waiter::Work(_)));
+                    if let Some(Waiter::Thread(thread)) = state.order.next() {
+                        thread.unpark();
+                    }
                 }
             }
             None => {}
         }
+        // Who is told may want the queue, and may take long.
+        drop(state);
+        drop(refused);
     }
 }
 
@@ -227,5 +242,57 @@ impl State {
         let work = self.order.take(ticket)?.into_work()?;
         self.owner = Some((ticket, thread::current()));
         Some((ticket, work))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use drivebus_rtu::{Instant, Request, SerialFormat};
+
+    use super::*;
+    use crate::call::CallOptions;
+    use crate::error::Failure;
+    use crate::{BusOptions, Line, PortError};
+
+    /// A line on which nobody is.
+    #[derive(Debug)]
+    struct Nobody;
+
+    impl Line for Nobody {
+        fn now(&self) -> Instant {
+            Instant::ZERO
+        }
+
+        fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
+            Ok(Instant::ZERO)
+        }
+
+        fn receive(&mut self, _: &mut [u8], _: Instant) -> Result<usize, PortError> {
+            Ok(0)
+        }
+
+        fn sleep(&mut self, _: Instant) {}
+
+        fn name(&self) -> String {
+            "nobody".to_owned()
+        }
+    }
+
+    #[test]
+    fn who_is_told_that_there_is_no_thread_may_use_the_queue() {
+        let opener = || -> Result<Box<dyn Line>, PortError> { Ok(Box::new(Nobody)) };
+        let bus = Bus::open(Box::new(opener), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
+        let bus = Arc::new(bus);
+        bus.queue.lock().crew.spawn = |_| false;
+        let (tell, told) = channel();
+        let queue = Arc::clone(&bus.queue);
+        let unit = UnitAddress::new(1).unwrap();
+        let errand = Errand::new(unit.into(), &Request::write(0x2000, 5), CallOptions::default(), move |outcome| {
+            tell.send((outcome.unwrap_err().failure, queue.state.try_lock().is_ok())).unwrap();
+        });
+        bus.send(errand);
+        assert_eq!(told.recv(), Ok((Failure::Closed, true)));
     }
 }

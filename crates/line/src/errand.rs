@@ -99,7 +99,7 @@ impl Errand {
         self.failed(failure, now);
     }
 
-    fn failed(&mut self, failure: Failure, ended: Instant) {
+    fn failed(&mut self, failure: Failure, ended: Option<Instant>) {
         let (destination, request) = (self.destination, std::mem::take(&mut self.frame));
         self.tell(Err(Box::new(CallError { failure, destination, request, raw: Vec::new(), sent: None, ended })));
     }
@@ -115,7 +115,7 @@ impl Drop for Errand {
     /// Nobody waits for ever: the thread that carried it out panicked, or its bus is gone.
     fn drop(&mut self) {
         if self.then.is_some() {
-            self.failed(Failure::Closed, Instant::ZERO);
+            self.failed(Failure::Closed, None);
         }
     }
 }

@@ -22,8 +22,8 @@ pub struct CallError {
     pub raw: Vec<u8>,
     /// When the request went out, on the line's clock; `None`: it never did, so nothing was done.
     pub sent: Option<Instant>,
-    /// When the call ended, on the line's clock.
-    pub ended: Instant,
+    /// When the call ended, on the line's clock; `None` where only a line knows that is gone, or another process's.
+    pub ended: Option<Instant>,
 }
 
 impl fmt::Display for CallError {

@@ -52,8 +52,15 @@ impl Ask<'_> {
     }
 
     /// The error of this request; `sent` and `ended` are moments of the line's clock, `raw` is what came.
-    pub(crate) fn failed(&self, failure: Failure, sent: Option<Instant>, ended: Instant, raw: &[u8]) -> Box<CallError> {
+    pub(crate) fn failed(
+        &self,
+        failure: Failure,
+        sent: Option<Instant>,
+        ended: impl Into<Option<Instant>>,
+        raw: &[u8],
+    ) -> Box<CallError> {
         let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
+        let ended = ended.into();
         Box::new(CallError { failure, destination, request, raw, sent, ended })
     }
 }

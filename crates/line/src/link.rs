@@ -105,7 +105,7 @@ mod tests {
             in_doubt: false,
             yields: None,
         };
-        Err(ask.failed(failure, None, Instant::ZERO, &[]))
+        Err(ask.failed(failure, None, None, &[]))
     }
 
     const ANSWERED: Result<Done, Box<CallError>> = Ok(Done { sent: Instant::ZERO, ended: Instant::ZERO });

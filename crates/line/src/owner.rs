@@ -273,7 +273,7 @@ impl Owner {
         let ask = &Ask { yields: ask.yields.filter(|_| unit.is_some_and(|unit| self.is_silent(unit))), ..*ask };
         let result = match self.line.as_deref_mut() {
             Some(line) => exchange(line, &mut self.master, ask, give_up, take),
-            None => Err(ask.failed(Failure::Closed, None, Instant::ZERO, &[])),
+            None => Err(ask.failed(Failure::Closed, None, None, &[])),
         };
         let delay = result.as_ref().ok().map(|done| self.delay(ask, done));
         if let (Some(unit), Some(delay), Request::ReadHolding { .. }) = (unit, delay, ask.request) {

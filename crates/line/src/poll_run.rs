@@ -118,7 +118,10 @@ impl Runner {
             });
             let (sent, ended) = match &result {
                 Ok(done) => (done.sent, done.ended),
-                Err(error) => (error.sent.unwrap_or(error.ended), error.ended),
+                Err(error) => {
+                    let ended = error.ended.unwrap_or_else(|| self.bus.now());
+                    (error.sent.unwrap_or(ended), ended)
+                }
             };
             sample.sent = if index == 0 { sent } else { sample.sent };
             sample.ended = ended;

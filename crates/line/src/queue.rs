@@ -70,8 +70,6 @@ pub(crate) enum NoTurn {
 pub(crate) struct Turn<'a> {
     pub(crate) queue: &'a Queue,
     pub(crate) ticket: Ticket,
-    /// Whoever drops it comes back at once for the next work.
-    pub(crate) of_crew: bool,
 }
 
 impl Default for Queue {
@@ -132,11 +130,11 @@ impl Queue {
         if is_free {
             state.order.begin(ticket);
             state.owner = Some((ticket, thread));
-            return Ok(Turn { queue: self, ticket, of_crew: false });
+            return Ok(Turn { queue: self, ticket });
         }
         state.order.wait(ticket, Waiter::Thread(thread));
         drop(state);
-        let turn = Turn { queue: self, ticket, of_crew: false };
+        let turn = Turn { queue: self, ticket };
         if turn.comes(give_up) { Ok(turn) } else { Err(NoTurn::GivenUp) }
     }
 
@@ -176,8 +174,7 @@ impl Turn<'_> {
         if let Some((ticket, thread)) = state.owner.take_if(|(owner, _)| *owner == self.ticket) {
             state.order.step_aside(ticket, Waiter::Thread(thread));
         }
-        self.queue.call_next(&mut state);
-        drop(state);
+        self.queue.call_next(state);
         let back = self.comes(give_up);
         if !back {
             self.leave();
@@ -207,29 +204,19 @@ impl Turn<'_> {
     }
 
     /// Gives up the turn, or the place of who waits for it. Doing so again does nothing.
-    pub(crate) fn leave(&mut self) {
-        // Who goes on after this does not come back for the next work.
-        self.of_crew = false;
-        self.end();
-    }
-
-    fn end(&self) {
+    pub(crate) fn leave(&self) {
         let mut state = self.queue.lock();
-        if self.of_crew {
-            // A second thread need not be called for what this one is about to take.
-            state.crew.comes_back();
-        }
         let had_the_line = state.owner.take_if(|(owner, _)| *owner == self.ticket);
         let waited = state.order.leave(self.ticket);
         if had_the_line.is_some() || waited.is_some() {
-            self.queue.call_next(&mut state);
+            self.queue.call_next(state);
         }
     }
 }
 
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
-        self.end();
+        self.leave();
     }
 }
 

@@ -286,10 +286,7 @@ impl Bus {
         take: &mut (dyn FnMut(Answer<'_>) + Send),
     ) -> PyResult<Done> {
         let result = with_signals(py, |give_up| self.core.call(to, request, options, give_up, take))?;
-        result.map_err(|error| {
-            let clock = self.unix_clock(py);
-            call_error(&error, error.sent.map(|sent| clock.at(sent)), clock.at(error.ended))
-        })
+        result.map_err(|error| call_error(&error, self.unix_clock(py)))
     }
 
     pub(crate) fn around(core: CoreBus) -> Self {

@@ -2,11 +2,13 @@
 //! bases where it helps.
 
 use drivebus_line::{CallError, Failure, PortError};
-use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError};
+use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError, Instant};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyDict, PyType};
+
+use crate::bus::UnixClock;
 
 /// The classes of `drivebus.errors`.
 #[derive(Debug, Clone, Copy)]
@@ -98,8 +100,10 @@ pub(crate) fn refused(
     })
 }
 
-/// A call that brought no answer. `times` are its beginning and end in Unix seconds.
-pub(crate) fn call_error(error: &CallError, started: Option<f64>, ended: f64) -> PyErr {
+/// A call that brought no answer; its beginning and end by `clock`.
+pub(crate) fn call_error(error: &CallError, clock: UnixClock) -> PyErr {
+    let at = |moment: Option<Instant>| moment.map(|moment| clock.at(moment));
+    let (started, ended) = (at(error.sent), at(error.ended));
     let unit = match error.destination {
         Destination::Unit(unit) => unit.get(),
         Destination::Broadcast => 0,

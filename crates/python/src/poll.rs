@@ -154,7 +154,7 @@ impl Batch {
             let (values, missing) = match &sample.missing {
                 None => (Some(self.values(py, sample, words)?), None),
                 Some(error) => {
-                    let error = call_error(error, error.sent.map(|sent| self.clock.at(sent)), ended);
+                    let error = call_error(error, self.clock);
                     (None, Some(error.into_value(py)))
                 }
             };

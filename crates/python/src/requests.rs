@@ -234,7 +234,7 @@ impl Requests {
         let errand = Errand::new(to, request, options, move |result| {
             inbox.post(number, move |py| match result {
                 Ok(reply) => make(py, reply, clock),
-                Err(error) => Err(call_error(&error, error.sent.map(|sent| clock.at(sent)), clock.at(error.ended))),
+                Err(error) => Err(call_error(&error, clock)),
             });
         });
         Asked { number, how: How::Errand(self.core.send(errand)) }

@@ -4,6 +4,7 @@
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use drivebus_line::{
     AdapterEcho, Bus, BusOptions, CallError, CallOptions, Errand, Failure, Line, PortError, Priority, Reply, Running,
@@ -191,6 +192,31 @@ fn what_is_abandoned_on_the_wire_ends_and_is_not_repeated() {
     let (_, outcome) = outcomes.recv().unwrap();
     assert!(matches!(outcome.unwrap_err().failure, Failure::NoAnswer { .. }), "it was left to end");
     assert_eq!(simulator.wire().requests(), before + 1);
+}
+
+#[test]
+fn a_slow_callback_holds_up_nobodys_errands() {
+    let (simulator, bus) = pair();
+    // Its first contact is over: whoever stands by for that goes on otherwise.
+    bus.call(unit(1).into(), &identify(), CallOptions::default(), &mut || false, &mut |_| {}).unwrap();
+    let ((called, it_is_called), (return_now, may_return)) = (channel(), channel::<()>());
+    bus.send(Errand::new(unit(1).into(), &identify(), CallOptions::default(), move |_| {
+        called.send(()).unwrap();
+        let _ = may_return.recv();
+    }));
+    it_is_called.recv().unwrap();
+
+    let (to, outcomes) = channel();
+    let stop = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
+    send(&bus, 1, &Request::write(0x2000, 5), stop, &to);
+    send(&bus, 2, &identify(), CallOptions::default(), &to);
+    // The limit only ends a test that has failed.
+    for name in [1, 2] {
+        let (told, outcome) = outcomes.recv_timeout(Duration::from_secs(20)).expect("the callback is still waited for");
+        assert_eq!((told, outcome.is_ok()), (name, true));
+    }
+    assert_eq!(simulator.drive(1).unwrap().writes().len(), 1);
+    drop(return_now);
 }
 
 #[test]

@@ -99,7 +99,7 @@ fn an_answer_is_there_at_its_last_character_after_few_looks() {
                 read = words.iter().count();
             }
         });
-        let ended = result.map_or_else(|error| error.ended, |done| done.ended);
+        let ended = result.map_or_else(|error| error.ended.unwrap(), |done| done.ended);
         assert_eq!((read, ended), (words, *last.lock().unwrap()), "{baud} bit/s, {words} words");
         let looks = looks.load(Ordering::Relaxed);
         assert!(looks <= looks_at_most, "{looks} looks at {words} words");

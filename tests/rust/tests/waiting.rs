@@ -41,7 +41,7 @@ fn waited(simulator: &Simulator, bus: &Bus, options: CallOptions) -> Duration {
     simulator.wire().drop_answers(1);
     let error = read(bus, 1, options).unwrap_err();
     let sent = error.sent.unwrap() + FORMAT.chars(8);
-    let waited = error.ended.saturating_duration_since(sent);
+    let waited = error.ended.unwrap().saturating_duration_since(sent);
     assert!(matches!(error.failure, Failure::NoAnswer { timeout, .. } if timeout == waited), "{error}");
     // Whatever it owes is settled, and has come or never will, before it is asked again.
     read(bus, 1, CallOptions::default()).unwrap();
@@ -130,5 +130,5 @@ fn a_write_waits_the_whole_time_out_whatever_reads_have_taught() {
     let write = Request::write(0x800B, 100); // P00.11 in RAM
     let error = bus.call(unit(1).into(), &write, ONCE, &mut || false, &mut |_| ()).unwrap_err();
     let sent = error.sent.unwrap() + FORMAT.chars(8);
-    assert_eq!(error.ended.saturating_duration_since(sent), Duration::from_millis(500), "{error}");
+    assert_eq!(error.ended.unwrap().saturating_duration_since(sent), Duration::from_millis(500), "{error}");
 }

@@ -165,7 +165,7 @@ fn who_was_called_and_gives_up_calls_the_next() {
         let mut state = queue.lock();
         let ticket = state.order.ticket(priority, unit(1));
         state.order.wait(ticket, Waiter::Thread(thread));
-        Turn { queue: &queue, ticket, of_crew: false }
+        Turn { queue: &queue, ticket }
     };
     let (called, next) = (waits(Write, elsewhere), waits(Read, thread::current()));
     drop(first);

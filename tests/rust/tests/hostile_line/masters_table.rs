@@ -165,6 +165,6 @@ fn a_refusal_is_told_at_its_last_byte() {
     let rig = Rig::new(move |_, _| at_once(&frame));
     let error = rig.read(100, 1).unwrap_err();
     assert!(matches!(error.failure, Failure::Refused { function: 3, code: ExceptionCode::ILLEGAL_ADDRESS }));
-    let took = error.ended.saturating_duration_since(error.sent.unwrap());
+    let took = error.ended.unwrap().saturating_duration_since(error.sent.unwrap());
     assert_eq!(took, FORMAT.chars(8) + FORMAT.t35() + FORMAT.chars(5));
 }
