@@ -2,6 +2,8 @@
 //! profile has its rows.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::path::Path;
+
 use drivebus_drives::{Profile, State, StateRule, StateWord};
 
 /// Bits as a VFD500 has them (its manual, p. 96): 0 runs, 1 the direction, 3 a fault.
@@ -92,5 +94,16 @@ fn of_the_shipped_profiles_only_one_word_says_two_things() {
             assert!(said.len() < 2 || name == "vfd500", "{name}: {raw:04X}H is {said:?}");
             assert_eq!(profile.is_in_fault(raw), said.contains(&State::Fault), "{name}: {raw:04X}H");
         }
+    }
+}
+
+/// One that somebody wrote, with its fault first: bits 0, 1 and 3 as above.
+#[test]
+fn a_profile_of_ones_own_is_read_alike() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/vectors/profiles/ex9");
+    let profile = Profile::load(&folder).unwrap();
+    for (raw, state) in [(0, State::Stopped), (8, State::Fault), (9, State::Forward), (0x0B, State::Reverse)] {
+        assert_eq!(profile.state(raw), state, "{raw:04X}H");
+        assert_eq!(profile.is_in_fault(raw), raw & FAULT != 0, "{raw:04X}H");
     }
 }
