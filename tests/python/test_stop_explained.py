@@ -320,16 +320,3 @@ def test_only_the_drives_own_ramp_from_its_setpoint_passes(
     for moment in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5):
         begun = max(0.0, moment - max(0.0, min(since, 0.1)))
         assert at(fall, moment) == pytest.approx(setpoint / 100 - RAMP * begun, abs=0.2)
-
-
-if __name__ == "__main__":
-    for name, explained in (EXPLAINED | USUAL).items():
-        told = []
-        for obeys in (False, True):
-            slave = Slave(explained, obeys=obeys)
-            try:
-                stop_at_once(slave)
-                told.append(f"proved after {slave.now() - 1000.0:6.2f} s at {slave.hz:6.2f} Hz")
-            except Unconfirmed:
-                told.append(f"unconfirmed,    {slave.now() - 1000.0:6.2f} s at {slave.hz:6.2f} Hz")
-        print(f"{name:48} | {told[0]} | {told[1]}")
