@@ -24,7 +24,8 @@ from drivebus import Profile, Unconfirmed
 COMMAND, STATE, FREQUENCY = 0x2000, 0x2100, 0x3000
 STOP, COAST = 5, 6
 FORWARD, REVERSE, STOPPED = 1, 2, 3
-COMMUNICATION = 2 << 5 | 1
+KEYPAD, COMMUNICATION = 1, 2 << 5 | 1
+JOG_STOP = 8
 RAMP = 5.0
 EXCHANGE = 0.016
 """Seconds from a request to its answer: 8 bytes each way at 19 200 bit/s, and the drive's 5 ms."""
@@ -56,12 +57,16 @@ class Explained(NamedTuple):
         setpoint: What the drive shows as the setpoint in force.
         parameters: What is set otherwise than for a drive that obeys the bus, by address.
         flash: Below so many hertz its state word says that it is stopped, while it goes on.
+        channel: Status word 2.
+        delay: Seconds after which a drive that obeys begins its ramp.
     """
 
     hz: Points
     setpoint: Points
     parameters: dict[int, int] = {}  # noqa: RUF012 - nobody writes to it
     flash: float = 0.0
+    channel: int = COMMUNICATION
+    delay: float = 0.0
 
 
 def along_the_ramp(since: float, hz: float, to: float) -> Points:
@@ -90,7 +95,19 @@ EXPLAINED = {
     "terminals that command": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0001: 1}),
     "a step speed": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0006: 6}),
     "a setpoint that another master lowers": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0.0, 50.0), (0.001, 10.0)]),
+    "a keypad that took over by a key": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], channel=KEYPAD),
+    "a setpoint that another master lowers later": Explained(
+        along_the_ramp(0.3, 50.0, 10.0), [(0.3, 50.0), (0.301, 10.0)]
+    ),
+    "a limit that is lowered later": Explained(along_the_ramp(0.3, 50.0, 10.0), [(0, 50.0)]),
+    "a motor that rocks": Explained(
+        [(0.0, 5.0), (1.2, -1.0), (1.6, 1.0), (2.0, -1.0), (3.2, 5.0)], [(0, 8.0)], flash=0.2
+    ),
+    "a drive that tells no ramp": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x000C: 0}),
+    "a drive that tells no maximum": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0003: 0}),
     "an upper limit that was lowered": Explained(along_the_ramp(-0.15, 50.0, 10.0), [(0, 50.0)]),
+    "a short dip along the ramp": Explained([(0.0, 50.0), (0.4, 48.0), (2.4, 50.0)], [(0, 50.0)]),
+    "a shallow dip along a slow ramp": Explained([(0.0, 50.0), (1.8, 49.1), (4.0, 50.0)], [(0, 50.0)], {0x000C: 1000}),
     "a dip of the mains": Explained([(0.0, 50.0), (1.0, 42.0), (2.0, 42.0), (4.0, 50.0)], [(0, 50.0)]),
     "a dip of the mains to nothing": Explained([(0.0, 50.0), (5.0, 0.0), (9.0, 0.0), (15.0, 50.0)], [(0, 50.0)]),
     "torque control": Explained([(-5.0, 45.0), (40.0, 5.0)], [(0, 50.0)]),
@@ -102,6 +119,7 @@ EXPLAINED = {
 USUAL = {
     "nothing, at its speed": Explained([(0, 50.0)], [(0, 50.0)]),
     "nothing, in reverse": Explained([(0, -30.0)], [(0, 30.0)]),
+    "nothing, in a drive that takes its time": Explained([(0, 50.0)], [(0, 50.0)], delay=0.08),
     "nothing, at a low speed": Explained([(0, 4.0)], [(0, 4.0)]),
     "a start": Explained([(-4.0, 0.0), (6.0, 50.0)], [(0, 50.0)]),
     "nothing, on a ramp of a minute": Explained([(0, 50.0)], [(0, 50.0)], {0x000C: 600}),
@@ -115,6 +133,7 @@ class Slave:
     Attributes:
         commands: The words that came, in order.
         clock: Seconds.
+        seems_to_stand: Whether its state word says so all the time.
         failure: What a read of a parameter raises, if it does, and
         failure_takes: after how many seconds.
     """
@@ -129,6 +148,7 @@ class Slave:
         self._heard: float | None = None
         self._ramp: tuple[float, float] | None = None
         self._off = False
+        self.seems_to_stand = False
         self.failure: drivebus.DrivebusError | None = None
         self.failure_takes = 0.0
         self._parameters = {0x0001: 2, 0x0002: 0, 0x0003: 5000, 0x0006: 8, 0x000C: 100} | explained.parameters
@@ -140,7 +160,7 @@ class Slave:
         self.clock += seconds
 
     def link(self, _: int, /) -> drivebus.Link:
-        return drivebus.Link(0, 10)
+        return drivebus.Link(10, 10)
 
     def read(self, _: int, address: int, count: int = 1, /, **__: object) -> list[int]:
         if self.failure is not None and address < COMMAND:
@@ -160,8 +180,8 @@ class Slave:
         self.clock += EXCHANGE / 2
         self._heard = self.clock if self._heard is None else self._heard
         self.commands.append(value)
-        if self._obeys and value == STOP and self._ramp is None:
-            self._ramp = self.clock, self.hz
+        if self._obeys and value in (STOP, JOG_STOP) and self._ramp is None:
+            self._ramp = self.clock + self._explained.delay, self.hz
         self._off |= self._obeys and value == COAST
         self.clock += EXCHANGE / 2
 
@@ -173,7 +193,8 @@ class Slave:
         if self._ramp is None:
             return at(self._explained.hz, self._since())
         begun, hz = self._ramp
-        left = max(0.0, abs(hz) - 50.0 / (self._parameters[0x000C] / 10) * (self.clock - begun))
+        slope = 500.0 / (self._parameters[0x000C] or 100)
+        left = max(0.0, abs(hz) - slope * max(0.0, self.clock - begun))
         return left if hz >= 0 else -left
 
     @property
@@ -187,10 +208,10 @@ class Slave:
     def _word(self, address: int) -> int:
         hz = self.hz
         if address == STATE:
-            looks_stopped = self.stands or abs(hz) < self._explained.flash
+            looks_stopped = self.stands or self.seems_to_stand or abs(hz) < self._explained.flash
             return STOPPED if looks_stopped else FORWARD if hz >= 0 else REVERSE
         shown = {
-            STATE + 1: COMMUNICATION,
+            STATE + 1: self._explained.channel,
             STATE + 3: 0x01A0,
             FREQUENCY: round(abs(hz) * 100),
             FREQUENCY + 1: round(at(self._explained.setpoint, self._since()) * 100),
@@ -262,6 +283,7 @@ def test_a_drive_that_obeys_it_is_proved(stop: Callable[..., None], reason: str)
         # Half a second of the ramp, the looks at it, and one read of how the drive is set.
         ("nothing, at its speed", 0.5, 0.65),
         ("nothing, in reverse", 0.5, 0.65),
+        ("nothing, in a drive that takes its time", 0.5, 0.65),
         # 0.83 Hz/s, so 1.2 s for a hertz.
         ("nothing, on a ramp of a minute", 1.2, 1.35),
         ("nothing, on a ramp of an hour", 71.0, 72.2),
@@ -275,6 +297,33 @@ def test_an_honest_stop_is_proved_soon(stop: Callable[..., None], reason: str, s
     begun = slave.now()
     stop(slave)
     assert soonest < slave.now() - begun < latest
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [
+        pytest.param(lambda drive: drive.run(reverse=True, confirm=0), id="run"),
+        pytest.param(lambda drive: drive.jog(reverse=True, confirm=0), id="jog"),
+        pytest.param(lambda drive: drive.jog(confirm=0), id="jog that catches it"),
+        pytest.param(lambda drive: drive.write_words(COMMAND, 2), id="by its word"),
+    ],
+)
+def test_what_was_told_in_the_very_moment_is_known(turn: Callable[[drivebus.Drive], None]) -> None:
+    """Nothing that the drive says tells it from a stop, until it has passed through zero."""
+    slave = Slave(Explained(along_the_ramp(0.0, 30.0, -30.0), [(0, 30.0)]), obeys=False)
+    slave.seems_to_stand = True
+    drive = drivebus.Drive(slave, 1, Profile.builtin("gd350"), 0x01A0)
+    turn(drive)  # a motor that seems to stand, so that it is jogged as well
+    slave.seems_to_stand = False
+    with pytest.raises(Unconfirmed):
+        drive.stop()
+
+
+def test_the_end_of_a_jog_is_its_standstill() -> None:
+    """However it falls: what jogs is not at its setpoint, and has a ramp of its own."""
+    slave = Slave(USUAL["nothing, at its speed"], obeys=True)
+    drivebus.Drive(slave, 1, Profile.builtin("gd350"), 0x01A0).jog_stop()
+    assert slave.stands
 
 
 @pytest.mark.parametrize(
