@@ -18,7 +18,7 @@ from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
 from drivebus.figures import Link
 from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening
+from drivebus.opening import BusFace, Opening, check_order, check_trust
 from drivebus.poll import Poll
 from drivebus.polling import Sample
 from drivebus.profile import Profile
@@ -158,6 +158,7 @@ class Bus(BusFace[_native.Bus]):
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
         unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+        check_order(urgent, verify)
         return self._native.read(unit, address, count, urgent=urgent, verify=verify)
 
     def read_stamped(
@@ -165,6 +166,7 @@ class Bus(BusFace[_native.Bus]):
     ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and at which the answer was complete."""
         unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+        check_order(urgent, verify)
         return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify)
 
     def write(
@@ -209,6 +211,7 @@ class Bus(BusFace[_native.Bus]):
         if connection is not None:
             connection = checks.whole("connection", connection, 0, 2**63)
         unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
+        check_order(urgent)
         self._known.check(unit, address, words, checks.flag("force", force))
         return self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
 
@@ -317,6 +320,7 @@ class Bus(BusFace[_native.Bus]):
             NoAnswer, BadAnswer: The drive did not tell; only if *profile* is None.
         """
         unit = checks.unit(unit)
+        check_trust(profile, trust_profile)
         known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)

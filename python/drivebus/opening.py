@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -12,7 +13,7 @@ from drivebus.figures import Stats
 from drivebus.known import KnownUnits
 from drivebus.sim import Simulator
 
-__all__ = ["BusFace", "Opening"]
+__all__ = ["BusFace", "Opening", "check_order", "check_trust"]
 
 
 class Opening:
@@ -56,6 +57,7 @@ class Opening:
             "low_latency": checks.flag("low_latency", low_latency),
             "queue": checks.whole("queue", queue, 1, 1_000_000),
         }
+        _check_together(port, self.keywords)
         target = ports.resolve(port, line)
         self.format = ports.format_of(target, line)
         self.simulator = target if isinstance(target, Simulator) else None
@@ -64,6 +66,29 @@ class Opening:
             target = target._native if target.transport == "process" else target.port
         self.target = target
         self.known = KnownUnits()
+
+
+def check_trust(profile: object, trust: object) -> None:
+    """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
+    if checks.flag("trust_profile", trust) and profile is None:
+        raise NotAllowed("trust_profile is for a profile that is named, and none is: give profile=… (`--profile`)")
+
+
+def check_order(urgent: object, verify: object = False) -> None:
+    """Refuses what is neither True nor False, without a call for each of them where both are."""
+    if type(urgent) is not bool or type(verify) is not bool:
+        checks.flag("urgent", urgent)
+        checks.flag("verify", verify)
+
+
+def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
+    """Refuses what cannot be meant of *port*, before it is resolved: that opens URLs of pyserial and simulators."""
+    named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
+    scheme = named.partition("://")[0] if isinstance(named, str) and "://" in named else ""
+    if keywords["rs485"] is not None and (not isinstance(named, str) or scheme):
+        raise NotAllowed("rs485 is for a serial port given by its path: nobody would move an RTS here")
+    if keywords["echo"] == "yes" and scheme == "tcp":
+        raise NotAllowed('echo "yes" is for an adapter that hands back what it sends, and tcp:// has none: Modbus TCP')
 
 
 class _Native(Protocol):

@@ -150,8 +150,11 @@ def open_simulator(url: str, line: SerialFormat) -> Simulator:
         units[checks.unit(number)] = checks.one_of("profile", family, profiles())
     options = {"clock": "real", "seed": "0", "strict_silence": "0", "echo": "0"}
     faults: dict[str, float] = {}
-    for key, value in parse_qsl(query, keep_blank_values=True):
+    given = parse_qsl(query, keep_blank_values=True)
+    for key, value in given:
         checks.one_of("simulator option", key, (*_SIMULATOR_OPTIONS, *FAULT_KINDS))
+        if [other for other, _ in given].count(key) > 1:
+            raise NotAllowed(f"simulator option {key!r} stands twice in {url!r}; give it once")
         if key == "faults" or key in FAULT_KINDS:
             faults["all" if key == "faults" else key] = _share(key, value, url)
         else:

@@ -211,7 +211,9 @@ class Simulator:
             if transport not in ("auto", "pty"):
                 raise NotAllowed(f'link {link!r} leads to a pseudo-terminal: it needs transport "pty"')
         _check_units(units)
-        rates = check_faults(faults or {}, transport)
+        checks.flag("strict_silence", strict_silence)
+        checks.flag("echo", echo)
+        rates = check_faults({} if faults is None else faults, transport)
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
         self.seed = checks.whole("seed", seed, 0, 2**64 - 1)
         fifo = checks.whole("fifo", fifo, 1, 256)
@@ -295,6 +297,8 @@ def first_served(transports: Sequence[str], served: Callable[[str], _T]) -> tupl
 
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:
     """*faults* as rates, if each is a kind of fault (or "all") with a share that this transport can have."""
+    if not isinstance(faults, Mapping):
+        raise NotAllowed(f'faults {faults!r} is no mapping; give one such as {{"flip_bit": 0.02}}, or None')
     rates = {}
     for kind, rate in faults.items():
         checks.one_of("fault", kind, ("all", *FAULT_KINDS))

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use drivebus_rtu::{self as rtu, DataBits, Parity, Silence, StopBits};
 use pyo3::prelude::*;
-use pyo3::types::{PyFloat, PyString};
+use pyo3::types::{PyBool, PyFloat, PyString};
 
 use crate::convert::shown;
 use crate::errors::{not_allowed, refuse};
@@ -31,7 +31,7 @@ impl SerialFormat {
     ) -> PyResult<Self> {
         let baudrate = match baudrate {
             None => rtu::SerialFormat::DEFAULT.baud_rate(),
-            Some(given) => given.extract().map_err(|_| {
+            Some(given) => no_bool(given).and_then(|given| given.extract().ok()).ok_or_else(|| {
                 let (low, high) = (rtu::SerialFormat::MIN_BAUD_RATE, rtu::SerialFormat::MAX_BAUD_RATE);
                 not_allowed(format!("baudrate {} is not in {low}..{high} bit/s", shown(given)))
             })?,
@@ -133,7 +133,7 @@ fn silence_rule(given: &Bound<'_, PyAny>) -> PyResult<Silence> {
             "characters" => return Ok(Silence::Characters),
             _ => {}
         }
-    } else if let Ok(seconds) = given.extract::<f64>()
+    } else if let Some(seconds) = no_bool(given).and_then(|given| given.extract::<f64>().ok())
         && let Ok(time) = Duration::try_from_secs_f64(seconds)
     {
         return Ok(Silence::Fixed(time));
@@ -157,8 +157,16 @@ fn text(given: Option<&Bound<'_, PyAny>>, default: &str) -> String {
 fn number(given: Option<&Bound<'_, PyAny>>, default: i64) -> Option<i64> {
     match given {
         None => Some(default),
-        Some(given) => given.extract::<i64>().ok().or_else(|| (1..=8).find(|&whole| given.eq(whole).unwrap_or(false))),
+        Some(given) => {
+            let given = no_bool(given)?;
+            given.extract::<i64>().ok().or_else(|| (1..=8).find(|&whole| given.eq(whole).unwrap_or(false)))
+        }
     }
+}
+
+/// What is not a bool: that is a number for Python, and was meant for something else.
+fn no_bool<'a, 'py>(given: &'a Bound<'py, PyAny>) -> Option<&'a Bound<'py, PyAny>> {
+    (!given.is_instance_of::<PyBool>()).then_some(given)
 }
 
 fn shown_or(given: Option<&Bound<'_, PyAny>>) -> String {

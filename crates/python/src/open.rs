@@ -10,7 +10,7 @@ use drivebus_line::tty::{Adapter, TtyOptions};
 use drivebus_line::{Line, Opener, Places};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyBool, PyDict, PyString};
 
 use crate::bus::gone;
 use crate::errors::{not_allowed, port_error};
@@ -131,6 +131,10 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
 
 /// Milliseconds that can be kept.
 fn delay(given: &Bound<'_, PyAny>) -> Option<u32> {
+    // A bool is a number for Python, and was meant for something else.
+    if given.is_instance_of::<PyBool>() {
+        return None;
+    }
     given.extract().ok().filter(|&delay| delay <= MAX_DELAY_MS)
 }
 

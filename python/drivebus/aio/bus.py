@@ -19,7 +19,7 @@ from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
 from drivebus.figures import Link
 from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening
+from drivebus.opening import BusFace, Opening, check_trust
 from drivebus.profile import Profile
 from drivebus.safeguard import end_over
 
@@ -195,6 +195,7 @@ class Bus(BusFace[Line]):
     ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
+        check_trust(profile, trust_profile)
         known, code = await who.profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)

@@ -197,6 +197,8 @@ def cli(
 
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
+    if trust_profile and profile is None:
+        raise click.UsageError("--trust-profile is for a profile that is named: give --profile too")
     out = Output(as_json)
     context.obj = Session(
         port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile, read_only

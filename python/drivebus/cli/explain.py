@@ -77,6 +77,8 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     FAULT is a number, what the keypad shows (`drivebus faults OL1`), or words (`drivebus faults earth short`): it is
     explained, and no drive is asked for faults.
     """
+    if everything and text:
+        raise click.UsageError("--all lists every fault: leave it out to have one explained")
     if everything or text:
         _show_known(session, " ".join(text))
         return

@@ -64,7 +64,7 @@ def sim(
         stopbits=int(stop),
         seed=seed,
         transport=transport,
-        faults=({} if faults is None else {"all": faults}) | dict(map(_rate, single)),
+        faults=_rates(faults, single),
         echo=echo,
         link=link,
         fifo=fifo,
@@ -92,6 +92,15 @@ def sim(
             threading.Event().wait()
         except KeyboardInterrupt:
             session.out.say("")
+
+
+def _rates(every: float | None, single: tuple[str, ...]) -> dict[str, float]:
+    rates = {} if every is None else {"all": every}
+    for kind, rate in map(_rate, single):
+        if kind in rates:
+            raise click.UsageError(f"the rate of {kind} is given twice")
+        rates[kind] = rate
+    return rates
 
 
 def _rate(text: str) -> tuple[str, float]:

@@ -95,6 +95,7 @@ def examine(
     named = None if profile is None else Profile.find(profile)
     say = tell or (lambda _: None)
     checks.flag("unverified", unverified)
+    checks.flag("full", full)
 
     def about(bus: Bus, found: Found) -> Iterator[Finding]:
         return unit_findings(bus, found, echoes, say, named, unverified)
