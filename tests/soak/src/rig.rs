@@ -142,12 +142,10 @@ impl Rig {
     }
 
     /// Sets `words` from `first` on at the keypad of `unit`.
-    pub(crate) fn set(&self, unit: u8, first: u16, words: &[u16]) {
-        let Ok(drive) = self.simulator.drive(unit) else { return };
-        for (address, &word) in (first..).zip(words) {
-            // No parameter that a role sets has a range.
-            let _ = drive.set_parameter(address, word);
-        }
+    pub(crate) fn set(&self, unit: u8, first: u16, words: &[u16]) -> Result<(), String> {
+        let drive = self.simulator.drive(unit).map_err(|error| error.to_string())?;
+        let mut set = (first..).zip(words).map(|(address, &word)| drive.set_parameter(address, word));
+        set.try_for_each(|done| done.map_err(|code| format!("{code:?}")))
     }
 
     /// So many calls were made by the bus itself.

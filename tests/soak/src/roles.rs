@@ -313,7 +313,7 @@ pub(crate) struct Commander {
 /// The stops of one unit. They are all alike, so that only their number tells.
 #[derive(Debug, Default)]
 struct Stops {
-    /// When the answer to one of them was given up, which may still come.
+    /// When the answer to one of them was given up, which may still come, whatever is answered meanwhile.
     owed: Option<Instant>,
     /// One went out and is not in the log yet: the adapter was pulled out in the silence after it.
     under_way: bool,
@@ -365,10 +365,6 @@ impl Commander {
         let stops = self.stops.entry(unit).or_default();
         if let Some(wrong) = stops.check(rig.now(), &taken, None, verdict) {
             verdict.blame(format!("unit {unit}: {wrong}"), rig.trace());
-        }
-        // What the unit owed was cleared up before the command went out.
-        if result.as_ref().map_or_else(|error| error.sent.is_some(), |_| true) {
-            stops.owed = None;
         }
     }
 
