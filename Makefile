@@ -1,5 +1,5 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -163,25 +163,43 @@ conformance: $(PEERS)/.installed ## writes docs/conformance.md
 CARGO_FUZZ := .tools/cargo-fuzz/bin/cargo-fuzz
 FUZZ       := $(CARGO_FUZZ) fuzz run --features libfuzzer --sanitizer none
 FUZZ_FOUND := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)/fuzz
-TARGET     ?= $(basename $(notdir $(wildcard fuzz/targets/*.rs)))
+TARGET     ?= $(basename $(notdir $(wildcard fuzz/targets/*)))
 TIME       ?= 60
+# What is fuzzed from Python runs under atheris, which is libFuzzer for it, in an environment of its own.
+FUZZ_VENV  := .venv-fuzz
+IN_PYTHON  := $(basename $(notdir $(wildcard fuzz/targets/*.py)))
+FUZZ_NEEDS := $(if $(filter-out $(IN_PYTHON),$(TARGET)),$(CARGO_FUZZ)) \
+              $(if $(filter $(IN_PYTHON),$(TARGET)),$(FUZZ_VENV)/.installed)
 
 $(CARGO_FUZZ):
 	@sh tools/check_machine.sh $(PYTHON) rust c++
 	$(CARGO) install --quiet --locked --version 0.13.2 --root .tools/cargo-fuzz cargo-fuzz
 
-fuzz: $(CARGO_FUZZ) ## TIME in seconds for each TARGET
+$(FUZZ_VENV)/.installed: pyproject.toml dist/.wheel
+	$(PYTHON) -m venv --clear $(FUZZ_VENV)
+	$(FUZZ_VENV)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(FUZZ_VENV)/bin/python -m pip install --quiet --group fuzz dist/drivebus-*.whl
+	@touch $@
+
+# How `target` is run, and what stands before libFuzzer's options.
+FUZZ_RUN = if [ -f fuzz/targets/$$target.py ]; \
+    then run="$(FUZZ_VENV)/bin/python -m fuzz.targets.$$target -artifact_prefix=$(FUZZ_FOUND)/" then=; \
+    else run="$(FUZZ) $$target" then=--; fi
+
+fuzz: $(FUZZ_NEEDS) ## TIME in seconds for each TARGET
 	@set -e; for target in $(TARGET); do \
 	    mkdir -p $(FUZZ_FOUND)/$$target; \
 	    echo "make fuzz: $$target, $(TIME) s"; \
-	    $(FUZZ) $$target $(FUZZ_FOUND)/$$target fuzz/corpus/$$target -- \
+	    $(FUZZ_RUN); \
+	    $$run $(FUZZ_FOUND)/$$target fuzz/corpus/$$target $$then \
 	        -max_total_time=$(TIME) -max_len=2048 -rss_limit_mb=512 -timeout=10 -print_final_stats=1; \
 	done
 
-fuzz-corpus: $(CARGO_FUZZ) ## adds what reaches code that nothing in fuzz/corpus reaches
+fuzz-corpus: $(FUZZ_NEEDS) ## adds what reaches code that nothing in fuzz/corpus reaches
 	@set -e; for target in $(TARGET); do \
 	    mkdir -p $(FUZZ_FOUND)/$$target; \
-	    $(FUZZ) $$target fuzz/corpus/$$target $(FUZZ_FOUND)/$$target -- -merge=1 -use_counters=0; \
+	    $(FUZZ_RUN); \
+	    $$run fuzz/corpus/$$target $(FUZZ_FOUND)/$$target $$then -merge=1 -use_counters=0; \
 	done
 
 # Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
@@ -199,4 +217,4 @@ soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(FUZZ_VENV) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import tomli
 
+from drivebus.sim import FAULT_KINDS
+
 HERE = Path(__file__).resolve().parent
 VECTORS = HERE.parent / "tests/vectors"
 PROFILE = HERE / "src/profile"
@@ -236,6 +238,55 @@ def profiles() -> dict[str, bytes]:
     }
 
 
+def drives() -> dict[str, bytes]:
+    """What a drive is told, and what becomes of the answers. A lie's number is that of its shape in `drive.py`."""
+    run, reverse, jog, stop, coast, reset, jog_stop, write, read, status = (1, 2, 3, 5, 6, 7, 8, 9, 10, 11)
+    wait, trip = 0, 12
+    first_lie = 8 * len(FAULT_KINDS)
+    first_lie += -first_lie % 8
+
+    def call(what: int, argument: int = 20, *answers: tuple[int, bytes]) -> bytes:
+        return bytes([what, argument, len(answers)]) + b"".join(bytes([gap]) + how for gap, how in answers)
+
+    def fault(kind: str, gap: int = 0) -> tuple[int, bytes]:
+        return gap, bytes([FAULT_KINDS.index(kind)])
+
+    def lie(shape: int, data: bytes, gap: int = 0) -> tuple[int, bytes]:
+        return gap, bytes([first_lie + shape]) + data
+
+    said_stopped, said_forward = lie(2, b"\0\3", 1), lie(2, b"\0\1", 1)
+    cases = {
+        "a-job": call(run) + call(wait, 32) + call(status) + call(stop) + call(wait, 64) + call(coast),
+        "stop-lost": call(run) + call(stop, 0, fault("deaf"), fault("deaf", 1)),
+        "stop-unheard": call(run) + call(stop, 0, fault("silence"), fault("silence", 1)),
+        "stop-said-to-stand": call(run) + call(stop, 0, fault("deaf"), said_stopped, said_stopped),
+        "coast-unheard": call(run) + call(coast, 0, fault("silence")),
+        "coast-lost": call(run) + call(coast, 0, fault("deaf")),
+        "run-lost": call(run, 20, fault("deaf", 3)) + call(run, 30, fault("deaf"), fault("deaf", 1)),
+        "run-unheard": call(run, 20, *(fault("silence", 1) for _ in range(6))),
+        "run-said-to-turn": call(run, 20, *(said_forward for _ in range(8))),
+        "run-late": call(run, 20, *(fault("late", 1) for _ in range(6))) + call(stop),
+        "run-overtaken": call(run, 20, *(fault("overtaken", 1) for _ in range(6))) + call(stop) + call(run),
+        "stops-overtaken": call(run) + call(stop, 0, fault("overtaken")) + call(run) + call(stop, 0, fault("deaf")),
+        "reversed": call(run) + call(wait, 8) + call(reverse) + call(wait, 40) + call(stop),
+        "jogged": call(jog) + call(jog_stop, 0, fault("silence")) + call(jog, 0, fault("flip_bit", 2)),
+        "tripped": call(run) + call(trip) + call(stop) + call(reset, 0, fault("silence", 1)) + call(run),
+        "written-twice": call(write, 50, fault("silence")) + call(write, 60, fault("deaf")) + call(read),
+        "read-overtaken": call(read, 0, fault("overtaken")) + call(write, 70) + call(read) * 3,
+        "in-pieces": call(run, 20, *(fault("split") for _ in range(8)))
+        + call(stop, 0, fault("split"), fault("foreign", 1)),
+        "unplugged": call(run, 20, fault("unplug", 3)) + call(stop) + call(status) + call(stop),
+        "anything": call(
+            run, 20, lie(0, b"\6\1\3\2\0\3\0"), lie(1, b"\3\x83\1\0"), lie(6, b"\3\6"), lie(7, b"\0\1\0\3")
+        ),
+        "confirmed-by-anybody": call(run, 20, *(lie(5, b"") for _ in range(5)))
+        + call(stop, 0, lie(4, b"\5"), lie(4, b"\5")),
+    }
+    return {name: b"\4\1" + data for name, data in cases.items()} | {
+        "echoing-adapter": b"\x14\1" + cases["a-job"] + cases["stop-lost"]
+    }
+
+
 def main() -> None:
     """The command."""
     listened = streams()
@@ -249,6 +300,7 @@ def main() -> None:
     }
     corpus = {
         "bus": buses(),
+        "drive": drives(),
         "frame": frames(),
         "framer": framer,
         "listener": listened,
