@@ -1,8 +1,9 @@
 """Measures what answers that come late, behind later ones, do to a bus: wrong values, failed reads, requests, time.
 
-A slave of its own in plain Python, in a process of its own, answers reads of eight registers in four lengths. Each
-answer carries the number of the request it was given for, so that one taken for another request shows at once, also
-where the same register was asked for. What happens to a share of its answers:
+A slave of its own in plain Python, in a process of its own, answers reads of eight registers in four lengths, and
+refuses those that go beyond its last one, as drives do at the end of a block. Each answer carries the number of the
+request it was given for, so that one taken for another request shows at once, also where the same register was asked
+for. What happens to a share of its answers:
 
     overtaken  they come 1.1 to 4 time-outs late, and whatever is answered meanwhile goes before
     lost       they never come
@@ -40,7 +41,8 @@ UNIT = 1
 REGISTERS, LENGTHS = range(8), (1, 2, 3, 5)
 # The number of a request and its register in one word: 13 bits and 3. A number comes again after 8192 requests.
 NUMBERS = 1 << 13
-READ, LOOP_BACK, ILLEGAL_FUNCTION = 0x03, 0x08, 0x01
+END = max(REGISTERS) + max(LENGTHS)  # no register from here on
+READ, LOOP_BACK, ILLEGAL_FUNCTION, ILLEGAL_ADDRESS = 0x03, 0x08, 0x01, 0x02
 DELAY = (0.001, 0.003)  # seconds that the unit takes to answer
 LATENESS = (1.1, 4.0)  # time-outs
 GAP = 0.002  # seconds between two answers: more than 3.5 characters
@@ -149,7 +151,8 @@ class Slave:
         if pdu[0] == READ:
             address, count = int.from_bytes(pdu[1:3], "big"), int.from_bytes(pdu[3:5], "big")
             shown = b"".join(word.to_bytes(2, "big") for word in words(number, address, count))
-            answer = bytes([READ, 2 * count]) + shown
+            there = address + count <= END
+            answer = bytes([READ, 2 * count]) + shown if there else bytes([READ | 0x80, ILLEGAL_ADDRESS])
         elif pdu[0] == LOOP_BACK and self._cell.loop_back == "answered":
             answer = pdu
         else:
