@@ -80,7 +80,7 @@ impl Framer {
             [_, function, ..] if expected && function & EXCEPTION_BIT == 0 => self.answer_len().or(more),
             // Only silence can tell where an unknown function ends, and a master that did not ask for it does not
             // care.
-            [..=HIGHEST_UNIT, 1..EXCEPTION_BIT, ..] if fresh && self.expect.is_none() && first.is_none() => more,
+            [(..=HIGHEST_UNIT), (1..EXCEPTION_BIT), ..] if fresh && self.expect.is_none() && first.is_none() => more,
             _ => None,
         };
         let mut lengths = [first, second, asked];
