@@ -106,7 +106,7 @@ class Fall:
         earliest, latest = self._began
         for asked, answered, hz, setpoint in self._looks:
             fallen = setpoint - hz
-            self._off |= fallen < -_WOBBLE
+            self._off |= setpoint != first.setpoint or fallen < -_WOBBLE
             earliest = max(earliest, asked - (fallen + _WOBBLE) / slope)
             if fallen > _WOBBLE:
                 latest = min(latest, answered - (fallen - _WOBBLE) / slope)

@@ -106,6 +106,9 @@ EXPLAINED = {
     "a drive that tells no ramp": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x000C: 0}),
     "a drive that tells no maximum": Explained(along_the_ramp(0.0, 50.0, 10.0), [(0, 50.0)], {0x0003: 0}),
     "an upper limit that was lowered": Explained(along_the_ramp(-0.15, 50.0, 10.0), [(0, 50.0)]),
+    "a setpoint that rises while the motor falls behind": Explained(
+        [(0.0, 40.0), (10.0, 20.0)], [(0.0, 40.0), (3.0, 49.0)]
+    ),
     "a short dip along the ramp": Explained([(0.0, 50.0), (0.4, 48.0), (2.4, 50.0)], [(0, 50.0)]),
     "a shallow dip along a slow ramp": Explained([(0.0, 50.0), (1.8, 49.1), (4.0, 50.0)], [(0, 50.0)], {0x000C: 1000}),
     "a dip of the mains": Explained([(0.0, 50.0), (1.0, 42.0), (2.0, 42.0), (4.0, 50.0)], [(0, 50.0)]),
