@@ -203,8 +203,11 @@ impl Owner {
             return Next::LookForEcho;
         }
         let in_doubt = match *ask.request {
-            // A word of the caller's own choosing may be one that it has sent before.
-            Request::Echo { data, .. } => !self.words.is_latest(data) && self.master.may_owe_an_echo(now, unit),
+            // A word of the caller's own choosing may be one that it has sent before. A unit that refuses echoes returns none.
+            Request::Echo { data, .. } => {
+                let may_come = self.master.may_owe_an_echo(now, unit) && !self.resync.refuses_echoes(unit);
+                may_come && !self.words.is_latest(data)
+            }
             _ => in_quarantine,
         };
         if in_doubt {

@@ -179,6 +179,11 @@ impl Resync {
         probe
     }
 
+    /// Whether `unit` has refused the latest echo that it answered.
+    pub(crate) fn refuses_echoes(&self, unit: UnitAddress) -> bool {
+        self.0.get(&unit).is_some_and(|known| known.echo == Some(Echo::Refused))
+    }
+
     /// `unit` owes nothing.
     pub(crate) fn is_sure(&mut self, unit: UnitAddress) {
         if let Some(known) = self.0.get_mut(&unit) {

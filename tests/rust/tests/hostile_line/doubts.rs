@@ -232,6 +232,22 @@ fn a_refusal_of_the_echo_is_no_proof_at_first_contact() {
     assert!(rig.wire.lock().unwrap().now >= Instant::ZERO + FIRST_CONTACT);
 }
 
+/// An echo of the caller's own word at a unit that refuses each: that is what the caller is told, at first contact too.
+#[test]
+fn an_echo_is_refused_by_a_unit_that_refuses_each() {
+    let rig = Rig::fresh(
+        |_, _| Vec::new(),
+        |_, request| {
+            let refusal = [1, 0x88, 0x01, 0x87, 0xC0];
+            at_once(if request[1] == 8 { &refusal } else { return at_once(&right(request)) })
+        },
+    );
+    for _ in 0..3 {
+        let error = rig.ask(&Request::echo(0x12AB)).unwrap_err();
+        assert!(matches!(error.failure, Failure::Refused { .. }), "{error}");
+    }
+}
+
 /// Another drive in the place of the one that was there: what the old one knew, the new one may not.
 #[test]
 fn a_unit_that_returns_no_echo_any_more_is_trusted_again() {
