@@ -47,10 +47,12 @@ pub struct Tally {
     pub noise_idle: u32,
     /// Requests that came back from the adapter itself.
     pub own_echo: u32,
+    /// Requests beside whose answer came what may be left of them: then an adapter may have sent them back.
+    pub own_remnant: u32,
 }
 
 impl Tally {
-    pub(crate) const EMPTY: Self = Self { late: 0, foreign: 0, noise: 0, noise_idle: 0, own_echo: 0 };
+    pub(crate) const EMPTY: Self = Self { late: 0, foreign: 0, noise: 0, noise_idle: 0, own_echo: 0, own_remnant: 0 };
 
     pub(crate) fn add_noise(&mut self, bytes: &[u8]) {
         let idle = bytes.iter().filter(|&&byte| byte == 0x00 || byte == 0xFF).count();

@@ -47,6 +47,9 @@ pub struct Framer {
     silence: Duration,
     last: Option<Instant>,
     expect: Option<(UnitAddress, Expected)>,
+    /// How long after its last byte the rest of an answer that has begun is waited for, and until when at least; `None`:
+    /// for ever.
+    patience: Option<(Duration, Instant)>,
     /// The request whose answer is looked for: an adapter may send it back to us.
     own: Adu,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
@@ -71,6 +74,7 @@ impl Framer {
             silence,
             last: None,
             expect: None,
+            patience: None,
             own: Adu::new(),
             overrun: false,
         }
@@ -78,11 +82,21 @@ impl Framer {
 
     /// From now on hunts for the answer of `unit` to what `expected` was made from; what is held is dropped.
     ///
-    /// Then silence no longer breaks that answer: a USB adapter may deliver it in lumps with pauses between.
+    /// Then silence no longer breaks that answer: a USB adapter may deliver it in lumps with pauses between. How long
+    /// they may be, [`wait_for_the_rest`](Self::wait_for_the_rest) says.
     pub fn expect(&mut self, unit: UnitAddress, expected: Expected) {
         self.clear();
         self.expect = Some((unit, expected));
+        self.patience = None;
         self.own = Adu::new();
+    }
+
+    /// After [`expect`](Self::expect): the rest of an answer that has begun is waited for until `pause` after its last byte,
+    /// and `least` at least; without this, for ever. Then what has come of it is handed out as skipped.
+    ///
+    /// A pause shorter than the silence counts as that silence.
+    pub fn wait_for_the_rest(&mut self, pause: Duration, least: Instant) {
+        self.patience = Some((pause.max(self.silence), least));
     }
 
     /// After [`expect`](Self::expect): `own`, the request, may come back before its answer.
@@ -124,9 +138,17 @@ impl Framer {
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         match self.last {
-            Some(last) if self.len > self.taken && self.lacks() == 0 => Some(last + self.silence),
-            _ => None,
+            Some(_) if self.len == self.taken => None,
+            Some(last) if self.lacks() == 0 => Some(last + self.silence),
+            Some(_) => self.gives_up(),
+            None => None,
         }
+    }
+
+    /// When nothing more is expected to follow what came last, however it is delivered; `None` where that may take for ever.
+    pub(crate) fn gives_up(&self) -> Option<Instant> {
+        let (pause, least) = self.patience?;
+        Some((self.last? + pause).max(least))
     }
 
     /// The next frame, or bytes that belong to none; `None` when there is nothing to say by `now`.
@@ -172,6 +194,7 @@ impl Framer {
             return None;
         }
         let quiet = self.is_quiet(now);
+        let given_up = quiet && self.gives_up().is_some_and(|moment| now >= moment);
         let mut error = None;
         let mut expected = false;
         let mut start = 0;
@@ -179,7 +202,7 @@ impl Framer {
             if start == self.len {
                 break None;
             }
-            match self.look(start, quiet) {
+            match self.look(start, quiet, given_up) {
                 Look::Frame(len) => break Some(start..start + len),
                 Look::Wait => break None,
                 Look::Nothing(why) => {
@@ -212,6 +235,7 @@ impl Framer {
             return None;
         }
         let range = 0..give_up;
+        expected |= quiet && found.is_none() && self.lost_its_head(&range);
         let error = error.or_else(|| Frame::parse(&self.bytes[range.clone()]).err());
         let error = error.unwrap_or(FrameError::TooShort { len: give_up });
         self.overrun = !quiet && found.is_none() && give_up > self.ended;

@@ -27,7 +27,7 @@ pub use doubt::{Attribution, FIRST_CONTACT, OVERTAKING, PATIENCE};
 pub use event::{BeginError, Event, Tally};
 pub use frame::{Adu, Frame, FrameError, MAX_ADU, MIN_ADU};
 pub use framer::{Framer, Skipped};
-pub use master::{Master, TURNAROUND};
+pub use master::{Master, Patience, TURNAROUND};
 pub use request::{AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, Request, RequestError, function};
 pub use serial::{DataBits, Parity, SerialFormat, SerialFormatError, Silence, StopBits};
 pub use slave::{Slave, SlaveEvent};

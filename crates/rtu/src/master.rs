@@ -7,6 +7,8 @@
 //! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
 mod judge;
+mod remnant;
+mod spoilt;
 
 use core::time::Duration;
 
@@ -18,10 +20,25 @@ use crate::framer::Framer;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
+use remnant::Beside;
+use spoilt::Spoilt;
+
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
 ///
 /// Source: *Modbus over Serial Line* V1.02, §2.4.1 (100 ms to 200 ms).
 pub const TURNAROUND: Duration = Duration::from_millis(100);
+
+/// How long is listened on for an answer of which something has come, and not the right thing.
+///
+/// Who has the clock learns both from answers that became whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patience {
+    /// So long after the last byte: no pause inside an answer is longer, as adapters and gateways hand it over in lumps.
+    pub pause: Duration,
+    /// But so long after the request at least, which is when the unit has usually begun to answer: what came before may
+    /// have been noise that looked like an answer.
+    pub usual: Duration,
+}
 
 /// A master with at most one request in flight.
 ///
@@ -33,6 +50,7 @@ pub struct Master {
     silence: Duration,
     /// The least silence before the next request, if that is more.
     gap: Duration,
+    patience: Option<Patience>,
     framer: Framer,
     state: State,
     request: Adu,
@@ -40,6 +58,10 @@ pub struct Master {
     strips_echo: bool,
     /// It has yet to send back the one in flight.
     echo_due: bool,
+    /// What came beside the answer that is waited for.
+    beside: Beside,
+    /// What came in its place.
+    spoilt: Spoilt,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
     doubts: Doubts,
@@ -88,11 +110,14 @@ impl Master {
         Self {
             silence,
             gap: Duration::ZERO,
+            patience: None,
             framer: Framer::new(silence),
             state: State::Idle,
             request: Adu::new(),
             strips_echo: false,
             echo_due: false,
+            beside: Beside::NOTHING,
+            spoilt: Spoilt::NOTHING,
             busy: None,
             doubts: Doubts::NONE,
             tally: Tally::EMPTY,
@@ -160,6 +185,15 @@ impl Master {
         self.gap = gap;
     }
 
+    /// From the next request on listens on while something may still follow what came, though it was not the answer.
+    ///
+    /// An answer that broke off is then [`Event::Corrupt`] when `patience` is over, and not when the time is. After one that
+    /// was damaged, or could not be right, the right one is taken if it comes by then. Without patience, as at first, what
+    /// is damaged ends its request at once, and what broke off only with the time.
+    pub const fn be_patient(&mut self, patience: Option<Patience>) {
+        self.patience = patience;
+    }
+
     /// Says that the bytes of [`Event::Transmit`] are on their way and that the last will have left at `end`.
     ///
     /// Out of turn, changes nothing.
@@ -170,7 +204,12 @@ impl Master {
         self.busy = self.busy.max(Some(end));
         let until = end + job.timeout;
         self.state = match job.destination {
-            Destination::Unit(unit) => State::Waiting { unit, expected: job.expected, timeout: job.timeout, until },
+            Destination::Unit(unit) => {
+                if let Some(Patience { pause, usual }) = self.patience {
+                    self.framer.wait_for_the_rest(pause, end + usual);
+                }
+                State::Waiting { unit, expected: job.expected, timeout: job.timeout, until }
+            }
             Destination::Broadcast => State::Turnaround { until },
         };
     }
@@ -194,7 +233,10 @@ impl Master {
             State::Idle => self.framer.deadline(),
             State::Sending { .. } => None,
             State::Quiet { give_up, .. } => Some(self.silent_at().min(give_up)),
-            State::Waiting { until, .. } => Some(self.framer.deadline().map_or(until, |silent| silent.min(until))),
+            State::Waiting { until, .. } => {
+                let until = self.listens_until(until);
+                Some(self.framer.deadline().map_or(until, |silent| silent.min(until)))
+            }
             State::Turnaround { until } => Some(until),
         }
     }
@@ -226,6 +268,8 @@ impl Master {
                     }
                     self.echo_due = self.strips_echo;
                     self.doubts.goes_out();
+                    self.beside.clear();
+                    self.spoilt.clear();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {

@@ -229,3 +229,55 @@ fn a_corrupt_answer_is_reported_with_both_crcs() {
     assert_eq!(received.to_le_bytes(), [0xF8, 0x45]);
     assert_eq!(computed, crc16(&bytes[..5]));
 }
+
+/// What has come when the rest is given up is handed out then, whatever it is cut into, and not earlier.
+#[test]
+fn an_answer_that_breaks_off_is_given_up_when_its_time_is_over() {
+    let unit = UnitAddress::MIN;
+    let answer = Adu::answer(unit, &Answer::read(&[1, 2, 3, 4]).unwrap());
+    for (len, cut) in (1..answer.as_bytes().len()).flat_map(|len| (1..=len).map(move |cut| (len, cut))) {
+        let mut framer = Framer::new(SILENCE);
+        framer.expect(unit, Request::read(0, 4).unwrap().expected());
+        framer.wait_for_the_rest(Duration::from_millis(20), at(15_000));
+        for lump in answer.as_bytes()[..len].chunks(cut) {
+            framer.receive(at(1_000), lump);
+            assert_eq!(framer.poll(at(1_000)), None);
+        }
+        assert_eq!(framer.deadline(), Some(at(21_000)));
+        assert_eq!(framer.poll(at(20_999)), None);
+        assert_eq!(framer.poll(at(21_000)).unwrap().unwrap_err().bytes, &answer.as_bytes()[..len]);
+        assert_eq!(framer.poll(at(21_000)), None);
+        assert_eq!(framer.deadline(), None);
+    }
+}
+
+/// Noise that begins like a longer answer hides a refusal no longer than its rest is waited for.
+#[test]
+fn a_refusal_behind_a_false_beginning_is_found() {
+    let unit = UnitAddress::MIN;
+    let refusal = Adu::answer(unit, &Answer::exception(3, ExceptionCode::ILLEGAL_ADDRESS));
+    let mut framer = Framer::new(SILENCE);
+    framer.expect(unit, Request::read(0, 16).unwrap().expected());
+    framer.wait_for_the_rest(Duration::from_millis(10), at(0));
+    framer.receive(at(0), &[&[0x01, 0x03, 0x20], refusal.as_bytes()].concat());
+    assert_eq!(framer.poll(at(9_999)), None);
+    assert_eq!(framer.poll(at(10_000)).unwrap().unwrap_err().bytes, [0x01, 0x03, 0x20]);
+    assert_eq!(framer.poll(at(10_000)).unwrap().unwrap().as_bytes(), refusal.as_bytes());
+}
+
+proptest! {
+    #[test]
+    fn any_cut_gives_the_same_answer_however_short_the_patience(
+        wire in streams(), cuts in prop::collection::vec(1..300_usize, 0..9), pause in 0..5_u64,
+    ) {
+        let expecting = || {
+            let mut framer = Framer::new(SILENCE);
+            framer.expect(UnitAddress::MIN, Request::read(0, 2).unwrap().expected());
+            framer.wait_for_the_rest(Duration::from_millis(pause), at(0));
+            framer
+        };
+        let whole = run(&mut expecting(), &wire, &[]);
+        prop_assert_eq!(&run(&mut expecting(), &wire, &[1]), &whole);
+        prop_assert_eq!(&run(&mut expecting(), &wire, &cuts), &whole);
+    }
+}

@@ -440,3 +440,66 @@ fn what_an_answer_lacks_is_never_overstated() {
     assert_eq!(master.lacks(), 33);
     assert_eq!(waiting(&read).lacks(), 0, "nothing has begun");
 }
+
+const PATIENCE_OF_10_MS: Patience = Patience { pause: Duration::from_millis(10), usual: Duration::from_millis(5) };
+
+/// As [`waiting`], with patience.
+fn waiting_patiently(request: &Request<'_>) -> Master {
+    let mut master = Master::with_silence(Duration::from_micros(1_750));
+    master.be_patient(Some(PATIENCE_OF_10_MS));
+    send(&mut master, 0, request);
+    master
+}
+
+#[test]
+fn an_answer_without_one_of_its_bytes_is_corrupt_before_the_time_is_over() {
+    let request = Request::read(0x2100, 4).unwrap();
+    let whole = words(1, &[0x1234, 0x5678, 0x9ABC, 0xDEF0]);
+    for lost in 0..whole.len() {
+        let mut bytes = whole.clone();
+        bytes.remove(lost);
+        let mut master = waiting_patiently(&request);
+        master.receive(at(9_000), &bytes);
+        assert_eq!(master.poll(at(18_999)), None, "without {lost}");
+        assert!(matches!(master.poll(at(19_000)), Some(Event::Corrupt { .. })), "without {lost}");
+        assert!(master.in_quarantine(at(20_000), unit(1)), "what comes later is late");
+    }
+}
+
+#[test]
+fn the_right_answer_behind_one_that_cannot_be_is_taken() {
+    let request = Request::read(0x2100, 1).unwrap();
+    let mut damaged = words(1, &[3]);
+    damaged[3] ^= 0x10;
+    for spoilt in [damaged, words(1, &[3, 3])] {
+        let mut master = waiting_patiently(&request);
+        master.receive(at(9_000), &spoilt);
+        assert_eq!(master.poll(at(14_000)), None);
+        let mut given_up = master.clone();
+        master.receive(at(14_000), &words(1, &[3]));
+        assert!(matches!(master.poll(at(14_000)), Some(Event::Answer(Answer::Read { .. }))), "{spoilt:02X?}");
+        assert!(!master.in_quarantine(at(15_000), unit(1)));
+        assert_eq!(given_up.deadline(), Some(at(19_000)));
+        assert_eq!(given_up.poll(at(18_999)), None);
+        match given_up.poll(at(19_000)) {
+            Some(Event::Corrupt { bytes, .. } | Event::Wrong { frame: bytes, .. }) => assert_eq!(bytes, spoilt),
+            other => panic!("{other:?}"),
+        }
+        assert!(given_up.in_quarantine(at(20_000), unit(1)));
+    }
+}
+
+/// What looks damaged before the unit usually answers may be noise.
+#[test]
+fn before_its_usual_time_a_unit_is_not_given_up() {
+    let mut master = Master::with_silence(Duration::from_micros(1_750));
+    let (pause, usual) = (Duration::from_millis(5), Duration::from_millis(30));
+    master.be_patient(Some(Patience { pause, usual }));
+    let end = send(&mut master, 0, &Request::read(0x2100, 1).unwrap());
+    master.receive(at(end + 100), &[0x01, 0x03, 0x02, 0x55]);
+    assert_eq!(master.poll(at(end + 29_999)), None);
+    let mut given_up = master.clone();
+    assert!(matches!(given_up.poll(at(end + 30_000)), Some(Event::Corrupt { .. })));
+    master.receive(at(end + 29_999), &words(1, &[3]));
+    assert!(matches!(master.poll(at(end + 29_999)), Some(Event::Answer(Answer::Read { .. }))));
+}

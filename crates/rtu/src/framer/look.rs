@@ -1,8 +1,11 @@
 //! What may stand at one place of the stream: which lengths a frame beginning there can have, and whether it is worth
 //! waiting for its end.
 
+use core::ops::Range;
+
 use super::Framer;
 use crate::UnitAddress;
+use crate::crc::{crc16, update};
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 
@@ -11,6 +14,9 @@ const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
 const EXCEPTION_ADU: usize = 5;
 /// Address, function code, two words, CRC.
 const SHORT_ADU: usize = 8;
+/// Bytes from which on a beginning is told from noise that happens to look like one: address, function, and a byte that
+/// fits.
+const TOLD: usize = 3;
 
 /// What may stand at one place of the stream.
 pub(super) enum Look {
@@ -20,8 +26,8 @@ pub(super) enum Look {
 }
 
 impl Framer {
-    /// What stands at `start`. `quiet`: no more bytes will come.
-    pub(super) fn look(&self, start: usize, quiet: bool) -> Look {
+    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `given_up`: not then either.
+    pub(super) fn look(&self, start: usize, quiet: bool, given_up: bool) -> Look {
         let expected = self.is_expected(start);
         // An expected answer may come in lumps; anything else ends where the line fell silent.
         let cut = start < self.ended && !expected;
@@ -30,7 +36,7 @@ impl Framer {
         let here = &self.bytes[start..end];
         let fresh = start == 0 && !self.overrun;
 
-        if expected && let Some(look) = self.look_for_own(here) {
+        if expected && let Some(look) = self.look_for_own(here, given_up) {
             return look;
         }
         let mut error = None;
@@ -49,21 +55,56 @@ impl Framer {
                 Err(why) => error = error.or(Some(why)),
             }
         }
-        let patient = expected && self.is_beginning_of_answer(here);
-        if patient || (incomplete && !closed) { Look::Wait } else { Look::Nothing(error) }
+        let begun = expected && self.is_beginning_of_answer(here);
+        if (begun && !given_up) || (incomplete && !closed) {
+            return Look::Wait;
+        }
+        if begun && here.len() >= TOLD {
+            error = error.or(Frame::parse(here).err());
+        }
+        Look::Nothing(error)
+    }
+
+    /// Whether the bytes in `range` end with the answer looked for, or a refusal, that has lost the first byte, the second, or
+    /// the number of bytes that a read has third.
+    ///
+    /// All of them are known, so that the CRC tells. Without them nothing in these bytes looks like an answer.
+    #[cold]
+    pub(super) fn lost_its_head(&self, range: &Range<usize>) -> bool {
+        let Some((unit, expected)) = self.expect else {
+            return false;
+        };
+        let answer = self.answer_len().map(|len| (len, expected.function()));
+        let refusal = (EXCEPTION_ADU, expected.function() | EXCEPTION_BIT);
+        answer.into_iter().chain([refusal]).any(|(len, function)| {
+            let start = range.end.checked_sub(len - 1).filter(|&start| start >= range.start);
+            let Some([head, body @ .., low, high]) = start.map(|start| &self.bytes[start..range.end]) else {
+                return false;
+            };
+            let received = u16::from_le_bytes([*low, *high]);
+            let known = [unit.get(), function];
+            let is_second = *head == unit.get() || *head == function;
+            let is_third = |rest| {
+                let count = u8::try_from(len - EXCEPTION_ADU).unwrap_or_default();
+                update(crc16(&[unit.get(), function, count]), rest) == received
+            };
+            (is_second && update(crc16(&known), body) == received)
+                || matches!(*body, [second, ref rest @ ..]
+                    if function == READ_HOLDING && [*head, second] == known && is_third(rest))
+        })
     }
 
     /// Whether `here` is our own request, sent back to us.
     ///
     /// Told by its bytes, not by its length: eight bytes of a longer answer have a right CRC by chance, once in 65 536.
     /// Like an answer it may come in lumps.
-    fn look_for_own(&self, here: &[u8]) -> Option<Look> {
+    fn look_for_own(&self, here: &[u8], given_up: bool) -> Option<Look> {
         let own = self.own.as_bytes();
         if own.is_empty() {
             None
         } else if here.starts_with(own) {
             Some(Look::Frame(own.len()))
-        } else if own.starts_with(here) {
+        } else if own.starts_with(here) && !given_up {
             Some(Look::Wait)
         } else {
             None

@@ -3,6 +3,7 @@
 use core::ops::Range;
 use core::time::Duration;
 
+use super::spoilt::Why;
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError, Expected};
 use crate::event::Event;
@@ -21,11 +22,15 @@ impl Master {
     ) -> Option<Event<'_>> {
         while let Some(step) = self.framer.step(now) {
             match step {
-                Step::Skipped { range, expected: false, .. } => self.tally.add_noise(self.framer.held(range)),
+                Step::Skipped { range, expected: false, .. } => self.add_noise(range),
                 Step::Skipped { range, error, expected: true } => {
-                    self.state = State::Idle;
-                    self.doubts.left_open(now, unit, expected, timeout);
-                    return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
+                    self.beside.add(self.framer.held(range.clone()));
+                    if self.patience.is_none() {
+                        self.state = State::Idle;
+                        self.doubts.left_open(now, unit, expected, timeout);
+                        return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
+                    }
+                    self.spoilt.keep(Why::Damaged(error), self.framer.held(range));
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
                     self.tally.add_own_echo();
@@ -49,6 +54,7 @@ impl Master {
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
                         Ok(Answer::Exception { code, .. }) if apart && doubted && expected.is_read() => {
+                            self.give_account(false);
                             self.state = State::Idle;
                             self.doubts.hear(&self.framer.frame(range.clone()));
                             self.doubts.left_open(now, unit, expected, timeout);
@@ -61,9 +67,13 @@ impl Master {
                         {
                             self.tally.add_late();
                         }
+                        Err(error) if self.patience.is_some() => {
+                            self.spoilt.keep(Why::Wrong(error), self.framer.held(range));
+                        }
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
                             let right = outcome.is_ok();
+                            self.give_account(right);
                             self.state = State::Idle;
                             self.doubts.hear(&self.framer.frame(range.clone()));
                             // The answer proves that the request has left the wire, whatever was computed; but not one
@@ -83,12 +93,22 @@ impl Master {
                 }
             }
         }
-        if now < until {
+        if now < self.listens_until(until) {
             return None;
         }
+        self.give_account(false);
         self.state = State::Idle;
         self.doubts.left_open(now, unit, expected, timeout);
-        Some(Event::NoAnswer { bytes: self.framer.pending() })
+        Some(self.spoilt.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() }))
+    }
+
+    /// Until when the answer is waited for that has to be there by `until`: no longer than something may still follow what
+    /// came in its place.
+    pub(super) fn listens_until(&self, until: Instant) -> Instant {
+        if !self.spoilt.is_some() {
+            return until;
+        }
+        self.framer.gives_up().map_or(until, |moment| moment.min(until))
     }
 
     /// The frame that ends the request.
@@ -107,6 +127,20 @@ impl Master {
             expected.check_custom(asked, pdu)?;
         }
         Ok(answer)
+    }
+
+    /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
+    fn give_account(&mut self, right: bool) {
+        if right && self.spoilt.is_some() {
+            self.tally.add_noise(self.spoilt.bytes());
+        }
+        self.tally.own_remnant += u32::from(self.beside.may_be_left_of(self.request.as_bytes()));
+    }
+
+    fn add_noise(&mut self, range: Range<usize>) {
+        let bytes = self.framer.held(range);
+        self.tally.add_noise(bytes);
+        self.beside.add(bytes);
     }
 
     /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
