@@ -102,14 +102,15 @@ impl Owner {
         if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
             return;
         }
-        let length = ask.request.adu_len();
-        // Bytes that are no frame might be what is left of an echo.
-        let clean = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= length)
+        let silent = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= ask.request.adu_len());
+        // Bytes that may be what is left of the request may be left of an echo. Others are noise, however many, as long as
+        // an answer shows that the line carries more than noise.
+        let clean = tally.own_remnant == 0
             && match result {
                 Ok(_) => true,
                 Err(error) => match error.failure {
                     Failure::Refused { .. } | Failure::Unreached => true,
-                    Failure::NoAnswer { .. } => error.raw.is_empty(),
+                    Failure::NoAnswer { .. } => silent && error.raw.is_empty(),
                     _ => false,
                 },
             };

@@ -8,6 +8,7 @@ use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Mast
 
 use crate::Line;
 use crate::error::{CallError, Failure};
+use crate::lumps::{Arrivals, Ended, Lumps};
 use crate::queue::{LOOK_UP, Queue};
 
 /// How long before an answer can be whole it is waited for again, in characters and on top of them: the first bytes may
@@ -65,11 +66,34 @@ impl Ask<'_> {
     }
 }
 
-/// Sends one request over `line` and gives its answer to `take`.
+/// Sends one request over `line` and gives its answer to `take`. `usual`: how long the unit takes at most until it begins to
+/// answer, where that is known; `lumps`: how answers come over this line.
 pub(crate) fn exchange(
     line: &mut dyn Line,
     master: &mut Master,
     ask: &Ask<'_>,
+    (usual, lumps): (Option<Duration>, &mut Lumps),
+    give_up: &mut dyn FnMut() -> bool,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<Done, Box<CallError>> {
+    master.be_patient(lumps.patience(usual));
+    let mut arrivals = Arrivals::new();
+    let result = follow(line, master, ask, &mut arrivals, give_up, take);
+    let ended = match &result {
+        Ok(_) => Ended::Whole,
+        Err(error) if matches!(error.failure, Failure::Corrupt(_)) => Ended::Damaged { bytes: error.raw.len() },
+        Err(_) => Ended::Otherwise,
+    };
+    lumps.learn(&arrivals, ask.request.expected().adu_len(), ended);
+    result
+}
+
+/// Sends the request, and waits for what becomes of it.
+fn follow(
+    line: &mut dyn Line,
+    master: &mut Master,
+    ask: &Ask<'_>,
+    arrivals: &mut Arrivals,
     give_up: &mut dyn FnMut() -> bool,
     take: &mut dyn FnMut(Answer<'_>),
 ) -> Result<Done, Box<CallError>> {
@@ -86,6 +110,8 @@ pub(crate) fn exchange(
     let mut quiet_since = None;
     // What is queued already is no answer, and the line was not silent while it came: read without waiting.
     let mut until = now;
+    // The end of the time-out, when the request is out; whether nobody was looking since the last bytes came.
+    let (mut limit, mut slept) = (now, false);
     loop {
         let received = line.receive(&mut buffer, until);
         now = line.now();
@@ -99,7 +125,9 @@ pub(crate) fn exchange(
         let came = rest.len();
         if came > 0 {
             quiet_since = quiet_since.map(|_| now);
+            arrivals.came(now, came, || !slept && master.lacks() > 0);
         }
+        slept = false;
         loop {
             // Whatever there is no room for now, there is after polling.
             rest = &rest[master.receive(now, rest)..];
@@ -110,6 +138,7 @@ pub(crate) fn exchange(
                         Ok(end) => {
                             quiet_since = Some(end);
                             master.sent(end);
+                            limit = end + ask.timeout;
                         }
                         Err(error) => {
                             master.abort(now);
@@ -139,7 +168,8 @@ pub(crate) fn exchange(
         let wake = now + LOOK_UP;
         until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
         if let Some(nearly) = pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, master.lacks())) {
-            line.sleep(nearly.min(until));
+            line.sleep(nearly.min(limit).min(wake));
+            slept = true;
             // What has come by then is taken without waiting for more.
             until = now;
         }

@@ -25,6 +25,7 @@ mod latency;
 mod link;
 mod listen;
 mod longer;
+mod lumps;
 pub mod mbap;
 mod opener;
 mod order;

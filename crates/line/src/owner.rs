@@ -11,6 +11,7 @@ use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done, exchange};
 use crate::link::Links;
 use crate::longer::Longer;
+use crate::lumps::Lumps;
 use crate::opener::{LineOpener, Opener};
 use crate::resync::{FreshWords, Probe, Resync, Tried};
 use crate::stats::Stats;
@@ -55,6 +56,7 @@ pub(crate) struct Owner {
     pub(crate) longer: Longer,
     links: Arc<Mutex<Links>>,
     delays: Delays,
+    lumps: Lumps,
     format: SerialFormat,
     /// Units that do not answer.
     pub(crate) dead: DeadUnits,
@@ -89,6 +91,7 @@ impl Owner {
             longer: Longer::default(),
             links: Arc::default(),
             delays: Delays::default(),
+            lumps: Lumps::of(line.as_ref()),
             format,
             dead: DeadUnits::default(),
             words,
@@ -173,6 +176,7 @@ impl Owner {
             self.master.opened(line.now());
         }
         self.clock = line.clock();
+        self.lumps = Lumps::of(line.as_ref());
         self.line = Some(line);
     }
 
@@ -275,7 +279,10 @@ impl Owner {
         let ask = &self.within_patience(ask);
         let ask = &Ask { yields: ask.yields.filter(|_| unit.is_some_and(|unit| self.is_silent(unit))), ..*ask };
         let result = match self.line.as_deref_mut() {
-            Some(line) => exchange(line, &mut self.master, ask, give_up, take),
+            Some(line) => {
+                let usual = unit.and_then(|unit| self.delays.longest(unit));
+                exchange(line, &mut self.master, ask, (usual, &mut self.lumps), give_up, take)
+            }
             None => Err(ask.failed(Failure::Closed, None, None, &[])),
         };
         let delay = result.as_ref().ok().map(|done| self.delay(ask, done));

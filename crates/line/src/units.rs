@@ -36,6 +36,7 @@ struct Delay {
     /// The last ones; the oldest is at `next` once all are there.
     last: Vec<Duration>,
     next: usize,
+    longest: Duration,
 }
 
 impl Delays {
@@ -45,9 +46,13 @@ impl Delays {
         if known.last.len() < REMEMBERED {
             known.last.push(delay);
         } else {
-            known.last[known.next] = delay;
+            let forgotten = std::mem::replace(&mut known.last[known.next], delay);
             known.next = (known.next + 1) % REMEMBERED;
+            if forgotten >= known.longest {
+                known.longest = known.last.iter().copied().max().unwrap_or_default();
+            }
         }
+        known.longest = known.longest.max(delay);
     }
 
     /// `unit` did not answer in the time that was learned: what was usual is not any more.
@@ -55,11 +60,15 @@ impl Delays {
         self.0.remove(&unit);
     }
 
+    /// The longest delay that is remembered of `unit`, if any is.
+    pub(crate) fn longest(&self, unit: UnitAddress) -> Option<Duration> {
+        self.0.get(&unit).map(|known| known.longest)
+    }
+
     /// How long to wait for the first character of an answer of `unit`; `None` while too little is known.
     pub(crate) fn patience(&self, unit: UnitAddress) -> Option<Duration> {
         let known = self.0.get(&unit).filter(|known| known.last.len() >= ENOUGH)?;
-        let longest = known.last.iter().max()?;
-        Some(longest.saturating_mul(MARGIN).max(FLOOR))
+        Some(known.longest.saturating_mul(MARGIN).max(FLOOR))
     }
 }
 
