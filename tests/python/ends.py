@@ -82,9 +82,14 @@ class Line:
         """When it was told what, on the simulator's clock."""
         return [(at, value) for at, address, value in self.simulator.drive(1).writes() if address == CONTROL]
 
-    def asked(self, unit: int) -> bool:
-        """Whether a program asked *unit*, be it there or not."""
-        return any(who == "master" and data[0] == unit for _, who, data in self.simulator.line.trace())
+    def asked(self, unit: int) -> int:
+        """How often a program asked *unit*, be it there or not."""
+        return sum(who == "master" and data[0] == unit for _, who, data in self.simulator.line.trace())
+
+    def runs_on(self) -> bool:
+        """Whether the motor is fed, or was not told to stop what it was told last."""
+        told = self.commands()
+        return self.simulator.drive(1).fault == 0 and bool(told) and told[-1] == FORWARD
 
     def start(self, body: str, timeout: float = 2.0) -> Program:
         """Runs *body* in a program of its own."""
@@ -129,6 +134,12 @@ class Program:
             if line != f"{word}\n":
                 self.child.kill()
                 raise AssertionError((line, *self.child.communicate()))
+
+    def goes_on(self) -> None:
+        """Lets it go on where it reads a line."""
+        assert self.child.stdin is not None
+        self.child.stdin.write("\n")
+        self.child.stdin.flush()
 
     def ends(self, limit: float = 60.0) -> tuple[int, list[str], str]:
         """Waits for its end: the exit code, and what it said since on standard output and standard error."""
