@@ -54,8 +54,10 @@ def wait_for_the_dead():
     while True:
         try:
             bus.read({dead}, 0x2100)
-        except drivebus.DrivebusError:
+        except drivebus.NoAnswer:
             pass
+        except drivebus.PortError:
+            return  # it was closed
 
 with bus, drive.running(10.0):
     threading.Thread(target=wait_for_the_dead, daemon=True).start()
