@@ -23,7 +23,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model soak soak-virtual soak-realtime wheel clean \
         machine format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -33,6 +33,7 @@ help: ## what can be made
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
+	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
@@ -201,6 +202,13 @@ fuzz-corpus: $(FUZZ_NEEDS) ## adds what reaches code that nothing in fuzz/corpus
 	    $(FUZZ_RUN); \
 	    $$run fuzz/corpus/$$target $(FUZZ_FOUND)/$$target $$then -merge=1 -use_counters=0; \
 	done
+
+# Further than `make rust-test` searches, and every rule broken once in a copy: make model THREADS=4
+THREADS ?= 2
+
+model: $(VENV)/.created ## some minutes; see tests/model/README.md
+	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-model -- --deep --threads $(THREADS)
+	$(BIN)/python tools/check_model.py
 
 # Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
 SEED  ?= $(shell date +%s)

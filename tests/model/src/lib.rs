@@ -1,0 +1,20 @@
+//! The state machines of `drivebus-rtu` under every line that is assumed: searched exhaustively, within bounds.
+//!
+//! The master is the real one, cloned as part of each state. Around it stand a program that does whatever the rules permit
+//! ([`program`]), and units, a line and an adapter that do whatever is assumed of them ([`world`]). An answer under way knows
+//! the request that it was given to, which the wire does not say; so an answer that is attributed to another one shows.
+//! [`scenario`] has the lines and how far each is searched, [`search`] what can happen and what must hold, [`ends`] when each
+//! doubt must be over, and [`trace`] tells a run in words.
+
+pub mod ends;
+pub mod fingerprint;
+pub mod frames;
+pub mod judge;
+pub mod program;
+pub mod scenario;
+pub mod search;
+pub mod trace;
+pub mod world;
+
+pub use scenario::{Budget, SCENARIOS, Scenario};
+pub use search::{Finding, Order, Search};

@@ -1,0 +1,347 @@
+//! The lines that are assumed, and how far each is searched.
+
+use drivebus_rtu::Duration;
+
+use crate::frames::{Content, Kind};
+
+/// What a unit makes of an echo (08H).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Echoing {
+    /// It sends it back.
+    Returns,
+    /// It refuses it.
+    Refuses,
+    /// It is silent.
+    Silent,
+}
+
+/// What the adapter makes of what it is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Adapter {
+    /// It is known not to send it back.
+    Known,
+    /// It does not send it back, which has to be found out.
+    Silent,
+    /// It sends it back, which has to be found out.
+    Echoes,
+}
+
+/// How often each thing may happen: with these used up a run is over. The search goes through every order of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Budget {
+    /// Requests that the program sends.
+    pub requests: u8,
+    /// Answers that are damaged, cut or brought twice, and ports that are lost while a request goes out.
+    pub faults: u8,
+    /// Requests that a unit refuses.
+    pub refusals: u8,
+    /// Requests given up before their time.
+    pub aborts: u8,
+    /// Times that the port is opened again.
+    pub openings: u8,
+    /// Times that a unit forgets what it was asked.
+    pub restarts: u8,
+    /// Times that the registers change.
+    pub changes: u8,
+    /// Times that an answer may come in the middle of the time-out, and not at once.
+    pub lingers: u8,
+}
+
+impl Budget {
+    /// The counter of this name.
+    pub fn named(&mut self, name: &str) -> Option<&mut u8> {
+        Some(match name {
+            "requests" => &mut self.requests,
+            "faults" => &mut self.faults,
+            "refusals" => &mut self.refusals,
+            "aborts" => &mut self.aborts,
+            "openings" => &mut self.openings,
+            "restarts" => &mut self.restarts,
+            "changes" => &mut self.changes,
+            "lingers" => &mut self.lingers,
+            _ => return None,
+        })
+    }
+
+    /// Requests, and nothing that goes wrong but time.
+    pub const fn requests(requests: u8) -> Self {
+        Self { requests, faults: 0, refusals: 0, aborts: 0, openings: 0, restarts: 0, changes: 0, lingers: 0 }
+    }
+}
+
+/// What has to be seen in a search, or it has searched nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Sight {
+    /// One answer was enough for a read.
+    ReadAtOnce,
+    /// A read was repeated until its answers agreed.
+    Agreed,
+    /// A command was confirmed.
+    Commanded,
+    /// A stop was confirmed.
+    Stopped,
+    /// A refusal was believed.
+    Refused,
+    /// An answer was told to be late.
+    Late,
+    /// An echo ended a doubt.
+    EndedByEcho,
+    /// The refusal of an echo ended a doubt.
+    EndedByRefusal,
+    /// A read of another length ended a doubt.
+    EndedByRead,
+    /// Waiting ended a doubt.
+    EndedByTime,
+    /// A late answer ended a doubt, because nothing else was open.
+    EndedBySight,
+    /// The adapter was found to send requests back.
+    AdapterFound,
+}
+
+/// A line, what happens on it, and how far it is searched.
+#[derive(Debug, Clone)]
+pub struct Scenario {
+    /// By which it is asked for.
+    pub name: &'static str,
+    /// What is special about it.
+    pub about: &'static str,
+    /// The units, one or two.
+    pub units: &'static [Echoing],
+    /// Whether answers may overtake each other.
+    pub overtaking: bool,
+    /// The adapter.
+    pub adapter: Adapter,
+    /// What another program may be answered that asked before the line was opened. Empty: no other program was there.
+    pub strangers: &'static [&'static [Content]],
+    /// What a unit that restarts makes of an echo from then on; `None`: what it made before.
+    pub replaced_by: Option<Echoing>,
+    /// Whether the program asks only what the master says can be told.
+    pub heeds: bool,
+    /// What the program asks.
+    pub kinds: &'static [Kind],
+    /// How long an answer is waited for.
+    pub timeout: Duration,
+    /// How far `make test` searches.
+    pub small: Budget,
+    /// How far `make model` searches.
+    pub deep: Budget,
+    /// What has to be seen in both.
+    pub sights: &'static [Sight],
+}
+
+impl Scenario {
+    /// How long after it was given up an answer may still come, if `echoed`: the unit has returned an echo. `None`: for ever.
+    pub const fn may_come_for(&self, echoed: bool) -> Option<Duration> {
+        if echoed && !self.overtaking { None } else { Some(PATIENCE) }
+    }
+}
+
+// What is assumed and promised, in numbers of its own: those of the code shall not be judged by themselves.
+
+/// How long after the line was opened the answer to another program's question may come.
+pub const STRANGERS_COME_FOR: Duration = Duration::from_secs(1);
+
+/// How long after it was given up an answer may come, and how long a doubt lasts while nothing is asked.
+pub const PATIENCE: Duration = Duration::from_secs(3);
+
+/// How long after the last request was given up a doubt may last, whatever is answered meanwhile.
+pub const LONGEST: Duration = Duration::from_secs(9);
+
+/// A unit that returned echoes and was then silent on so many is one that may never have returned any.
+pub const MUTE: u8 = 5;
+
+const HALF_A_SECOND: Duration = Duration::from_millis(500);
+const NOBODY: &[&[Content]] = &[];
+const SOMEBODY: &[&[Content]] = &[
+    &[],
+    &[Content::Words(1, false)],
+    &[Content::Done(Kind::Run)],
+    &[Content::Refused(Kind::Echo(0)), Content::Words(1, false)],
+];
+const READS: &[Kind] = &[Kind::Echo(0), Kind::Read(1), Kind::Read(2)];
+const COMMANDS: &[Kind] = &[Kind::Echo(0), Kind::Read(1), Kind::Run, Kind::Stop];
+
+/// All of them.
+pub const SCENARIOS: &[Scenario] = &[
+    Scenario {
+        name: "in-order",
+        about: "a unit that echoes and answers in order, damage, aborts, restarts",
+        units: &[Echoing::Returns],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 1, lingers: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, aborts: 1, restarts: 1, lingers: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Late, Sight::EndedByEcho, Sight::EndedByRead, Sight::EndedBySight],
+    },
+    Scenario {
+        name: "in-order-commands",
+        about: "the same with commands, stops and refusals",
+        units: &[Echoing::Returns],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget { refusals: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, lingers: 1, ..Budget::requests(4) },
+        sights: &[Sight::Commanded, Sight::Stopped, Sight::Refused, Sight::EndedByEcho],
+    },
+    Scenario {
+        name: "first-contact",
+        about: "another program's question is open when the line is opened, for the first time and again",
+        units: &[Echoing::Returns],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: SOMEBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget { openings: 1, ..Budget::requests(2) },
+        deep: Budget { openings: 1, refusals: 1, ..Budget::requests(3) },
+        sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::EndedByEcho, Sight::EndedByTime],
+    },
+    Scenario {
+        name: "refuses-08H",
+        about: "a unit that refuses echoes",
+        units: &[Echoing::Refuses],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: SOMEBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { lingers: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::EndedByRefusal, Sight::EndedByRead, Sight::EndedByTime],
+    },
+    Scenario {
+        name: "silent-on-08H",
+        about: "a unit that is silent on echoes",
+        units: &[Echoing::Silent],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: SOMEBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { lingers: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::EndedByRead, Sight::EndedByTime],
+    },
+    Scenario {
+        name: "overtaking",
+        about: "a line on which answers overtake each other",
+        units: &[Echoing::Returns],
+        overtaking: true,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget::requests(4),
+        deep: Budget { faults: 1, ..Budget::requests(5) },
+        sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late, Sight::EndedByEcho],
+    },
+    Scenario {
+        name: "overtaking-commands",
+        about: "the same with commands, stops and refusals",
+        units: &[Echoing::Returns],
+        overtaking: true,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget { refusals: 1, ..Budget::requests(3) },
+        deep: Budget { refusals: 1, lingers: 1, ..Budget::requests(4) },
+        sights: &[Sight::Commanded, Sight::Stopped, Sight::Refused, Sight::EndedByEcho],
+    },
+    Scenario {
+        name: "overtaking-no-echo",
+        about: "the same with a unit that is silent on echoes, and a stranger before",
+        units: &[Echoing::Silent],
+        overtaking: true,
+        adapter: Adapter::Known,
+        strangers: SOMEBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 1, ..Budget::requests(3) },
+        deep: Budget { refusals: 1, openings: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::EndedByTime],
+    },
+    Scenario {
+        name: "two-units",
+        about: "two units with equal registers",
+        units: &[Echoing::Returns, Echoing::Refuses],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget::requests(3),
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(3) },
+        sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Late, Sight::EndedByEcho, Sight::EndedByRefusal],
+    },
+    Scenario {
+        name: "adapter-echoes",
+        about: "an adapter that sends requests back, which nobody knows yet",
+        units: &[Echoing::Returns],
+        overtaking: true,
+        adapter: Adapter::Echoes,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Stopped, Sight::AdapterFound],
+    },
+    Scenario {
+        name: "adapter-unknown",
+        about: "an adapter that sends nothing back, which nobody knows yet",
+        units: &[Echoing::Returns],
+        overtaking: false,
+        adapter: Adapter::Silent,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        kinds: COMMANDS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Stopped],
+    },
+    Scenario {
+        name: "replaced",
+        about: "a unit that returned echoes, in whose place another stands that is silent on them",
+        units: &[Echoing::Returns],
+        overtaking: false,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: Some(Echoing::Silent),
+        heeds: true,
+        kinds: &[Kind::Echo(0)],
+        timeout: HALF_A_SECOND,
+        small: Budget { restarts: 1, ..Budget::requests(6) },
+        deep: Budget { restarts: 1, ..Budget::requests(8) },
+        sights: &[Sight::EndedByEcho],
+    },
+];

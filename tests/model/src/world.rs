@@ -1,0 +1,287 @@
+//! The whole of one moment: the real master, the units, what is under way, the program and the time.
+//!
+//! Only time-outs and the rules' own times take time; what is sent and what arrives take none.
+
+use std::hash::{Hash, Hasher};
+
+use drivebus_rtu::{Duration, Instant, Master, UnitAddress};
+
+use crate::fingerprint::{self, offset};
+use crate::frames::{Asker, Coming, Content, Kind};
+use crate::program::{Knowledge, Program};
+use crate::scenario::{Adapter, Budget, Echoing, LONGEST, MUTE, PATIENCE, STRANGERS_COME_FOR, Scenario};
+
+/// When the search begins: far from the clock's own start, which would be a special moment.
+pub const START: Instant = Instant::from_nanos(1_000_000_000_000);
+
+/// The steps of time that matter: half a time-out.
+pub const TICK: Duration = Duration::from_millis(250);
+
+/// A unit and what it has answered.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    /// What it makes of an echo.
+    pub echoing: Echoing,
+    /// Answers that have not arrived, in the order in which they were given.
+    pub coming: Vec<Coming>,
+    /// Whether it has returned an echo, and not been silent on many since: then nothing but an echo ends a doubt about it.
+    pub echoed: bool,
+    /// Echoes that were left open since the last proof.
+    pub silent_echoes: u8,
+    /// When the last of those was given up.
+    pub echo_open: Option<Instant>,
+    /// When the last request to it was given up.
+    pub gave_up: Option<Instant>,
+    /// The same, or when something was taken for an answer of it while it owed another.
+    pub touched: Option<Instant>,
+}
+
+/// What went wrong, once it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Wrong {
+    /// An answer was attributed to a request that it was not given to.
+    Misattributed,
+    /// A write was reported as done or as refused, and was not.
+    NotDone,
+    /// What moves was sent twice for one call.
+    SentTwice,
+    /// What was to end a doubt has not ended it.
+    Unended,
+}
+
+/// What the last step showed, for a person to read. No part of the state.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    /// The number of the request that was sent.
+    pub sent: Option<u16>,
+    /// The answer that arrived.
+    pub came: Option<Coming>,
+    /// What the master and the program made of it.
+    pub outcome: Option<&'static str>,
+}
+
+/// All of it.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Now.
+    pub now: Instant,
+    /// The code under test.
+    pub master: Box<Master>,
+    /// The units.
+    pub units: Vec<Unit>,
+    /// Whether the order of what comes is open.
+    pub overtaking: bool,
+    /// What is asked, and what is known of the adapter.
+    pub program: Program,
+    /// What may still happen.
+    pub left: Budget,
+    /// Whether the registers have changed.
+    pub changed: bool,
+    /// When the line was opened, if others may have used it before.
+    pub opened: Option<Instant>,
+    /// What went wrong.
+    pub wrong: Option<Wrong>,
+    /// How many requests were sent. No part of the state.
+    pub requests: u16,
+    /// The last step. No part of the state.
+    pub told: Told,
+}
+
+/// The address of unit `index`: 1 and 2.
+pub fn address(index: usize) -> UnitAddress {
+    u8::try_from(index + 1).ok().and_then(|raw| UnitAddress::new(raw).ok()).unwrap_or(UnitAddress::MIN)
+}
+
+impl State {
+    /// The line before anything was asked, with answers to `strangers` under way.
+    pub fn new(scenario: &Scenario, left: Budget, strangers: &[Content]) -> Self {
+        let unit = |echoing: &Echoing| Unit {
+            echoing: *echoing,
+            coming: Vec::new(),
+            echoed: false,
+            silent_echoes: 0,
+            echo_open: None,
+            gave_up: None,
+            touched: None,
+        };
+        let master = Master::with_silence(Duration::ZERO);
+        let mut state = Self {
+            now: START,
+            master: Box::new(master),
+            overtaking: scenario.overtaking,
+            units: scenario.units.iter().map(unit).collect(),
+            program: Program::new(scenario),
+            left,
+            changed: false,
+            opened: None,
+            wrong: None,
+            requests: 0,
+            told: Told::default(),
+        };
+        if !scenario.strangers.is_empty() {
+            state.open(scenario, strangers);
+        }
+        state
+    }
+
+    /// The port is opened; `strangers` is what another program's last questions to unit 1 are answered with.
+    pub fn open(&mut self, scenario: &Scenario, strangers: &[Content]) {
+        self.give_up_what_is_asked();
+        self.master.opened(self.now);
+        self.program.knowledge = Knowledge::at_opening(scenario.adapter);
+        self.master.strip_echo(false);
+        self.opened = Some(self.now);
+        let coming = strangers.iter().map(|&content| Coming { asker: Asker::Stranger, content, given_up: None });
+        self.units[0].coming.extend(coming);
+    }
+
+    /// The program waits for nothing any more; a request in flight has ended without its answer.
+    pub fn give_up_what_is_asked(&mut self) {
+        if let Some((unit, kind, number)) = self.program.in_flight() {
+            self.ended(number);
+            self.left_open(unit, kind);
+        }
+        self.program.forget_call();
+    }
+
+    /// Request `number` has ended: what still comes of it is late.
+    pub fn ended(&mut self, number: u16) {
+        let now = self.now;
+        for coming in self.units.iter_mut().flat_map(|unit| &mut unit.coming) {
+            if coming.asker == Asker::Request(number) {
+                coming.given_up.get_or_insert(now);
+            }
+        }
+    }
+
+    /// `unit` was asked `kind`, and owes the answer.
+    pub fn left_open(&mut self, unit: usize, kind: Kind) {
+        let unit = &mut self.units[unit];
+        if let Kind::Echo(_) = kind {
+            unit.echo_open = Some(self.now);
+            unit.silent_echoes += 1;
+            unit.echoed &= unit.silent_echoes < MUTE;
+        } else {
+            // An open echo can be mistaken for nothing but an echo, and prolongs nothing.
+            (unit.gave_up, unit.touched) = (Some(self.now), Some(self.now));
+        }
+    }
+
+    /// Time passes: what is assumed to come by then or never does not come any more.
+    pub fn wait(&mut self, scenario: &Scenario, until: Instant) {
+        self.now = self.now.max(until);
+        for index in 0..self.units.len() {
+            let (now, state) = (self.now, &*self);
+            let still = |coming: &Coming| state.comes_until(scenario, index, coming).is_none_or(|end| now < end);
+            let coming = state.units[index].coming.iter().copied().filter(still).collect();
+            self.units[index].coming = coming;
+            let unit = &mut self.units[index];
+            unit.gave_up = unit.gave_up.filter(|&at| at + LONGEST > now);
+            unit.touched = unit.touched.filter(|&at| at + PATIENCE > now);
+            unit.echo_open = unit.echo_open.filter(|&at| at + PATIENCE > now);
+        }
+        self.opened = self.opened.filter(|&opened| opened + STRANGERS_COME_FOR > self.now);
+    }
+
+    /// Until when `coming` can arrive; `None`: for as long as it takes.
+    pub fn comes_until(&self, scenario: &Scenario, unit: usize, coming: &Coming) -> Option<Instant> {
+        match coming.asker {
+            Asker::Stranger => self.opened.map(|opened| opened + STRANGERS_COME_FOR),
+            Asker::Request(_) => Some(coming.given_up? + scenario.may_come_for(self.units[unit].echoed)?),
+        }
+    }
+
+    /// The next moment at which something is over, by the assumptions or by the rules.
+    pub fn next_end(&self, scenario: &Scenario) -> Option<Instant> {
+        let mut ends = Vec::new();
+        for (index, unit) in self.units.iter().enumerate() {
+            ends.extend(unit.coming.iter().filter_map(|coming| self.comes_until(scenario, index, coming)));
+            ends.extend(unit.touched.map(|at| at + PATIENCE));
+            ends.extend(unit.gave_up.map(|at| at + LONGEST));
+            ends.extend(self.program.waits_until(self, index, scenario));
+        }
+        ends.extend(self.opened.map(|opened| opened + STRANGERS_COME_FOR));
+        ends.into_iter().filter(|&end| end > self.now).min()
+    }
+
+    /// A word that no echo carries that may still come.
+    pub fn fresh_word(&self) -> u16 {
+        let taken = |word| {
+            self.units.iter().flat_map(|unit| &unit.coming).any(|coming| coming.content == Content::Echoed(word))
+        };
+        (1..=u16::MAX).find(|&word| !taken(word)).unwrap_or_default()
+    }
+
+    /// What unit `index` has taken in, answered.
+    pub fn hear(&mut self, index: usize, kind: Kind, refuses: bool) {
+        let unit = &mut self.units[index];
+        let content = match (kind, unit.echoing) {
+            (Kind::Echo(_), Echoing::Silent) => return,
+            (Kind::Echo(_), Echoing::Refuses) => Content::Refused(Kind::Echo(0)),
+            (Kind::Echo(word), Echoing::Returns) => Content::Echoed(word),
+            (Kind::Look, _) => Content::Words(1, self.changed),
+            (kind, _) if refuses => Content::Refused(kind),
+            (Kind::Read(count), _) => Content::Words(count, self.changed),
+            (Kind::Run | Kind::Stop, _) => Content::Done(kind),
+        };
+        unit.coming.push(Coming { asker: Asker::Request(self.requests), content, given_up: None });
+    }
+
+    /// Takes the answer at `place` of what comes of unit `index` off the line, and with it what cannot come any more.
+    pub fn arrives(&mut self, index: usize, place: usize) -> Coming {
+        let coming = &mut self.units[index].coming;
+        let came = coming.remove(place);
+        if self.overtaking {
+            // Another program's question was answered in order, or never will be.
+            let own = came.asker != Asker::Stranger;
+            coming.retain(|other| !own || other.asker != Asker::Stranger);
+        } else {
+            coming.drain(..place);
+        }
+        came
+    }
+
+    /// All of `coming` that can make a difference from now on.
+    pub fn signature(&self, coming: &Coming) -> (Content, Option<i64>, bool, bool, bool) {
+        let given_up = coming.given_up.map(|at| offset(self.now, at));
+        let in_flight = self.program.in_flight().is_some_and(|(.., number)| coming.is_since(number));
+        let current = self.program.first().is_some_and(|first| coming.is_since(first));
+        (coming.content, given_up, coming.asker == Asker::Stranger, in_flight, current)
+    }
+
+    /// Whether the adapter of the line sends requests back.
+    pub fn is_sent_back(scenario: &Scenario) -> bool {
+        scenario.adapter == Adapter::Echoes
+    }
+}
+
+impl Hash for State {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        let now = self.now;
+        let at = |moment: Option<Instant>| moment.map(|moment| offset(now, moment));
+        fingerprint::of(now, &self.master).hash(hasher);
+        self.program.hash_at(now, hasher);
+        for unit in &self.units {
+            (unit.echoing, unit.echoed, unit.silent_echoes, at(unit.echo_open)).hash(hasher);
+            (at(unit.gave_up), at(unit.touched)).hash(hasher);
+            let mut coming: Vec<_> = unit.coming.iter().map(|coming| self.signature(coming)).collect();
+            if self.overtaking {
+                coming.sort_unstable();
+            }
+            coming.hash(hasher);
+        }
+        (self.left, self.changed, at(self.opened), self.wrong).hash(hasher);
+    }
+}
+
+impl PartialEq for State {
+    /// As the search tells states apart: by all that can make a difference from now on.
+    fn eq(&self, other: &Self) -> bool {
+        let number = |state: &Self| {
+            let mut hasher = std::collections::hash_map::DefaultHasher::new();
+            state.hash(&mut hasher);
+            hasher.finish()
+        };
+        number(self) == number(other)
+    }
+}

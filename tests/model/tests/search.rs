@@ -1,0 +1,65 @@
+//! Each line searched as far as it goes in seconds. `make model` goes further, and breaks the rules one by one.
+
+use drivebus_model::{Budget, Order, SCENARIOS, Scenario, Search};
+
+fn line(name: &str) -> &'static Scenario {
+    SCENARIOS.iter().find(|scenario| scenario.name == name).unwrap_or(&SCENARIOS[0])
+}
+
+macro_rules! lines {
+    ($($test:ident: $name:literal,)*) => {
+        const SEARCHED: &[&str] = &[$($name),*];
+
+        $(
+            #[test]
+            fn $test() {
+                let scenario = line($name);
+                let found = Search::new(scenario, scenario.small).run(Order::Shortest, 1);
+                if let Some((_, trace)) = found.refuted {
+                    panic!("{trace}");
+                }
+                assert_eq!(found.unseen, [], "in {} states", found.states);
+            }
+        )*
+    };
+}
+
+lines! {
+    in_order: "in-order",
+    in_order_commands: "in-order-commands",
+    first_contact: "first-contact",
+    refuses_echoes: "refuses-08H",
+    silent_on_echoes: "silent-on-08H",
+    overtaking: "overtaking",
+    overtaking_commands: "overtaking-commands",
+    overtaking_without_echo: "overtaking-no-echo",
+    two_units: "two-units",
+    adapter_that_echoes: "adapter-echoes",
+    adapter_that_nobody_knows: "adapter-unknown",
+    unit_replaced: "replaced",
+}
+
+#[test]
+fn every_line_is_searched() {
+    let names: Vec<_> = SCENARIOS.iter().map(|scenario| scenario.name).collect();
+    assert_eq!(names, SEARCHED);
+}
+
+/// A search that finds nothing wrong where something is, finds nothing.
+#[test]
+fn a_program_that_heeds_nothing_is_found_out_by_the_shortest_run() {
+    let scenario = Scenario { heeds: false, ..line("in-order").clone() };
+    let found = Search::new(&scenario, Budget::requests(2)).run(Order::Shortest, 1);
+    let (property, trace) = found.refuted.unwrap();
+    assert_eq!(property, "no answer is attributed to a request it was not sent for");
+    let expected = "\
+not so: no answer is attributed to a request it was not sent for
+on the line \"in-order\": a unit that echoes and answers in order, damage, aborts, restarts
+    0.00 s  request 1: read 1 word of unit 1
+    0.50 s    request 1 times out: left open
+    0.50 s  request 2: read 1 word of unit 1
+    0.50 s    unit 1: the answer to request 1 (the words of 1 register) arrives, while request 2 is waited for: taken for the answer
+            WRONG: it was not given to this request
+";
+    assert_eq!(trace, expected);
+}

@@ -1,0 +1,420 @@
+"""Breaks each rule of the protocol core once in a copy, and expects the model's search to refute it.
+
+`check_model.py` builds each broken copy of `crates/rtu` under the target folder, searches the line on which the rule
+matters, and prints the shortest run that shows what the rule is for. A rule that can be broken unnoticed is a finding:
+the exit code is 1 then, or where the text that a break replaces is no longer there. `check_model.py NAME …` takes those
+whose names hold one of these words.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+DOUBT = "crates/rtu/src/doubt.rs"
+JUDGE = "crates/rtu/src/master/judge.rs"
+MASTER = "crates/rtu/src/master.rs"
+AGREEMENT = "crates/rtu/src/agreement.rs"
+
+
+@dataclass(frozen=True)
+class Break:
+    """One rule broken: what is replaced, and the search that refutes it."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    search: str
+    # What is replaced too, so that the rule matters within the search's bounds.
+    beside: tuple[str, str] = ("", "")
+
+
+BREAKS = [
+    # --- first contact
+    Break(
+        "another program may have asked any unit",
+        DOUBT,
+        "self.strangers = UnitSet::ALL;",
+        "",
+        "first-contact --openings 0",
+    ),
+    Break(
+        "first contact lasts a second",
+        DOUBT,
+        "self.strangers_until = now + FIRST_CONTACT;",
+        "self.strangers_until = now;",
+        "first-contact --openings 0",
+    ),
+    Break(
+        "first contact lasts no longer",
+        DOUBT,
+        "self.strangers_until = now + FIRST_CONTACT;",
+        "self.strangers_until = now + FIRST_CONTACT * 2;",
+        "first-contact --openings 0",
+    ),
+    Break(
+        "opening the line begins first contact", MASTER, "self.doubts.opened(now);", "", "first-contact --openings 0"
+    ),
+    Break(
+        "no read tells its answer from a stranger's",
+        DOUBT,
+        "&& !self.is_strange(now, unit)\n                && !self.has_forgotten",
+        "&& !self.has_forgotten",
+        "first-contact --openings 0",
+    ),
+    Break("an echo ends first contact", DOUBT, "self.strangers.remove(unit);", "", "first-contact --openings 0"),
+    Break(
+        "no stranger's answer is taken for one that was seen",
+        DOUBT,
+        "if !is_new || self.is_strange(now, unit) {",
+        "if !is_new {",
+        "overtaking-no-echo --openings 1 --requests 3",
+    ),
+    # --- what is left open
+    Break(
+        "a time-out leaves the request open",
+        JUDGE,
+        "self.doubts.left_open(now, unit, expected, timeout);\n        Some(Event::NoAnswer",
+        "Some(Event::NoAnswer",
+        "in-order",
+    ),
+    Break(
+        "a damaged answer leaves the request open",
+        JUDGE,
+        "self.doubts.left_open(now, unit, expected, timeout);\n                    return Some(Event::Corrupt",
+        "return Some(Event::Corrupt",
+        "in-order",
+    ),
+    Break(
+        "an answer to something else leaves the request open",
+        JUDGE,
+        "(false, ..) => self.doubts.left_open(now, unit, expected, timeout),",
+        "(false, ..) => {}",
+        "overtaking-commands --requests 3 --lingers 1",
+    ),
+    Break(
+        "a request given up is left open",
+        MASTER,
+        "State::Waiting { unit, expected, timeout, .. } => {\n"
+        "                self.doubts.left_open(now, unit, expected, timeout);",
+        "State::Waiting { .. } => {",
+        "in-order --aborts 1",
+    ),
+    Break(
+        "a request that was going out is left open",
+        MASTER,
+        "self.doubts.left_open(now, unit, job.expected, job.timeout);",
+        "let _ = (unit, now);",
+        "in-order",
+    ),
+    Break(
+        "a stop that the adapter may have confirmed is still owed",
+        MASTER,
+        "self.doubts.left_open(now, unit, request.expected(), timeout);",
+        "let _ = (now, unit, request, timeout);",
+        "adapter-echoes --refusals 1 --faults 0",
+    ),
+    Break(
+        "requests of one kind are counted",
+        DOUBT,
+        "open.count = if over { 1 } else { open.count.saturating_add(1) };",
+        "open.count = 1;",
+        "overtaking --requests 5 --faults 0",
+    ),
+    Break(
+        "the time counts from the latest",
+        DOUBT,
+        "open.given_up = now;\n            open.last = now;",
+        "",
+        "in-order --lingers 0 --faults 0",
+    ),
+    Break("what is left open puts the unit in doubt", DOUBT, "self.open.insert(unit);", "", "in-order"),
+    # --- the quarantine
+    Break(
+        "nothing that could be mistaken is asked in quarantine",
+        MASTER,
+        "if self.in_quarantine(now, unit) && !self.doubts.tells_apart(now, unit, request.expected()) =>",
+        "if false && !self.doubts.tells_apart(now, unit, request.expected()) =>",
+        "first-contact --openings 0",
+    ),
+    Break(
+        "a read of the same length tells nothing apart",
+        DOUBT,
+        "&& !self.possible(now, unit).any(|open| open.expected.could_pass_for(expected)))",
+        ")",
+        "in-order",
+    ),
+    Break("an echo ends the quarantine", DOUBT, "self.open.remove(unit);\n        if echoed", "if echoed", "in-order"),
+    Break(
+        "a read that tells apart ends the quarantine",
+        JUDGE,
+        "(true, false, echo) if echo || apart =>",
+        "(true, false, echo) if echo =>",
+        "silent-on-08H --requests 3",
+    ),
+    Break(
+        "another read does not end it",
+        JUDGE,
+        "(true, false, echo) if echo || apart =>",
+        "(true, false, echo) =>",
+        "in-order --requests 4 --faults 0",
+    ),
+    Break(
+        "the refusal of an echo ends it",
+        DOUBT,
+        "self.settle(now, unit, false);",
+        "self.left_open(now, unit, Expected::ECHO, Duration::ZERO);",
+        "refuses-08H --requests 3",
+    ),
+    Break(
+        "not at first contact",
+        DOUBT,
+        "if earlier || self.is_strange(now, unit) ||",
+        "if earlier ||",
+        "refuses-08H --requests 3",
+    ),
+    Break(
+        "time ends it where no echo ever came",
+        DOUBT,
+        "asked.is_none_or(|asked| now >= asked + PATIENCE)",
+        "asked.is_none()",
+        "silent-on-08H --requests 3",
+    ),
+    Break("time does not end it where echoes come", DOUBT, "self.echoers.insert(unit);", "", "in-order"),
+    Break(
+        "a unit that returns none any more is one that never did", DOUBT, "self.echoers.remove(unit);", "", "replaced"
+    ),
+    Break(
+        "an open echo does not prolong it",
+        DOUBT,
+        ".filter(|open| !open.expected.is_echo())",
+        "",
+        "silent-on-08H --requests 3",
+    ),
+    Break(
+        "every open answer seen ends it",
+        DOUBT,
+        "if !self.has_forgotten(now, unit) && self.of(unit).all(|open| open.expected.is_echo()) {\n"
+        "            self.open.remove(unit);",
+        "if false {",
+        "in-order",
+    ),
+    # --- what may overtake
+    Break(
+        "an open answer may overtake for three seconds",
+        DOUBT,
+        "pub const OVERTAKING: Duration = Duration::from_secs(3);",
+        "pub const OVERTAKING: Duration = Duration::from_secs(1);",
+        "overtaking --requests 4 --faults 0",
+    ),
+    Break(
+        "and no longer",
+        DOUBT,
+        "pub const OVERTAKING: Duration = Duration::from_secs(3);",
+        "pub const OVERTAKING: Duration = Duration::from_secs(6);",
+        "overtaking --requests 4 --faults 0",
+    ),
+    Break(
+        "an echo proves nothing of what may overtake",
+        DOUBT,
+        "self.forget(unit, |open| open.is_past(now));",
+        "self.forget(unit, |_| true);",
+        "overtaking --requests 4 --faults 0",
+    ),
+    Break(
+        "what is taken may have been the open one",
+        DOUBT,
+        "open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));",
+        "",
+        "in-order --requests 3 --lingers 1",
+    ),
+    Break(
+        "but not for ever",
+        DOUBT,
+        "open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));",
+        "open.last = now;",
+        "in-order-commands --requests 4 --refusals 0",
+    ),
+    Break(
+        "a refusal may have been another's",
+        DOUBT,
+        "self.enter(now, unit, expected, window);\n        }\n    }",
+        "let _ = window;\n        }\n    }",
+        "overtaking --requests 5 --faults 0 --refusals 1",
+    ),
+    Break(
+        "one answer more than could be mistaken",
+        DOUBT,
+        "words = words.saturating_add(open.count);",
+        "",
+        "overtaking --requests 4 --faults 0",
+    ),
+    Break(
+        "and one refusal more",
+        DOUBT,
+        "refusal = refusal.saturating_add(open.count);",
+        "refusal = 2;",
+        "overtaking --requests 5 --faults 0 --refusals 2",
+    ),
+    Break(
+        "a write waits",
+        DOUBT,
+        "Some(latest) if !expected.is_read() || refusal",
+        "Some(latest) if refusal",
+        "overtaking-commands --refusals 0",
+    ),
+    Break(
+        "a refusal of another write is not believed",
+        DOUBT,
+        "|| self.possible(now, unit).any(rival)",
+        "",
+        "in-order-commands --requests 4",
+    ),
+    # --- what was seen
+    Break(
+        "an answer seen takes one of its kind away",
+        DOUBT,
+        "Some(open) if open.count > 1 => open.count -= 1,",
+        "",
+        "overtaking --requests 4 --faults 0",
+    ),
+    Break(
+        "not when it is the same frame again",
+        DOUBT,
+        "if !is_new || self.is_strange(now, unit) {",
+        "if self.is_strange(now, unit) {",
+        "overtaking --requests 4 --faults 1",
+    ),
+    Break(
+        "nor when the adapter may have sent it",
+        DOUBT,
+        "Some(open) if open.expected.may_repeat_request() => return,",
+        "",
+        "adapter-echoes --requests 3",
+    ),
+    # --- what is forgotten
+    Break(
+        "what there is no room for is waited for",
+        DOUBT,
+        "self.forgotten.insert(oldest.unit);",
+        "let _ = oldest.unit;",
+        "overtaking --requests 4 --faults 0",
+        beside=("const KEPT: usize = 32;", "const KEPT: usize = 1;"),
+    ),
+    # --- the master
+    Break(
+        "a request goes out once", MASTER, "self.state = State::Sending { job };", "", "in-order-commands --requests 4"
+    ),
+    Break(
+        "the adapter confirms nothing",
+        JUDGE,
+        "(self.echo_due || !expected.may_repeat_request())",
+        "!expected.may_repeat_request()",
+        "adapter-echoes",
+    ),
+    Break(
+        "the adapter's echo of a read is known",
+        JUDGE,
+        "(self.echo_due || !expected.may_repeat_request())",
+        "self.echo_due",
+        "adapter-echoes",
+    ),
+    # --- the agreement
+    Break(
+        "answers have to be the same",
+        AGREEMENT,
+        "if came == self.last { self.heard.saturating_add(1) } else { 1 };",
+        "self.heard.saturating_add(1);",
+        "overtaking --requests 4 --faults 0 --changes 1",
+    ),
+    Break(
+        "as often as it takes",
+        AGREEMENT,
+        "self.heard >= needed",
+        "self.heard >= needed.min(1)",
+        "overtaking --requests 4 --faults 0",
+    ),
+]
+
+
+def copy(root: Path, to: Path) -> None:
+    """What the model is built of, as a workspace of its own."""
+    for name in ("crates/rtu", "tests/model"):
+        shutil.copytree(root / name, to / name, dirs_exist_ok=True, ignore=shutil.ignore_patterns("target"))
+    shutil.copy(root / "Cargo.lock", to / "Cargo.lock")
+    manifest = (root / "Cargo.toml").read_text(encoding="utf-8")
+    manifest = re.sub(r"^members = .*$", 'members = ["crates/rtu", "tests/model"]', manifest, flags=re.MULTILINE)
+    manifest = re.sub(r"^default-members = .*$", "", manifest, flags=re.MULTILINE)
+    (to / "Cargo.toml").write_text(manifest, encoding="utf-8")
+
+
+def build(place: Path) -> Path:
+    """Builds the model in *place*: the program that searches."""
+    # Built some fifty times, and searched in seconds.
+    quick = {"LTO": "off", "CODEGEN_UNITS": "16", "OPT_LEVEL": "1", "INCREMENTAL": "true"}
+    quick = {f"CARGO_PROFILE_RELEASE_{name}": value for name, value in quick.items()}
+    command = ["cargo", "build", "--quiet", "--release", "-p", "drivebus-model"]
+    environment = os.environ | quick | {"RUSTFLAGS": "-Awarnings", "CARGO_TARGET_DIR": str(place / "target")}
+    done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"check_model: {' '.join(command)} failed:\n{done.stderr}")
+    return place / "target/release/drivebus-model"
+
+
+def refutation(place: Path, broken: Break) -> str | None:
+    """What refutes *broken*; None where nothing does."""
+    path = place / broken.file
+    text = path.read_text(encoding="utf-8")
+    for old in filter(None, (broken.old, broken.beside[0])):
+        if text.count(old) != 1:
+            raise SystemExit(f"check_model: out of date: {broken.file} holds {text.count(old)} times {old!r}")
+    patched = text.replace(broken.old, broken.new)
+    if broken.beside[0]:
+        patched = patched.replace(*broken.beside)
+    path.write_text(patched, encoding="utf-8")
+    try:
+        search = [str(build(place)), *broken.search.split()]
+        done = subprocess.run(search, capture_output=True, text=True, check=False)
+    finally:
+        path.write_text(text, encoding="utf-8")
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"check_model: {' '.join(search)} failed:\n{done.stderr}")
+    shown = [line for line in done.stdout.splitlines() if not line.startswith(("line ", "all "))]
+    return "\n".join(shown[1:]) if done.returncode else None
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="only breaks whose names hold one of these")
+    names: list[str] = parser.parse_args().names
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
+    place = target / "model"
+    copy(ROOT, place)
+    began, unnoticed = time.monotonic(), []
+    chosen = [broken for broken in BREAKS if not names or any(name in broken.name for name in names)]
+    for broken in chosen:
+        found = refutation(place, broken)
+        print(f'\n{"refuted" if found else "UNNOTICED"}: not "{broken.name}" ({broken.search})', flush=True)
+        if found:
+            print(found, flush=True)
+        else:
+            unnoticed.append(broken.name)
+    print(f"\n{len(chosen) - len(unnoticed)} of {len(chosen)} breaks refuted in {time.monotonic() - began:.0f} s")
+    for name in unnoticed:
+        print(f"unnoticed: {name}", file=sys.stderr)
+    return 1 if unnoticed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
