@@ -94,7 +94,8 @@ impl Known {
     }
 
     fn reads_like(&self, pdu: &[u8]) -> impl Iterator<Item = &Open> {
-        self.open.iter().filter(move |open| open.asked.pdu[0] == 3 && open.asked.pdu[3..5] == pdu[3..5])
+        // Or looks the same when it is cut short.
+        self.open.iter().filter(move |open| open.asked.pdu[0] == 3 && open.asked.pdu[3..5] >= pdu[3..5])
     }
 
     pub(crate) fn has_open_echo(&self, now: Instant) -> bool {

@@ -196,7 +196,9 @@ impl Owner {
         let now = self.now();
         let in_quarantine = self.master.in_quarantine(now, unit);
         let attribution = self.master.attribution(now, unit, ask.request);
-        let may_be_mistaken = in_quarantine || attribution.may_be_mistaken();
+        // A unit that returns echoes proves more by one: that it has caught up.
+        let may_be_mistaken =
+            if in_quarantine { self.resync.knows_no_echo(unit) } else { attribution.may_be_mistaken() };
         if apart
             && may_be_mistaken
             && let Some(count) = self.longer.form(&self.master, now, unit, ask.request)

@@ -117,6 +117,15 @@ struct Known {
     other_reads: u32,
 }
 
+impl Known {
+    fn knows_no_echo(&self) -> bool {
+        match self.echo {
+            Some(echo) => echo == Echo::Refused,
+            None => self.silent_echoes >= SILENT_BEFORE_READ,
+        }
+    }
+}
+
 impl Resync {
     /// `unit` answered `request`, or refused it.
     pub(crate) fn answered(&mut self, unit: UnitAddress, request: &Request<'_>, refused: bool) {
@@ -155,9 +164,8 @@ impl Resync {
             Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
             _ => known.readable,
         };
-        let is_silent = known.echo.is_none() && known.silent_echoes >= SILENT_BEFORE_READ;
+        let knows_no_echo = known.knows_no_echo();
         let other_read = || {
-            let knows_no_echo = is_silent || known.echo == Some(Echo::Refused);
             let is_worth_it = knows_no_echo && !tried.other_read && known.other_reads < OTHER_READS;
             let address = address.filter(|_| is_worth_it)?;
             (1..=MAX_WORDS)
@@ -166,7 +174,7 @@ impl Resync {
                 .map(|(count, _)| Probe::OtherRead { address, count })
         };
         let probe = if known.alive {
-            if is_silent { other_read().or(echo) } else { echo.or_else(other_read) }
+            if knows_no_echo && known.echo.is_none() { other_read().or(echo) } else { echo.or_else(other_read) }
         } else if tried.has_echoed() || tried.other_read {
             None // silence is all that is known: one probe an attempt, so that it costs no more than an attempt
         } else if known.echo_was_last {
@@ -177,6 +185,11 @@ impl Resync {
         known.echo_was_last = probe == Some(Probe::Echo);
         known.other_reads += u32::from(matches!(probe, Some(Probe::OtherRead { .. })));
         probe
+    }
+
+    /// Whether `unit` refuses echoes, or is silent on them.
+    pub(crate) fn knows_no_echo(&self, unit: UnitAddress) -> bool {
+        self.0.get(&unit).is_some_and(Known::knows_no_echo)
     }
 
     /// Whether `unit` has refused the latest echo that it answered.

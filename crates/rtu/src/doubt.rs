@@ -194,13 +194,14 @@ impl Doubts {
         (owes || (expected.is_echo() && self.open.contains(unit))) && self.tells_apart(now, unit, expected)
     }
 
-    /// Whether the answer of `unit` to `expected` cannot be mistaken for one that it may still give.
+    /// Whether the answer of `unit` to `expected` cannot be mistaken for one that it may still give, even if that one has
+    /// fewer words than were asked for.
     pub(crate) fn tells_apart(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
         expected.is_echo()
             || (expected.is_read()
                 && !self.is_strange(now, unit)
                 && !self.has_forgotten(now, unit)
-                && !self.possible(now, unit).any(|open| open.expected.could_pass_for(expected)))
+                && !self.possible(now, unit).any(|open| open.expected.could_pass_for_cut(expected)))
     }
 
     /// Whether a refusal that `unit` gives to `expected` may be meant for something else that it was asked before.
@@ -254,6 +255,11 @@ impl Doubts {
         if !self.has_forgotten(now, unit) && self.of(unit).all(|open| open.expected.is_echo()) {
             self.open.remove(unit);
         }
+    }
+
+    /// Whether `frame` is, as it stands, the answer to something that `unit` left open.
+    pub(crate) fn owes(&self, now: Instant, unit: UnitAddress, frame: &Frame<'_>) -> bool {
+        self.possible(now, unit).any(|open| open.expected.judge_frame(unit, frame).is_ok())
     }
 
     /// Whether `frame` is another one than the last since a request went out.
@@ -313,7 +319,9 @@ impl Doubts {
         }
         match latest {
             None => Attribution::Certain,
-            Some(latest) if !expected.is_read() || refusal > 1 + MAX_RIVALS => Attribution::Wait(latest),
+            // What refuses another is told by the master as that.
+            Some(_) if !expected.is_read() && words == 1 => Attribution::Certain,
+            Some(latest) if !expected.is_read() || words > 1 + MAX_RIVALS => Attribution::Wait(latest),
             Some(_) => Attribution::Repeat { words, refusal },
         }
     }

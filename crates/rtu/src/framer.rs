@@ -194,7 +194,7 @@ impl Framer {
             return None;
         }
         let quiet = self.is_quiet(now);
-        let given_up = quiet && self.gives_up().is_some_and(|moment| now >= moment);
+        let is_over = quiet && self.gives_up().is_some_and(|moment| now >= moment);
         let mut error = None;
         let mut expected = false;
         let mut start = 0;
@@ -202,7 +202,7 @@ impl Framer {
             if start == self.len {
                 break None;
             }
-            match self.look(start, quiet, given_up) {
+            match self.look(start, quiet, is_over) {
                 Look::Frame(len) => break Some(start..start + len),
                 Look::Wait => break None,
                 Look::Nothing(why) => {

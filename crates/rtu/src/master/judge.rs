@@ -48,7 +48,7 @@ impl Master {
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
-                        Err(_) if apart => {
+                        Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
                             self.doubts.seen(now, &self.framer.frame(range));
                             self.tally.add_late();
                         }

@@ -69,7 +69,7 @@ fn whatever_comes_before_each_answer_all_is_answered() {
                     let answer = answer(echo, request);
                     answer.map_or_else(Vec::new, |answer| at_once(&[noise(number, count), answer].concat()))
                 };
-                let rig = Rig::fresh(false, |_, _| Vec::new(), script);
+                let rig = Rig::fresh(|_, _| Vec::new(), script);
                 if !fresh {
                     rig.pass(millis(2_000));
                 }
@@ -204,7 +204,6 @@ const SPOILT: [(&str, fn(&[u8]) -> Vec<u8>); 4] = [
 fn the_right_answer_behind_a_spoilt_one_is_taken() {
     for ((what, spoil), fresh) in SPOILT.into_iter().flat_map(|each| [(each, true), (each, false)]) {
         let rig = Rig::fresh(
-            false,
             |_, _| Vec::new(),
             move |_, request| {
                 let right = right(request);
