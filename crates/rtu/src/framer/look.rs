@@ -26,8 +26,8 @@ pub(super) enum Look {
 }
 
 impl Framer {
-    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `given_up`: not then either.
-    pub(super) fn look(&self, start: usize, quiet: bool, given_up: bool) -> Look {
+    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `is_over`: not then either.
+    pub(super) fn look(&self, start: usize, quiet: bool, is_over: bool) -> Look {
         let expected = self.is_expected(start);
         // An expected answer may come in lumps; anything else ends where the line fell silent.
         let cut = start < self.ended && !expected;
@@ -36,7 +36,7 @@ impl Framer {
         let here = &self.bytes[start..end];
         let fresh = start == 0 && !self.overrun;
 
-        if expected && let Some(look) = self.look_for_own(here, given_up) {
+        if expected && let Some(look) = self.look_for_own(here, is_over) {
             return look;
         }
         let mut error = None;
@@ -56,7 +56,7 @@ impl Framer {
             }
         }
         let begun = expected && self.is_beginning_of_answer(here);
-        if (begun && !given_up) || (incomplete && !closed) {
+        if (begun && !is_over) || (incomplete && !closed) {
             return Look::Wait;
         }
         if begun && here.len() >= TOLD {
@@ -98,13 +98,13 @@ impl Framer {
     ///
     /// Told by its bytes, not by its length: eight bytes of a longer answer have a right CRC by chance, once in 65 536.
     /// Like an answer it may come in lumps.
-    fn look_for_own(&self, here: &[u8], given_up: bool) -> Option<Look> {
+    fn look_for_own(&self, here: &[u8], is_over: bool) -> Option<Look> {
         let own = self.own.as_bytes();
         if own.is_empty() {
             None
         } else if here.starts_with(own) {
             Some(Look::Frame(own.len()))
-        } else if own.starts_with(here) && !given_up {
+        } else if own.starts_with(here) && !is_over {
             Some(Look::Wait)
         } else {
             None
