@@ -53,6 +53,8 @@ struct Job {
     asked: Asked,
     frame: Vec<u8>,
     timeout: Duration,
+    /// It went out whatever was in doubt.
+    in_doubt: bool,
 }
 
 /// How far a request has come.
@@ -178,7 +180,7 @@ impl Run {
         };
         let asked = Asked { pdu: pdu_of(&request), length };
         let frame = oracle::sealed(&[&[destination.to_wire()], &asked.pdu[..]].concat());
-        let job = Job { destination, asked, frame, timeout };
+        let job = Job { destination, asked, frame, timeout, in_doubt };
         self.follow(&job, input);
     }
 
@@ -275,8 +277,7 @@ impl Run {
                 return true;
             }
         };
-        let is_echo = job.asked.pdu[0] == 8;
-        let (now, place) = (self.now, self.stream.len());
+        let (now, place, is_echo) = (self.now, self.stream.len(), job.asked.pdu[0] == 8);
         let known = &mut self.units[usize::from(unit)];
         let is_apart = job.asked.pdu[0] == 3 && !known.is_strange(now) && !known.has_read_like(&job.asked.pdu);
         let may_be_apart = job.asked.pdu[0] == 3
@@ -311,7 +312,8 @@ impl Run {
                         }
                     }
                     (false, true) => {
-                        assert!(!known.is_doubtful(now) || !is_apart || self.is_crowded, "a refusal that may be late");
+                        let is_sure = !known.is_doubtful(now) || !is_apart || self.is_crowded || job.in_doubt;
+                        assert!(is_sure || known.may_be_free(unit, &self.stream), "a refusal that may be late");
                     }
                     (false, false) if self.is_crowded || may_be_apart => {
                         if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {

@@ -161,30 +161,6 @@ pub(crate) fn lengths(here: &[u8]) -> Vec<usize> {
     lengths.into_iter().flatten().collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_oracle_knows_printed_frames() {
-        // INVT GD350 IP54 manual, 9.4.1 and 9.4.3.
-        let read = [0x01, 0x03, 0x00, 0x04, 0x00, 0x02, 0x85, 0xCA];
-        let answer = [0x01, 0x03, 0x04, 0x13, 0x88, 0x00, 0x00, 0x7E, 0x9D];
-        let echo = [0x01, 0x08, 0x00, 0x00, 0x12, 0xAB, 0xAD, 0x14];
-        assert_eq!(crc(b"123456789"), 0x4B37); // reveng's check value of CRC-16/MODBUS
-        assert_eq!(sealed(&read[..6]), read);
-        assert_eq!(frame(&read), Some((1, &read[1..6])));
-        assert!(is_request(&read[1..6]) && is_answer(&answer[1..7]) && is_request(&echo[1..6]));
-        let asked = Asked { pdu: read[1..6].to_vec(), length: Length::Named };
-        assert_eq!(asked.judge(&answer[1..7]), Verdict::Right);
-        assert_eq!(asked.judge(&[0x83, 0x02]), Verdict::Refusal);
-        assert_eq!(asked.judge(&answer[1..5]), Verdict::Wrong);
-        let stream = [&read[..], &[0xFF], &answer[..], &[0x00], &echo[..]].concat();
-        let heard = frames_in(&stream);
-        assert_eq!(heard, [Ok(&read[..]), Err(0xFF), Ok(&answer[..]), Err(0x00), Ok(&echo[..])]);
-    }
-}
-
 /// Whether the specification lets `answer` be one to `asked`, both of the same function, which is the caller's own PDU.
 ///
 /// Of a request that is not as the specification says, nothing is said.
@@ -216,5 +192,29 @@ fn fits(asked: &[u8], answer: &[u8]) -> bool {
         (0x2B, 4) if asked[1] == 0x0E => answer.len() >= 3 && answer[1..3] == asked[1..3],
         (0x2B, 2..) => answer.get(1) == asked.get(1),
         _ => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oracle_knows_printed_frames() {
+        // INVT GD350 IP54 manual, 9.4.1 and 9.4.3.
+        let read = [0x01, 0x03, 0x00, 0x04, 0x00, 0x02, 0x85, 0xCA];
+        let answer = [0x01, 0x03, 0x04, 0x13, 0x88, 0x00, 0x00, 0x7E, 0x9D];
+        let echo = [0x01, 0x08, 0x00, 0x00, 0x12, 0xAB, 0xAD, 0x14];
+        assert_eq!(crc(b"123456789"), 0x4B37); // reveng's check value of CRC-16/MODBUS
+        assert_eq!(sealed(&read[..6]), read);
+        assert_eq!(frame(&read), Some((1, &read[1..6])));
+        assert!(is_request(&read[1..6]) && is_answer(&answer[1..7]) && is_request(&echo[1..6]));
+        let asked = Asked { pdu: read[1..6].to_vec(), length: Length::Named };
+        assert_eq!(asked.judge(&answer[1..7]), Verdict::Right);
+        assert_eq!(asked.judge(&[0x83, 0x02]), Verdict::Refusal);
+        assert_eq!(asked.judge(&answer[1..5]), Verdict::Wrong);
+        let stream = [&read[..], &[0xFF], &answer[..], &[0x00], &echo[..]].concat();
+        let heard = frames_in(&stream);
+        assert_eq!(heard, [Ok(&read[..]), Err(0xFF), Ok(&answer[..]), Err(0x00), Ok(&echo[..])]);
     }
 }

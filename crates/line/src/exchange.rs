@@ -316,7 +316,9 @@ mod tests {
             in_doubt: true,
             yields,
         };
-        exchange(line, &mut Master::new(&SerialFormat::DEFAULT), &ask, give_up, &mut |_| ()).unwrap_err().failure
+        let mut master = Master::new(&SerialFormat::DEFAULT);
+        let known = (None, &mut Lumps::of(line));
+        exchange(line, &mut master, &ask, known, give_up, &mut |_| ()).unwrap_err().failure
     }
 
     fn queue_with(priority: Priority) -> Queue {

@@ -31,9 +31,15 @@ impl Longer {
     pub(crate) fn form(&self, master: &Master, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
         let Request::ReadHolding { address, count, .. } = *request else { return None };
         let refused = self.0.get(&(unit, address)).map_or(u16::MAX, |limit| limit.refused);
-        (count..=count.max(MAX_WORDS))
-            .take_while(|&words| words < refused)
-            .find(|&words| Request::read(address, words).is_ok_and(|read| master.tells_apart(now, unit, &read)))
+        let find = |tells_apart: &dyn Fn(&Request<'_>) -> bool| {
+            let mut given = (count..=count.max(MAX_WORDS)).take_while(|&words| words < refused);
+            given.find(|&words| Request::read(address, words).is_ok_and(|read| tells_apart(&read)))
+        };
+        // More words than anything open has, so that not even an answer that is cut short could pass; else another number.
+        find(&|read| master.tells_apart(now, unit, read)).or_else(|| {
+            let is_sure = |read: &Request<'_>| !master.attribution(now, unit, read).may_be_mistaken();
+            find(&is_sure).filter(|_| !master.in_quarantine(now, unit))
+        })
     }
 
     /// `unit` refused to give `count` words from `address`.
@@ -68,7 +74,7 @@ impl Longer {
 
 #[cfg(test)]
 mod tests {
-    use drivebus_rtu::{Duration, SerialFormat};
+    use drivebus_rtu::{Adu, Answer, Duration, Event, SerialFormat};
 
     use super::*;
 
@@ -84,12 +90,12 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_length_that_nothing_owed_has() {
+    fn the_shortest_length_that_nothing_owed_has_even_cut_short() {
         let form = |owed_counts: &[u16], count| {
             Longer::default().form(&owed(owed_counts), Instant::ZERO, UNIT, &Request::read(100, count).unwrap())
         };
         assert_eq!(form(&[1], 1), Some(2));
-        assert_eq!(form(&[1, 2, 4], 1), Some(3));
+        assert_eq!(form(&[1, 2, 4], 1), Some(5), "four words cut short could be three");
         assert_eq!(form(&[15, 16], 15), None, "no unit known here gives 17");
         assert_eq!(form(&[16], 16), None);
         assert_eq!(form(&[1], 2), Some(2), "it can be told apart as it is");
@@ -98,6 +104,26 @@ mod tests {
         assert_eq!(Longer::default().form(&owed(&[1]), Instant::ZERO, UNIT, &write), None);
         let last = Request::read(0xFFFF, 1).unwrap();
         assert_eq!(Longer::default().form(&owed(&[1]), Instant::ZERO, UNIT, &last), None, "no register comes after it");
+    }
+
+    /// Out of quarantine another length will do where no greater one is given.
+    #[test]
+    fn a_length_that_nothing_owed_has() {
+        let (mut longer, mut master) = (Longer::default(), owed(&[1, 4]));
+        let echo = Request::echo(7);
+        master.begin(Instant::ZERO, UNIT.into(), &echo, Duration::from_millis(100)).unwrap();
+        let sent = master.deadline().unwrap();
+        assert!(matches!(master.poll(sent), Some(Event::Transmit(_))));
+        master.sent(sent);
+        let frame = Adu::answer(UNIT, &Answer::confirming(&echo).unwrap());
+        master.receive(sent, frame.as_bytes());
+        assert!(matches!(master.poll(sent), Some(Event::Answer(_))), "the unit has caught up");
+        let read = Request::read(100, 1).unwrap();
+        assert_eq!(longer.form(&master, sent, UNIT, &read), Some(5));
+        longer.refused(UNIT, 100, 4);
+        assert_eq!(longer.form(&master, sent, UNIT, &read), Some(2));
+        longer.refused(UNIT, 100, 2);
+        assert_eq!(longer.form(&master, sent, UNIT, &read), None);
     }
 
     #[test]

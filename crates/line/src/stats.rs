@@ -131,7 +131,7 @@ mod tests {
             ..Counters::default()
         };
         let mut counters = full.clone();
-        counters.add(Tally { late: 1, foreign: 1, noise: 1, noise_idle: 1, own_echo: 1 });
+        counters.add(Tally { late: 1, foreign: 1, noise: 1, noise_idle: 1, own_echo: 1, own_remnant: 1 });
         counters.answered(Duration::MAX, Duration::MAX);
         counters.answered(Duration::MAX, Duration::MAX);
         assert_eq!(Counters { round_trip: full.round_trip, delay: full.delay, ..counters }, full);

@@ -71,6 +71,10 @@ impl Tally {
     pub(crate) fn add_own_echo(&mut self) {
         self.own_echo = self.own_echo.saturating_add(1);
     }
+
+    pub(crate) fn add_own_remnant(&mut self, is_there: bool) {
+        self.own_remnant = self.own_remnant.saturating_add(u32::from(is_there));
+    }
 }
 
 /// A request that was not begun. Nothing was sent.
@@ -106,13 +110,20 @@ mod tests {
 
     #[test]
     fn a_tally_that_is_full_stays_full() {
-        let full =
-            Tally { late: u32::MAX, foreign: u32::MAX, noise: u32::MAX, noise_idle: u32::MAX, own_echo: u32::MAX };
+        let full = Tally {
+            late: u32::MAX,
+            foreign: u32::MAX,
+            noise: u32::MAX,
+            noise_idle: u32::MAX,
+            own_echo: u32::MAX,
+            own_remnant: u32::MAX,
+        };
         let mut tally = full;
         tally.add_noise(&[0x00, 0x55]);
         tally.add_late();
         tally.add_foreign();
         tally.add_own_echo();
+        tally.add_own_remnant(true);
         assert_eq!(tally, full);
     }
 }

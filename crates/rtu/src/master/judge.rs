@@ -134,7 +134,7 @@ impl Master {
         if right && self.spoilt.is_some() {
             self.tally.add_noise(self.spoilt.bytes());
         }
-        self.tally.own_remnant += u32::from(self.beside.may_be_left_of(self.request.as_bytes()));
+        self.tally.add_own_remnant(self.beside.may_be_left_of(self.request.as_bytes()));
     }
 
     fn add_noise(&mut self, range: Range<usize>) {

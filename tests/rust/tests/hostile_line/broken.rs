@@ -187,8 +187,11 @@ fn pauses_longer_than_were_ever_seen_are_learned() {
     assert!(right.count() > 30, "{:?}", rig.bus.stats());
 }
 
+/// What is made of the right answer.
+type Spoiling = fn(&[u8]) -> Vec<u8>;
+
 /// What comes in the place of an answer.
-const SPOILT: [(&str, fn(&[u8]) -> Vec<u8>); 4] = [
+const SPOILT: [(&str, Spoiling); 4] = [
     ("damaged", |right| right.iter().enumerate().map(|(at, &byte)| byte ^ u8::from(at == 4)).collect()),
     ("damaged in its CRC", |right| {
         right.iter().rev().enumerate().map(|(at, &byte)| byte ^ u8::from(at == 0)).rev().collect()

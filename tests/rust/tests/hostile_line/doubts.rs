@@ -100,14 +100,24 @@ fn a_unit_without_an_echo_is_right_again_with_the_next_call() {
 }
 
 #[test]
-fn a_read_that_can_be_told_apart_needs_nothing_before_it() {
-    let rig = Rig::new(mute(2));
+fn a_read_that_can_be_told_apart_needs_no_echo_of_a_unit_that_knows_none() {
+    let mut reads = 0;
+    let rig = Rig::new(move |_, request| {
+        reads += u32::from(request[1] == 3);
+        match (request[1], reads) {
+            (8, _) => Vec::new(),
+            (_, 2 | 4) => after(millis(503), &right(request)),
+            _ => at_once(&right(request)),
+        }
+    });
     assert_eq!(rig.read(7, 1).unwrap(), [7]);
+    rig.read(100, 1).unwrap_err();
+    assert_eq!(rig.read(150, 1).unwrap(), [150], "an echo comes first; nobody knew");
     rig.read(100, 1).unwrap_err();
     assert_eq!(rig.read(200, 1).unwrap(), [200], "and what was not asked for is cut off");
     assert_eq!(rig.sent(&Request::read(200, 2).unwrap()), 1, "a length that the open answer has not");
     let stats = rig.bus.stats();
-    assert_eq!((stats.total.late, stats.total.resyncs, stats.total.requests), (1, 1, 3), "{stats:?}");
+    assert_eq!((stats.total.late, stats.total.resyncs, stats.total.requests), (2, 2, 6), "{stats:?}");
 }
 
 #[test]
@@ -334,8 +344,8 @@ fn a_verified_read_is_not_repeated_more_often_than_allowed() {
 fn a_read_that_a_stop_overtook_is_repeated_beyond_doubt() {
     let rig = Rig::new(|number, request| match number {
         1 => Vec::new(),
-        // The read that overtakes is told apart.
-        2 => after(millis(520), &right(request)),
+        // An echo comes first, then the read that overtakes.
+        3 => after(millis(520), &right(request)),
         _ => after(millis(60), &right(request)),
     });
     rig.read(7, 1).unwrap();
