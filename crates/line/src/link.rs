@@ -36,8 +36,8 @@ struct Ring {
 }
 
 impl Links {
-    /// Keeps what became of one exchange with `unit`.
-    pub(crate) fn note(&mut self, unit: UnitAddress, result: &Result<Done, Box<CallError>>) {
+    /// Keeps what became of one exchange with `unit`; whether it brought an answer, where it says anything of the link.
+    pub(crate) fn note(&mut self, unit: UnitAddress, result: &Result<Done, Box<CallError>>) -> Option<bool> {
         let good = match result {
             Ok(_) => Some(true),
             Err(error) => good(&error.failure),
@@ -45,16 +45,12 @@ impl Links {
         if let Some(good) = good {
             self.0.entry(unit).or_default().push(good);
         }
+        good
     }
 
     /// How well `unit` could be reached; nothing asked if it never was.
     pub(crate) fn of(&self, unit: UnitAddress) -> Link {
         self.0.get(&unit).map(Ring::link).unwrap_or_default()
-    }
-
-    /// Whether nothing was heard of `unit` when it was asked last, or ever.
-    pub(crate) fn is_silent(&self, unit: UnitAddress) -> bool {
-        self.0.get(&unit).is_none_or(|ring| ring.bits & 1 == 0)
     }
 }
 

@@ -55,6 +55,8 @@ pub(crate) struct Owner {
     /// Which reads can be asked in a longer form.
     pub(crate) longer: Longer,
     links: Arc<Mutex<Links>>,
+    /// Units that were heard when they were asked last, by their number.
+    heard: [bool; 256],
     delays: Delays,
     lumps: Lumps,
     format: SerialFormat,
@@ -90,6 +92,7 @@ impl Owner {
             resync: Resync::default(),
             longer: Longer::default(),
             links: Arc::default(),
+            heard: [false; 256],
             delays: Delays::default(),
             lumps: Lumps::of(line.as_ref()),
             format,
@@ -279,7 +282,8 @@ impl Owner {
             Destination::Broadcast => None,
         };
         let ask = &self.within_patience(ask);
-        let ask = &Ask { yields: ask.yields.filter(|_| unit.is_some_and(|unit| self.is_silent(unit))), ..*ask };
+        let is_silent = unit.is_some_and(|unit| !self.heard[usize::from(unit.get())]);
+        let ask = &Ask { yields: ask.yields.filter(|_| is_silent), ..*ask };
         let result = match self.line.as_deref_mut() {
             Some(line) => {
                 let usual = unit.and_then(|unit| self.delays.longest(unit));
@@ -301,7 +305,10 @@ impl Owner {
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);
         if let Some(unit) = unit {
-            self.links.lock().unwrap_or_else(PoisonError::into_inner).note(unit, &result);
+            let heard = self.links.lock().unwrap_or_else(PoisonError::into_inner).note(unit, &result);
+            if let Some(heard) = heard {
+                self.heard[usize::from(unit.get())] = heard;
+            }
             match &result {
                 Ok(_) => self.resync.answered(unit, ask.request, false),
                 Err(error) if matches!(error.failure, Failure::Refused { .. }) => {
@@ -336,10 +343,6 @@ impl Owner {
             self.line = None;
         }
         result
-    }
-
-    fn is_silent(&self, unit: UnitAddress) -> bool {
-        self.links.lock().unwrap_or_else(PoisonError::into_inner).is_silent(unit)
     }
 
     /// `ask`, with the time-out that its unit's answers have taught, if that is to hold for it and is shorter.

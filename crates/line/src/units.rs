@@ -48,7 +48,7 @@ impl Delays {
         } else {
             let forgotten = std::mem::replace(&mut known.last[known.next], delay);
             known.next = (known.next + 1) % REMEMBERED;
-            if forgotten >= known.longest {
+            if forgotten >= known.longest && delay < forgotten {
                 known.longest = known.last.iter().copied().max().unwrap_or_default();
             }
         }

@@ -283,6 +283,9 @@ impl Doubts {
 
     /// `unit` was asked for `expected`, and an answer or a refusal was taken for its own.
     pub(crate) fn taken(&mut self, now: Instant, unit: UnitAddress, expected: Expected, refused: bool) {
+        if !self.listed.contains(unit) {
+            return;
+        }
         let mut displaced = None;
         for open in self.ledger.iter_mut().flatten() {
             let rival =
