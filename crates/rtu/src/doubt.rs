@@ -120,8 +120,8 @@ pub(crate) struct Doubts {
     /// Units of which something had to be forgotten, and until when the latest of it may come.
     forgotten: UnitSet,
     forgotten_until: Instant,
-    /// The frame that was heard last since a request went out, by unit and CRC: a line may bring it twice at once.
-    heard: Option<(u8, [u8; 2])>,
+    /// The frame that was heard last since a request went out, by unit and CRC, and when: a line may bring it twice at once.
+    heard: Option<(u8, [u8; 2], Instant)>,
 }
 
 impl Doubts {
@@ -234,9 +234,9 @@ impl Doubts {
     /// more.
     ///
     /// Not so an answer that looks like its request, which an adapter may have sent back; nor one of the first second, which
-    /// another program may have asked for; nor the same frame again, which the line may have brought twice.
-    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>) {
-        let is_new = self.hear(frame);
+    /// another program may have asked for; nor the same frame again within `at_once`, which the line may have brought twice.
+    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) {
+        let is_new = self.hear(now, frame, at_once);
         let Ok(unit) = UnitAddress::new(frame.address()) else { return };
         if !is_new || self.is_strange(now, unit) {
             return;
@@ -262,10 +262,13 @@ impl Doubts {
         self.possible(now, unit).any(|open| open.expected.judge_frame(unit, frame).is_ok())
     }
 
-    /// Whether `frame` is another one than the last since a request went out.
-    pub(crate) fn hear(&mut self, frame: &Frame<'_>) -> bool {
-        let heard = Some((frame.address(), frame.crc()));
-        core::mem::replace(&mut self.heard, heard) != heard
+    /// Whether `frame`, which came whole at `now`, is another one than the last since a request went out, or came later than
+    /// `at_once` after it.
+    pub(crate) fn hear(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
+        let before = self.heard.replace((frame.address(), frame.crc(), now));
+        before.is_none_or(|(unit, crc, then)| {
+            unit != frame.address() || crc != frame.crc() || now.saturating_duration_since(then) >= at_once
+        })
     }
 
     /// `unit` has refused an echo. Refusals look alike: where another echo is open, this may be the refusal of that one,

@@ -48,6 +48,8 @@ pub struct Patience {
 #[derive(Debug, Clone)]
 pub struct Master {
     silence: Duration,
+    /// How long a character takes at the most.
+    char_time: Duration,
     /// The least silence before the next request, if that is more.
     gap: Duration,
     patience: Option<Patience>,
@@ -102,13 +104,15 @@ struct Job {
 impl Master {
     /// A master on a line of `format` that nobody else has asked anything on; otherwise call [`opened`](Self::opened).
     pub const fn new(format: &SerialFormat) -> Self {
-        Self::with_silence(format.t35())
+        Self { char_time: format.chars(1), ..Self::with_silence(format.t35()) }
     }
 
     /// A master that keeps a silence of its own; zero where frames are delimited by other means.
     pub const fn with_silence(silence: Duration) -> Self {
         Self {
             silence,
+            // Of a line whose format is not known, two characters may follow each other as slowly as frames.
+            char_time: silence,
             gap: Duration::ZERO,
             patience: None,
             framer: Framer::new(silence),

@@ -44,19 +44,19 @@ impl Master {
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
-                            self.doubts.seen(now, &self.framer.frame(range.clone()));
+                            self.see(now, range.clone());
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
-                            self.doubts.seen(now, &self.framer.frame(range));
+                            self.see(now, range);
                             self.tally.add_late();
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
                         Ok(Answer::Exception { code, .. }) if apart && doubted && expected.is_read() => {
                             self.give_account(false);
                             self.state = State::Idle;
-                            self.doubts.hear(&self.framer.frame(range.clone()));
+                            self.hear(now, range.clone());
                             self.doubts.left_open(now, unit, expected, timeout);
                             let frame = self.framer.held(range);
                             return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
@@ -75,7 +75,7 @@ impl Master {
                             let right = outcome.is_ok();
                             self.give_account(right);
                             self.state = State::Idle;
-                            self.doubts.hear(&self.framer.frame(range.clone()));
+                            self.hear(now, range.clone());
                             // The answer proves that the request has left the wire, whatever was computed; but not one
                             // that may be late.
                             if apart || !doubted {
@@ -129,6 +129,23 @@ impl Master {
         Ok(answer)
     }
 
+    /// A frame came that answers nothing in flight.
+    fn see(&mut self, now: Instant, range: Range<usize>) {
+        let at_once = self.at_once(range.len());
+        self.doubts.seen(now, &self.framer.frame(range), at_once);
+    }
+
+    /// A frame came that answers what is in flight.
+    fn hear(&mut self, now: Instant, range: Range<usize>) {
+        let at_once = self.at_once(range.len());
+        self.doubts.hear(now, &self.framer.frame(range), at_once);
+    }
+
+    /// How soon after another one a frame of `len` bytes can have come with no silence between them.
+    fn at_once(&self, len: usize) -> Duration {
+        self.silence + self.char_time.saturating_mul(u32::try_from(len).unwrap_or(u32::MAX))
+    }
+
     /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
     fn give_account(&mut self, right: bool) {
         if right && self.spoilt.is_some() {
@@ -166,7 +183,7 @@ impl Master {
                     self.tally.add_own_echo();
                 }
                 Step::Frame(range) => {
-                    self.doubts.seen(now, &self.framer.frame(range));
+                    self.see(now, range);
                     self.tally.add_late();
                 }
                 Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
