@@ -1,8 +1,8 @@
 """Right reads a second on a line that loses characters of its answers, beside a careful master in C on the same line.
 
 The line is a pseudo-terminal with the pace of the wire. A share of the answers loses one character, as a line does that
-loses two characters in a hundred. Both masters ask the same words, one after the other, and again up to twice; the master in
-C (`careful.c`) waits so many milliseconds for what is missing.
+loses two characters in a hundred. Both masters ask the same words, one after the other, and again up to twice; the
+master in C (`careful.c`) waits so many milliseconds for what is missing.
 
 usage: python -m benches.python.lossy [--baud 19200] [--words 1] [--seconds 10] [--runs 3] [--pause 20] [--json]
 """
@@ -88,10 +88,8 @@ def main() -> None:
             each = {"baudrate": given.baud, "words": words, "share": share, "master": master}
             figures.append({**each, "rates": rates, "right": right})
             spread = f"{min(rates):.1f} … {max(rates):.1f}"
-            rows.append(
-                [str(given.baud), str(words), f"{share:.0%}", master, f"{statistics.median(rates):.1f}", spread]
-                + [f"{right:.2%}"]
-            )
+            median = f"{statistics.median(rates):.1f}"
+            rows.append([str(given.baud), str(words), f"{share:.0%}", master, median, spread, f"{right:.2%}"])
     show(given.json, figures, markdown(HEAD, rows))
 
 

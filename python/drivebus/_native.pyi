@@ -615,7 +615,7 @@ class SimulatedLine:
     def faults(self) -> dict[str, float]:
         """The kinds that have a rate, and the rate."""
     def script(self, faults: Iterable[tuple[int, str | bytes]], /) -> None:
-        """Says which answer, counted from now (the next one is 1), is hit by what kind, or which bytes come instead of it.
+        """Says which answer, counted from now (the next one is 1), is hit by what kind, or which bytes come instead.
 
         Rates go on beside it. NotAllowed: something else stands in the list; nothing was changed.
         """

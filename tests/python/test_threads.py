@@ -64,4 +64,5 @@ def test_no_thread_gets_the_answer_of_another(faults: dict[str, float]) -> None:
         assert [sum(each.values()) for each in outcomes] == [READS] * THREADS
         total = sum(outcomes, Counter())
         assert total["wrong"] == 0
-        assert total["right"] >= (0.99 if faults else 1) * READS * THREADS
+        # Of eighteen kinds of fault, 2 % each, the longest keeps an answer for more than all time-outs of a call.
+        assert total["right"] >= (0.98 if faults else 1) * READS * THREADS

@@ -3,13 +3,13 @@
 
 use std::sync::MutexGuard;
 
-use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request, UnitAddress};
+use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request};
 
 use crate::call::{Call, is_silence};
-use crate::course::{Course, Form};
+use crate::course::{Course, Form, Hearing};
 use crate::error::{CallError, Failure};
 use crate::exchange::{Ask, Done};
-use crate::owner::{Asked, Next, Owner};
+use crate::owner::{Next, Owner};
 use crate::queue::{Priority, Turn};
 use crate::resync::Tried;
 
@@ -25,14 +25,6 @@ enum Question {
     Unproven,
 }
 
-/// A question that is put until the answers agree.
-struct Hearing {
-    agreement: Agreement,
-    asked: u32,
-    /// What was asked of the unit when the last answer came.
-    known: Option<Asked>,
-}
-
 impl<'b> Call<'b, '_> {
     /// Asks once, beyond doubt: with what has to come before, and as often as it takes to be sure.
     ///
@@ -46,9 +38,10 @@ impl<'b> Call<'b, '_> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut tried = Tried::default();
-        let mut hearing = None;
         // Whatever else is repeated would be done twice, and what is verified is asked as it is.
         let mut apart = !self.verify;
+        // A question that is repeated until the answers agree counts as asked once an attempt.
+        let mut asks = true;
         loop {
             let (mut owner, question) = self.until_sure(turn, course, &mut tried, apart, give_up)?;
             let attribution = match question {
@@ -74,17 +67,19 @@ impl<'b> Call<'b, '_> {
                     let result = course.ask(&mut owner, &ask, Form::Plain, give_up, &mut |_| ());
                     return owner.unless_echoed(&self.ask, result, give_up);
                 }
+                // What was heard goes on.
+                Question::Same(Form::Repeated) => Attribution::Certain,
                 Question::New(attribution) => attribution,
             };
-            let hearing = self.hearing(&mut hearing, &owner, attribution);
-            let Some(unit) = self.unit.filter(|_| !hearing.agreement.is_immediate()) else {
+            let again = matches!(question, Question::Same(_));
+            if !self.go_on_hearing(course, &owner, attribution) {
                 let result = course.ask(&mut owner, &self.ask, Form::Plain, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);
-            };
-            if hearing.asked == 0 {
+            }
+            if std::mem::take(&mut asks) {
                 course.asks(owner.now());
             }
-            if let Some(done) = self.hear(hearing, &mut owner, unit, give_up, take)? {
+            if let Some(done) = self.hear(course, &mut owner, again, give_up, take)? {
                 return Ok(done);
             }
         }
@@ -136,7 +131,12 @@ impl<'b> Call<'b, '_> {
                 }
                 // Where the words can be read, what they are is known sooner than who was confirmed.
                 Next::Overtaken(_) if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
-                Next::Wait(until) | Next::Overtaken(until) => {
+                Next::Overtaken(until) => {
+                    drop(owner);
+                    self.stand_by(turn, until, give_up)?;
+                    *tried = Tried::default(); // others have asked the unit meanwhile
+                }
+                Next::Wait(until) => {
                     drop(owner);
                     self.stand_by(turn, until, give_up)?;
                 }
@@ -185,35 +185,42 @@ impl<'b> Call<'b, '_> {
         result
     }
 
-    /// What was heard so far, unless somebody else asked the unit in between: that may be open now.
-    fn hearing<'h>(&self, heard: &'h mut Option<Hearing>, owner: &Owner, attribution: Attribution) -> &'h mut Hearing {
+    /// Whether the question has to be repeated until the answers agree. What was heard so far counts, unless somebody else
+    /// asked the unit in between: that may be open now.
+    fn go_on_hearing(&self, course: &mut Course, owner: &Owner, attribution: Attribution) -> bool {
         // Whatever else is repeated would be done twice.
         let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
-        let fresh = || Agreement::new(attribution, 1 + u8::from(twice));
-        if let Some(hearing) = heard
-            && self.unit.map(|unit| owner.asked(unit)) != hearing.known
-        {
-            hearing.agreement = fresh();
+        let asked = self.unit.map(|unit| owner.asked(unit));
+        if course.hearing.as_ref().is_none_or(|hearing| hearing.known != asked) {
+            let agreement = Agreement::new(attribution, 1 + u8::from(twice));
+            let is_repeated = self.unit.is_some() && !agreement.is_immediate();
+            if let Attribution::Repeat { words, .. } = attribution {
+                course.takes_more(u32::from(words) - 1, self.ask.timeout);
+            }
+            let before = course.hearing.as_ref().map_or(0, |hearing| hearing.asked);
+            course.hearing = is_repeated.then_some(Hearing { agreement, asked: before, known: None });
         }
-        heard.get_or_insert_with(|| Hearing { agreement: fresh(), asked: 0, known: None })
+        course.hearing.is_some()
     }
 
-    /// Asks `unit` once more; `None` while the answers do not agree.
+    /// Asks once more, `again` where only this call left something open; `None` while the answers do not agree.
     fn hear(
         &self,
-        hearing: &mut Hearing,
+        course: &mut Course,
         owner: &mut Owner,
-        unit: UnitAddress,
+        again: bool,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Option<Done>, Box<CallError>> {
+        let (Some(hearing), Some(unit)) = (course.hearing.as_mut(), self.unit) else { return Ok(None) };
         let Hearing { agreement, asked, known } = hearing;
         if *asked == 1 {
             owner.stats().count(Some(unit), |counters| counters.verified += 1);
         }
         *asked += 1;
         let mut agreed = false;
-        let result = owner.exchange(&self.ask, give_up, &mut |answer| {
+        let ask = Ask { in_doubt: again, ..self.ask };
+        let result = owner.exchange(&ask, give_up, &mut |answer| {
             agreed = agreement.hear(unit, &answer);
             if agreed {
                 take(answer);
@@ -224,16 +231,24 @@ impl<'b> Call<'b, '_> {
         match result {
             Ok(done) if agreed => Ok(Some(done)),
             Ok(done) if is_last => {
-                Err(self.ask.failed(Failure::Disagreeing { asked: *asked }, Some(done.sent), done.ended, &[]))
+                let failure = Failure::Disagreeing { asked: *asked };
+                course.hearing = None;
+                Err(self.ask.failed(failure, Some(done.sent), done.ended, &[]))
             }
-            Ok(_) => Ok(None),
-            Err(error) => match error.failure {
-                Failure::Refused { function, code } => {
+            Ok(_) => {
+                // What this call left open before may still come; it is an answer like this one.
+                course.repeats(owner, unit, again);
+                Ok(None)
+            }
+            Err(error) => {
+                if let Failure::Refused { function, code } = error.failure {
                     let enough = agreement.hear(unit, &Answer::exception(function, code));
-                    if enough || is_last { Err(error) } else { Ok(None) }
+                    return if enough || is_last { Err(error) } else { Ok(None) };
                 }
-                _ => Err(error),
-            },
+                let result = Err(error);
+                course.leaves_open(owner, &self.ask, Form::Repeated, &result);
+                result.map(|_: Done| None)
+            }
         }
     }
 }

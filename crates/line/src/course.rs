@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::PortErrorKind;
 use crate::error::{CallError, Failure};
@@ -24,6 +24,18 @@ pub(crate) enum Form {
     Plain,
     /// As a read of so many words, which nothing that the unit owes could pass for.
     Apart(u16),
+    /// As the caller did, until the answers agree.
+    Repeated,
+}
+
+/// A question that is put until the answers agree.
+///
+/// What this call has left open itself is no rival: whichever of its requests is answered, it is this question that was.
+pub(crate) struct Hearing {
+    pub(crate) agreement: Agreement,
+    pub(crate) asked: u32,
+    /// What was asked of the unit when the last answer came or was given up.
+    pub(crate) known: Option<Asked>,
 }
 
 /// What the attempts of one call leave to the next.
@@ -35,10 +47,14 @@ pub(crate) struct Course {
     attempts: u32,
     /// How often it was asked; a question that is repeated to be sure of its answer counts once.
     asked: u32,
+    /// How many more questions and time-outs were granted because answers have to agree.
+    granted: u32,
     /// What is left of the retries, in halves: a damaged answer, which took no time-out, costs one.
     left: u32,
     /// What was asked of the unit, if the last of it was a read of this call, which it left open; and how that was put.
     left_open: Option<(Asked, Form)>,
+    /// What was heard of a question that is repeated until the answers agree.
+    pub(crate) hearing: Option<Hearing>,
     /// Requests that are left.
     requests: u32,
     /// Whether a write was confirmed by what may have been the confirmation of another one.
@@ -55,7 +71,18 @@ impl Course {
         let left = retries.saturating_mul(2);
         // One is kept for the look at the adapter after a request that did not wait for it.
         let requests = retries.saturating_add(1).saturating_mul(REQUESTS) - 1;
-        Self { allowed, until: None, attempts: 0, asked: 0, left, left_open: None, requests, unproven: false }
+        Self {
+            allowed,
+            until: None,
+            attempts: 0,
+            asked: 0,
+            granted: 0,
+            left,
+            left_open: None,
+            hearing: None,
+            requests,
+            unproven: false,
+        }
     }
 
     /// The same call goes on with something else: with `retries` more questions than one, and what is left of the requests.
@@ -109,13 +136,40 @@ impl Course {
     ) -> Result<Done, Box<CallError>> {
         self.asks(owner.now());
         let result = owner.exchange(ask, give_up, take);
-        self.left_open = match (&result, ask.destination, ask.request) {
+        self.leaves_open(owner, ask, form, &result);
+        result
+    }
+
+    /// Remembers whether what came of `ask` lets the same be asked again.
+    pub(crate) fn leaves_open(
+        &mut self,
+        owner: &Owner,
+        ask: &Ask<'_>,
+        form: Form,
+        result: &Result<Done, Box<CallError>>,
+    ) {
+        self.left_open = match (result, ask.destination, ask.request) {
             (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
                 Some((owner.asked(unit), form))
             }
             _ => None,
         };
-        result
+    }
+
+    /// The question has to be put `more` times than once to be believed: that may take as many time-outs of `timeout` more, and
+    /// as many failures.
+    pub(crate) fn takes_more(&mut self, more: u32, timeout: Duration) {
+        let granted = more.saturating_sub(self.granted);
+        self.granted += granted;
+        self.left = self.left.saturating_add(granted.saturating_mul(2));
+        let longer = timeout.saturating_mul(granted);
+        self.allowed += longer;
+        self.until = self.until.map(|until| until + longer);
+    }
+
+    /// The question is repeated, `again` where all that `unit` owes is the answer to it.
+    pub(crate) fn repeats(&mut self, owner: &Owner, unit: UnitAddress, again: bool) {
+        self.left_open = again.then(|| (owner.asked(unit), Form::Repeated));
     }
 
     /// How the question was put, if all that `unit` owes is the answer to this very one, so that it may be asked again as it

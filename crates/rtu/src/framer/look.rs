@@ -60,7 +60,11 @@ impl Framer {
             return Look::Wait;
         }
         if begun && here.len() >= TOLD {
-            error = error.or(Frame::parse(here).err());
+            match Frame::parse(here) {
+                // Whole, and shorter than it may be.
+                Ok(_) => return Look::Frame(here.len()),
+                Err(why) => error = error.or(Some(why)),
+            }
         }
         Look::Nothing(error)
     }
