@@ -111,8 +111,8 @@ impl Master {
     pub const fn with_silence(silence: Duration) -> Self {
         Self {
             silence,
-            // Of a line whose format is not known, two characters may follow each other as slowly as frames.
-            char_time: silence,
+            // Of a line whose format is not known nobody can tell what follows at once.
+            char_time: Duration::MAX,
             gap: Duration::ZERO,
             patience: None,
             framer: Framer::new(silence),

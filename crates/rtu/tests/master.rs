@@ -129,6 +129,25 @@ fn a_frame_that_comes_twice_is_one_answer() {
     assert_eq!(master.attribution(at(230_100), unit(1), &read), Attribution::Repeat { words: 2, refusal: 2 });
 }
 
+/// After a silence the same bytes are another answer: that of a question that was put twice.
+#[test]
+fn the_same_frame_after_a_silence_is_another_answer() {
+    let read = Request::read(0x2100, 1).unwrap();
+    let mut master = waiting(&read);
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    master.begin_in_doubt(at(110_000), unit(1).into(), &read, TIMEOUT).unwrap();
+    assert!(matches!(master.poll(at(110_000)), Some(Event::Transmit(_))));
+    master.sent(at(111_000));
+    assert!(matches!(master.poll(at(220_000)), Some(Event::NoAnswer { .. })));
+    // Seven characters and the silence: 2.4 ms at 115 200 bit/s.
+    for at_ in [230_000, 233_000] {
+        master.receive(at(at_), &words(1, &[3]));
+        assert_eq!(master.poll(at(at_)), None);
+    }
+    assert!(!master.in_quarantine(at(233_000), unit(1)));
+    assert_eq!(master.attribution(at(233_000), unit(1), &read), Attribution::Certain);
+}
+
 /// A write looks like its own confirmation: what an adapter has sent back is no answer that was seen.
 #[test]
 fn an_open_write_is_not_seen_by_what_may_be_its_own_echo() {

@@ -143,7 +143,7 @@ impl Master {
 
     /// How soon after another one a frame of `len` bytes can have come with no silence between them.
     fn at_once(&self, len: usize) -> Duration {
-        self.silence + self.char_time.saturating_mul(u32::try_from(len).unwrap_or(u32::MAX))
+        self.char_time.saturating_mul(u32::try_from(len).unwrap_or(u32::MAX)).saturating_add(self.silence)
     }
 
     /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
