@@ -71,7 +71,7 @@ PYTHON: dict[str, set[str]] = {
     "terminals": {"checks", "commanding", "errors", "motion", "values"},
     "watchdog": {"at_once", "checks", "commanding", "errors", "evidence", "falling", "motion", "values"},
     "interruptions": set(),
-    "safeguard": {"errors", "interruptions"},
+    "safeguard": {"_native", "errors", "interruptions"},
     "at_once": {"figures", "protocols"},
     "backup": {"_native", "checks", "errors", "parameters", "profile", "protocols", "registers", "values"},
     "operations": {

@@ -25,12 +25,14 @@ __all__ = [
     "SimulatedLine",
     "Simulator",
     "__version__",
+    "begin_of_child",
     "crc16",
     "decode",
     "decode_answer",
     "encode_echo",
     "encode_read",
     "encode_write",
+    "end_of_program",
     "fault_kinds",
     "open_bus",
     "port_facts",
@@ -543,6 +545,15 @@ class Simulator:
     def drive(self, unit: int, /) -> SimulatedDrive: ...
     @property
     def line(self) -> SimulatedLine: ...
+
+def end_of_program() -> None:
+    """To be called last of all at exit, by the thread that ends the program; others raise SystemExit from here on.
+
+    Waits up to 1 s for those that make an exception here, or use an object that stands for a port.
+    """
+
+def begin_of_child() -> None:
+    """To be called in a forked child: its program has not ended, whatever was so in its parent."""
 
 def fault_kinds() -> tuple[str, ...]:
     """The names of what can go wrong with an answer on a simulated line."""

@@ -21,6 +21,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from types import FrameType
 
+from drivebus._native import begin_of_child, end_of_program
 from drivebus.errors import NotAllowed
 from drivebus.interruptions import Kept
 
@@ -222,6 +223,8 @@ def _end_all() -> None:
 def _end_the_rest() -> None:
     """Called last of all: what was armed when the interpreter had begun to call is not called by it."""
     _end_all()
+    # Not before: until here, other threads finish what they began.
+    end_of_program()
 
 
 atexit.register(_end_the_rest)
@@ -233,6 +236,7 @@ def _forget() -> None:
         guard.leave_alone()
     _guards.clear()
     _over.clear()
+    begin_of_child()
     _stop_listening()
 
 

@@ -54,10 +54,8 @@ def wait_for_the_dead():
     while True:
         try:
             bus.read({dead}, 0x2100)
-        except drivebus.NoAnswer:
+        except drivebus.DrivebusError:
             pass
-        except drivebus.PortError:
-            return  # it was closed
 
 with bus, drive.running(10.0):
     threading.Thread(target=wait_for_the_dead, daemon=True).start()
@@ -93,15 +91,15 @@ class Line:
         told = self.commands()
         return self.simulator.drive(1).fault == 0 and bool(told) and told[-1] == FORWARD
 
-    def start(self, body: str, timeout: float = 2.0) -> Program:
-        """Runs *body* in a program of its own."""
+    def start(self, body: str, timeout: float = 2.0, before: str = "") -> Program:
+        """Runs *body* in a program of its own, which does what stands in *before* before it imports drivebus."""
         child = subprocess.Popen(
             [
                 sys.executable,
                 "-W",
                 "ignore::DeprecationWarning",
                 "-c",
-                PRELUDE + body,
+                before + PRELUDE + body,
                 self.kind,
                 self.port,
                 str(timeout),

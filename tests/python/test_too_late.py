@@ -125,5 +125,6 @@ begun.wait()
 @pytest.mark.parametrize("wait", [0.0, 0.02, 0.04])
 def test_a_program_that_ends_at_any_moment_leaves_no_motor_running(wait: float) -> None:
     with line("native") as there, there.start(AT_ANY_MOMENT.format(wait=f"time.sleep({wait})")) as program:
-        program.ends()
+        code, _, said = program.ends()
+        assert (code, said) == (0, "")
         assert there.commands()[-1] == STOP

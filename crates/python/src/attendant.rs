@@ -11,6 +11,8 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
+use crate::ending::Inside;
+
 type Job = Box<dyn FnOnce() + Send>;
 
 /// The thread. It ends with this.
@@ -54,8 +56,9 @@ impl Attendant {
         }
         let (tell, told) = channel();
         let job = move || {
+            let inside = Inside::wait();
             // Nobody listens any more where it was late.
-            let _ = tell.send(Python::try_attach(work));
+            let _ = tell.send(inside.and_then(|_inside| Python::try_attach(work)));
         };
         self.jobs.send(Box::new(job)).map_err(|_| Unattended::Over)?;
         match told.recv_timeout(patience) {

@@ -12,6 +12,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::arguments::{any_request, duration, open_failed, read_options, read_request, to_open, write_options};
 use crate::convert::{bytes_of, one_word, unit_address, words_of};
+use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
 
@@ -83,7 +84,7 @@ impl Bus {
     }
 
     fn close(&self, py: Python<'_>) {
-        py.detach(|| self.core.close());
+        detached(py, || self.core.close());
     }
 
     fn now(&self, py: Python<'_>) -> f64 {
@@ -330,12 +331,13 @@ pub(crate) fn with_signals<T: Send>(
     work: impl FnOnce(&mut dyn FnMut() -> bool) -> T + Send,
 ) -> PyResult<T> {
     let raised = Mutex::new(None);
-    let result = py.detach(|| {
+    let result = detached(py, || {
         work(&mut || {
             let Ok(mut raised) = raised.lock() else { return true };
             // The first is the one that counts; what comes after it, the interpreter raises when this has ended.
             if raised.is_none() {
-                *raised = Python::try_attach(|py| py.check_signals().err()).flatten();
+                *raised =
+                    Inside::enter().and_then(|_inside| Python::try_attach(|py| py.check_signals().err()).flatten());
             }
             raised.is_some()
         })

@@ -3,12 +3,13 @@
 
 use drivebus_line::{CallError, Failure, PortError};
 use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError, Instant};
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::PySystemExit;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyDict, PyType};
 
 use crate::bus::UnixClock;
+use crate::ending::Inside;
 
 /// The classes of `drivebus.errors`.
 #[derive(Debug, Clone, Copy)]
@@ -38,20 +39,21 @@ impl Class {
     }
 
     /// An exception of this class with `message` and whatever `details` puts among its keyword arguments.
+    ///
+    /// Where it is too late to call the class, which is written in Python, `SystemExit`: it ends a thread without a word.
     pub(crate) fn raise(
         self,
         message: String,
         details: impl for<'py> FnOnce(&Bound<'py, PyDict>) -> PyResult<()>,
     ) -> PyErr {
-        let built = Python::try_attach(|py| {
+        let build = |py: Python<'_>| {
             let keywords = PyDict::new(py);
             details(&keywords)?;
             Ok(PyErr::from_value(self.get(py)?.call((message,), Some(&keywords))?))
-        });
-        match built {
+        };
+        match Inside::enter().and_then(|_inside| Python::try_attach(build)) {
             Some(Ok(error) | Err(error)) => error,
-            // Nobody is left to see it.
-            None => PyErr::new::<PyKeyboardInterrupt, _>(()),
+            None => PyErr::new::<PySystemExit, _>(()),
         }
     }
 }

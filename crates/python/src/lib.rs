@@ -9,6 +9,7 @@ mod arguments;
 mod attendant;
 mod bus;
 mod convert;
+mod ending;
 mod errors;
 mod format;
 mod frames;
@@ -23,13 +24,15 @@ mod sim;
 mod sim_line;
 mod tables;
 
-/// Nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
+/// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]
 mod _native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
     use crate::bus::Bus;
+    #[pymodule_export]
+    use crate::ending::{begin_of_child, end_of_program};
     #[pymodule_export]
     use crate::format::SerialFormat;
     #[pymodule_export]

@@ -16,9 +16,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::attendant::{Attendant, Unattended};
+use crate::ending::{detached, is_over};
 
 /// The time-out of an object that has no descriptor to wait on: how fine its waits are.
 const STEP: Duration = Duration::from_millis(1);
+/// How long the object is waited for without a break: the end of the program waits for that.
+const BREAK: Duration = Duration::from_millis(50);
 /// How long the object is given beyond what it is asked to wait. A program may keep the interpreter to itself for seconds.
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -83,10 +86,9 @@ impl PySerialLine {
             PortError::new(PortErrorKind::Other, "a Python object", message)
         })?;
         let (object, asked) = (port.clone().unbind(), *asked);
-        let (name, wait, format) = port
-            .py()
-            .detach(|| attendant.run(PATIENCE, move |py| look_at(object.bind(py), &asked)))
-            .unwrap_or_else(|why| Err(unattended("a Python object", why)))?;
+        let (name, wait, format) =
+            detached(port.py(), || attendant.run(PATIENCE, move |py| look_at(object.bind(py), &asked)))
+                .unwrap_or_else(|why| Err(unattended("a Python object", why)))?;
         let notes = if format == asked {
             Vec::new()
         } else {
@@ -134,10 +136,14 @@ impl Line for PySerialLine {
             return Ok(0);
         }
         let room = buffer.len();
-        let patience = until.saturating_duration_since(monotonic()) + PATIENCE;
-        let came = self.attended(patience, move |port, wait| read_some(port, wait, room, until))?;
-        buffer[..came.len()].copy_from_slice(&came);
-        Ok(came.len())
+        loop {
+            let pause = until.min(monotonic() + BREAK);
+            let came = self.attended(BREAK + PATIENCE, move |port, wait| read_some(port, wait, room, pause))?;
+            if !came.is_empty() || pause >= until {
+                buffer[..came.len()].copy_from_slice(&came);
+                return Ok(came.len());
+            }
+        }
     }
 
     fn sleep(&mut self, until: Instant) {
@@ -159,6 +165,10 @@ impl Line for PySerialLine {
 
 impl Drop for PySerialLine {
     fn drop(&mut self) {
+        if is_over() {
+            // An interpreter that ends closes the object itself.
+            return;
+        }
         let object = Arc::clone(&self.object);
         let owned = self.owned;
         let let_go = move |py: Python<'_>| {
@@ -170,7 +180,7 @@ impl Drop for PySerialLine {
                 Wait::Timeout(before) => port.setattr(intern!(py, "timeout"), before),
             };
         };
-        // Whoever drops it may be attached. An interpreter that ends closes the object itself.
+        // Whoever drops it may be attached.
         let _ = Python::try_attach(|py| py.detach(|| self.attendant.run(PATIENCE, let_go)));
     }
 }
