@@ -97,8 +97,4 @@ impl Known {
         // Or looks the same when it is cut short.
         self.open.iter().filter(move |open| open.asked.pdu[0] == 3 && open.asked.pdu[3..5] >= pdu[3..5])
     }
-
-    pub(crate) fn has_open_echo(&self, now: Instant) -> bool {
-        self.open.iter().any(|open| open.is_echo() && now < open.given_up + PATIENCE)
-    }
 }

@@ -297,8 +297,8 @@ impl Run {
                         known.settle();
                         known.echoed = true;
                     }
-                    // The refusal of an earlier echo looks the same.
-                    (true, true) if known.is_strange(now) || known.has_open_echo(now) => {
+                    // The refusal of another program's echo looks the same.
+                    (true, true) if known.is_strange(now) => {
                         known.leave_open(job.asked.clone(), now, place);
                     }
                     (true, true) => {

@@ -111,7 +111,12 @@ impl<'b> Call<'b, '_> {
             }
             let in_time = course.is_in_time(self.bus.now_of(&owner));
             if !course.sends() {
-                return Err(self.none_settled(tried, &owner));
+                return Err(match &course.hearing {
+                    Some(Hearing { asked, .. }) if tried.failure.is_none() => {
+                        self.ask.failed(Failure::Disagreeing { asked: *asked }, None, self.bus.now_of(&owner), &[])
+                    }
+                    _ => self.none_settled(tried, &owner),
+                });
             }
             if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(&owner, unit)) {
                 return Ok((owner, Question::Same(form)));

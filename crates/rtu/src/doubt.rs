@@ -7,7 +7,7 @@
 //! | --- | --- | --- |
 //! | the echo (08H) of a fresh word | any | it answers in the order it was asked |
 //! | the answer to a read that no open answer could pass for | requests of our own | the same |
-//! | the refusal of an echo (exception to 08H), while no other echo is open | requests of our own | the same |
+//! | the refusal of an echo (exception to 08H) | requests of our own | the same |
 //! | [`FIRST_CONTACT`] after the line was opened | questions of others | it answers within that time or never |
 //! | [`PATIENCE`] after the last request it left open | requests of our own, to a unit that returns no echo | the same |
 //! | every open answer was seen | requests of our own | it answers at most once |
@@ -154,7 +154,6 @@ impl Doubts {
             open.unit == unit && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
         };
         if let Some(open) = self.ledger.iter_mut().flatten().find(|open| alike(open)) {
-            // Echoes are counted as long as none comes back.
             let over = open.is_past(now) && !self.open.contains(unit) && !expected.is_echo();
             open.count = if over { 1 } else { open.count.saturating_add(1) };
             open.given_up = now;
@@ -218,7 +217,8 @@ impl Doubts {
             self.echoers.insert(unit);
         }
         if self.listed.contains(unit) {
-            self.forget(unit, |open| open.is_past(now));
+            // Echoes are counted as long as none comes back, and can be mistaken for nothing but echoes.
+            self.forget(unit, |open| open.is_past(now) || open.expected.is_echo());
         }
         if now >= self.forgotten_until {
             self.forgotten.remove(unit);
@@ -271,13 +271,10 @@ impl Doubts {
         })
     }
 
-    /// `unit` has refused an echo. Refusals look alike: where another echo is open, this may be the refusal of that one,
-    /// and prove nothing of what was asked since.
+    /// `unit` has refused an echo, this one or one that was asked before. What was asked before both is answered, if it
+    /// answers in order; what was asked between them counts as possible for [`OVERTAKING`] in any case.
     pub(crate) fn refused_echo(&mut self, now: Instant, unit: UnitAddress) {
-        let earlier = self
-            .of(unit)
-            .any(|open| open.expected.function() == Expected::ECHO.function() && now < open.last + PATIENCE);
-        if earlier || self.is_strange(now, unit) || self.has_forgotten(now, unit) {
+        if self.is_strange(now, unit) || self.has_forgotten(now, unit) {
             self.left_open(now, unit, Expected::ECHO, Duration::ZERO);
         } else {
             self.settle(now, unit, false);
