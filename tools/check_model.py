@@ -84,14 +84,14 @@ BREAKS = [
     Break(
         "a time-out leaves the request open",
         JUDGE,
-        "self.doubts.left_open(now, unit, expected, timeout);\n        Some(Event::NoAnswer",
-        "Some(Event::NoAnswer",
+        "self.doubts.left_open(now, unit, expected, timeout);\n        Some(self.spoilt",
+        "Some(self.spoilt",
         "in-order",
     ),
     Break(
         "a damaged answer leaves the request open",
         JUDGE,
-        "self.doubts.left_open(now, unit, expected, timeout);\n                    return Some(Event::Corrupt",
+        "self.doubts.left_open(now, unit, expected, timeout);\n                        return Some(Event::Corrupt",
         "return Some(Event::Corrupt",
         "in-order",
     ),
@@ -150,7 +150,7 @@ BREAKS = [
     Break(
         "a read of the same length tells nothing apart",
         DOUBT,
-        "&& !self.possible(now, unit).any(|open| open.expected.could_pass_for(expected)))",
+        "&& !self.possible(now, unit).any(|open| open.expected.could_pass_for_cut(expected)))",
         ")",
         "in-order",
     ),
@@ -179,8 +179,8 @@ BREAKS = [
     Break(
         "not at first contact",
         DOUBT,
-        "if earlier || self.is_strange(now, unit) ||",
-        "if earlier ||",
+        "if self.is_strange(now, unit) || self.has_forgotten",
+        "if self.has_forgotten",
         "refuses-08H --requests 3",
     ),
     Break(
@@ -227,7 +227,7 @@ BREAKS = [
     Break(
         "an echo proves nothing of what may overtake",
         DOUBT,
-        "self.forget(unit, |open| open.is_past(now));",
+        "self.forget(unit, |open| open.is_past(now) || open.expected.is_echo());",
         "self.forget(unit, |_| true);",
         "overtaking --requests 4 --faults 0",
     ),
@@ -269,8 +269,8 @@ BREAKS = [
     Break(
         "a write waits",
         DOUBT,
-        "Some(latest) if !expected.is_read() || refusal",
-        "Some(latest) if refusal",
+        "Some(latest) if !expected.is_read() || words",
+        "Some(latest) if words",
         "overtaking-commands --refusals 0",
     ),
     Break(
