@@ -111,16 +111,22 @@ fn an_open_answer_that_is_seen_is_owed_no_more() {
     assert_eq!(master.attribution(at(150_000), unit(1), &read), Attribution::Certain);
 }
 
+/// A master that has asked `read` twice; both answers are open.
+fn asked_twice_in_vain(read: &Request<'_>) -> Master {
+    let mut master = waiting(read);
+    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
+    master.begin_in_doubt(at(110_000), unit(1).into(), read, TIMEOUT).unwrap();
+    assert!(matches!(master.poll(at(110_000)), Some(Event::Transmit(_))));
+    master.sent(at(111_000));
+    assert!(matches!(master.poll(at(220_000)), Some(Event::NoAnswer { .. })));
+    master
+}
+
 /// The line may bring a frame twice at once: of two open answers only one is seen by that.
 #[test]
 fn a_frame_that_comes_twice_is_one_answer() {
     let read = Request::read(0x2100, 1).unwrap();
-    let mut master = waiting(&read);
-    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
-    master.begin_in_doubt(at(110_000), unit(1).into(), &read, TIMEOUT).unwrap();
-    assert!(matches!(master.poll(at(110_000)), Some(Event::Transmit(_))));
-    master.sent(at(111_000));
-    assert!(matches!(master.poll(at(220_000)), Some(Event::NoAnswer { .. })));
+    let mut master = asked_twice_in_vain(&read);
     for at_ in [230_000, 230_100] {
         master.receive(at(at_), &words(1, &[3]));
         assert_eq!(master.poll(at(at_)), None);
@@ -133,12 +139,7 @@ fn a_frame_that_comes_twice_is_one_answer() {
 #[test]
 fn the_same_frame_after_a_silence_is_another_answer() {
     let read = Request::read(0x2100, 1).unwrap();
-    let mut master = waiting(&read);
-    assert!(matches!(master.poll(at(110_000)), Some(Event::NoAnswer { .. })));
-    master.begin_in_doubt(at(110_000), unit(1).into(), &read, TIMEOUT).unwrap();
-    assert!(matches!(master.poll(at(110_000)), Some(Event::Transmit(_))));
-    master.sent(at(111_000));
-    assert!(matches!(master.poll(at(220_000)), Some(Event::NoAnswer { .. })));
+    let mut master = asked_twice_in_vain(&read);
     // Seven characters and the silence: 2.4 ms at 115 200 bit/s.
     for at_ in [230_000, 233_000] {
         master.receive(at(at_), &words(1, &[3]));
