@@ -100,7 +100,7 @@ BREAKS = [
         JUDGE,
         "(false, ..) => self.doubts.left_open(now, unit, expected, timeout),",
         "(false, ..) => {}",
-        "overtaking-commands --requests 3 --lingers 1",
+        "overtaking --requests 3 --faults 1",
     ),
     Break(
         "a request given up is left open",
