@@ -3,6 +3,9 @@
 //!
 //! An adapter hands over what it has when its buffer is full or its timer runs out, a network when it pleases, a machine
 //! when it has time. Nothing of that can be asked for, so it is learned: from the pauses inside answers that became whole.
+//!
+//! Where nothing is lost, the longest pause decides. Where much is lost, each answer that broke off pays for it, so that rare
+//! pauses are not worth waiting for: an answer given up too early is asked for again.
 
 use drivebus_rtu::{Duration, Instant, Patience};
 
@@ -12,14 +15,20 @@ use crate::Line;
 /// 50 ms is no rarity; what a network adds it adds more often than once.
 const UNKNOWN: Duration = Duration::from_millis(100);
 
-/// Answers that have to become whole before they say what is usual.
+/// Answers that have to become whole, or to break off for good, before they say what is usual.
 const ENOUGH: u32 = 8;
 
 /// Answers after which what was usual before is forgotten; up to twice as many are remembered.
 const REMEMBERED: u32 = 256;
 
-/// So many times the longest pause is waited.
+/// So many times a pause is waited.
 const MARGIN: u32 = 2;
+
+/// So many answers have to break off for each that is given up before it goes on.
+const WORTH: u32 = 4;
+
+/// Pauses are told apart in so many steps, each twice the one before.
+const STEPS: usize = 8;
 
 /// The least where bytes are handed over as the wire carries them: a damaged answer may have the right one a few
 /// milliseconds behind it, and machines wake late.
@@ -40,10 +49,42 @@ pub(crate) struct Lumps {
     pause: Duration,
     /// Answers in the period under way.
     whole: u32,
-    /// Longest pause in it, and in the one before.
-    longest: Duration,
-    before: Option<Duration>,
+    current: Period,
+    before: Option<Period>,
     broke_off: Option<BrokeOff>,
+}
+
+/// What the answers of one period have taught.
+#[derive(Debug, Clone, Copy, Default)]
+struct Period {
+    /// Longest pause.
+    longest: Duration,
+    /// How many answers had one that was longer than [`NEVER_MINDED`], than twice as long, and so on.
+    paused: [u32; STEPS],
+    /// How many broke off, or were damaged, and did not go on.
+    torn: u32,
+}
+
+impl Period {
+    fn has_paused(&mut self, pause: Duration) {
+        self.longest = self.longest.max(pause);
+        for (step, paused) in (0..).zip(&mut self.paused) {
+            *paused += u32::from(pause > shortest(step));
+        }
+    }
+
+    /// The pause that is worth waiting for, after this period and the one `before`.
+    fn worth(&self, before: &Self) -> Duration {
+        let torn = self.torn + before.torn;
+        let paused = self.paused.iter().zip(&before.paused).map(|(now, before)| now + before);
+        let rare = (0..).zip(paused).find(|(_, paused)| torn > 0 && paused * WORTH <= torn);
+        self.longest.max(before.longest).min(rare.map_or(Duration::MAX, |(step, _)| shortest(step)))
+    }
+}
+
+/// What pauses of this step are longer than.
+const fn shortest(step: u32) -> Duration {
+    Duration::from_nanos(NEVER_MINDED << step)
 }
 
 /// An answer of which no more was expected.
@@ -51,7 +92,7 @@ pub(crate) struct Lumps {
 struct BrokeOff {
     /// When its last byte came.
     last: Instant,
-    /// How many it lacked.
+    /// How many it lacked; 0 where it was as long as it should be.
     lacked: usize,
 }
 
@@ -63,8 +104,8 @@ impl Lumps {
             (false, None, Duration::ZERO) => Some(LEAST_BEHIND_UNKNOWN),
             (false, _, latency) => Some(LEAST + latency),
         };
-        let (pause, longest) = (UNKNOWN.max(least.unwrap_or_default()), Duration::ZERO);
-        Self { least, pause, whole: 0, longest, before: None, broke_off: None }
+        let pause = UNKNOWN.max(least.unwrap_or_default());
+        Self { least, pause, whole: 0, current: Period::default(), before: None, broke_off: None }
     }
 
     /// How long to listen on; `usual` is when the unit that is asked has begun to answer, as far as is known. `None` where
@@ -90,16 +131,25 @@ impl Lumps {
             _ => 0,
         };
         // What an earlier answer lacked came before this one: it had only paused.
-        if let (Some(broke_off), Some(answer)) = (self.broke_off.take(), answer)
-            && arrivals.count > 0
-            && arrivals.count + lacks == answer + broke_off.lacked
-        {
-            self.has_paused(arrivals.first.saturating_duration_since(broke_off.last));
+        match (self.broke_off.take(), answer) {
+            (Some(broke_off), Some(answer))
+                if broke_off.lacked > 0
+                    && arrivals.count > 0
+                    && arrivals.count + lacks == answer + broke_off.lacked =>
+            {
+                self.has_paused(arrivals.first.saturating_duration_since(broke_off.last));
+            }
+            // Beside a whole answer and nothing else, it would have been seen to go on.
+            (Some(_), Some(answer)) if ended == Ended::Whole && arrivals.count == answer => {
+                self.current.torn += 1;
+                self.weigh();
+            }
+            _ => {}
         }
         match ended {
             Ended::Whole => self.became_whole(arrivals, answer),
-            _ if lacks > 0 => self.broke_off = Some(BrokeOff { last: arrivals.last, lacked: lacks }),
-            _ => {}
+            Ended::Damaged { .. } => self.broke_off = Some(BrokeOff { last: arrivals.last, lacked: lacks }),
+            Ended::Otherwise => {}
         }
     }
 
@@ -111,9 +161,9 @@ impl Lumps {
     fn became_whole(&mut self, arrivals: &Arrivals, answer: Option<usize>) {
         self.whole += 1;
         if self.whole >= REMEMBERED {
-            self.before = Some(std::mem::take(&mut self.longest));
+            self.before = Some(std::mem::take(&mut self.current));
             self.whole = 0;
-            self.has_paused(Duration::ZERO);
+            self.weigh();
         }
         if arrivals.longest > NEVER_MINDED || self.whole == ENOUGH {
             let pause = Duration::from_nanos(arrivals.longest);
@@ -123,10 +173,15 @@ impl Lumps {
     }
 
     fn has_paused(&mut self, pause: Duration) {
-        self.longest = self.longest.max(pause);
-        let least =
-            if self.before.is_some() || self.whole >= ENOUGH { self.least.unwrap_or_default() } else { UNKNOWN };
-        self.pause = self.longest.max(self.before.unwrap_or_default()).saturating_mul(MARGIN).max(least);
+        self.current.has_paused(pause);
+        self.weigh();
+    }
+
+    fn weigh(&mut self) {
+        let is_known = self.before.is_some() || self.whole + self.current.torn >= ENOUGH;
+        let least = if is_known { self.least.unwrap_or_default() } else { UNKNOWN };
+        let worth = self.current.worth(&self.before.unwrap_or_default());
+        self.pause = worth.saturating_mul(MARGIN).max(least);
     }
 }
 

@@ -263,6 +263,17 @@ impl Expected {
         }
     }
 
+    /// What stands behind the function code in the answer, where that is known.
+    pub(crate) const fn third(self) -> Option<u8> {
+        match self.0 {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 125 words")]
+            Kind::Read { count } => Some(2 * count as u8),
+            Kind::WriteSingle { address, .. } | Kind::WriteMultiple { address, .. } => Some(address.to_be_bytes()[0]),
+            Kind::Echo { .. } => Some(0),
+            Kind::Custom { .. } => None,
+        }
+    }
+
     /// Whether the specification says more of the answer to `asked`, the PDU of the request: checks `pdu` against that.
     ///
     /// # Errors

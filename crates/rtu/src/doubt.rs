@@ -11,6 +11,7 @@
 //! | [`FIRST_CONTACT`] after the line was opened | questions of others | it answers within that time or never |
 //! | [`PATIENCE`] after the last request it left open | requests of our own, to a unit that returns no echo | the same |
 //! | every open answer was seen | requests of our own | it answers at most once |
+//! | it came damaged, and on this line such never come again (`master/torn.rs`) | reads of our own | the same |
 //!
 //! A radio bridge, a serial server or a gateway may let answers overtake each other, and nobody can tell from a port
 //! whether one stands behind it. There none of the orders above holds. So on every line an open answer counts as possible
@@ -149,6 +150,12 @@ impl Doubts {
         self.open.insert(unit);
     }
 
+    /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
+    /// not.
+    pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
+        self.enter(now, unit, expected, window);
+    }
+
     fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
         let alike = |open: &Open| {
             open.unit == unit && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
@@ -158,7 +165,7 @@ impl Doubts {
             open.count = if over { 1 } else { open.count.saturating_add(1) };
             open.given_up = now;
             open.last = now;
-            open.window = open.window.max(window);
+            open.window = if over { window } else { open.window.max(window) };
             if expected.is_echo() && open.count >= MUTE {
                 self.echoers.remove(unit);
             }

@@ -34,7 +34,8 @@ pub enum Event<'a> {
     Busy,
 }
 
-/// What was seen on the line beside answers, since [`crate::Master::take_tally`]. A count that is full stays full.
+/// What was seen on the line beside answers, since [`crate::Master::take_tally`]. Noise counts when its request ends. A count
+/// that is full stays full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
     /// Whole frames that came when nothing was waited for, or from a unit in quarantine.

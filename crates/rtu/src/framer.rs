@@ -18,6 +18,7 @@ use crate::frame::{Adu, Frame, FrameError, MAX_ADU};
 use crate::{Instant, UnitAddress};
 
 use look::Look;
+pub(crate) use look::{EXCEPTION_ADU, lost_its_head};
 
 /// Twice the longest frame: one that is being received, and whatever came before it.
 const CAPACITY: usize = 2 * MAX_ADU;
@@ -235,7 +236,6 @@ impl Framer {
             return None;
         }
         let range = 0..give_up;
-        expected |= quiet && found.is_none() && self.lost_its_head(&range);
         let error = error.or_else(|| Frame::parse(&self.bytes[range.clone()]).err());
         let error = error.unwrap_or(FrameError::TooShort { len: give_up });
         self.overrun = !quiet && found.is_none() && give_up > self.ended;

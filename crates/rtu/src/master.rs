@@ -6,9 +6,10 @@
 //! what no answer still to come could be mistaken for, an echo (08H/0000) of a fresh word or a read of another length.
 //! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
+mod beside;
 mod judge;
 mod remnant;
-mod spoilt;
+mod torn;
 
 use core::time::Duration;
 
@@ -20,8 +21,8 @@ use crate::framer::Framer;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
-use remnant::Beside;
-use spoilt::Spoilt;
+use beside::Beside;
+use torn::Torn;
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
 ///
@@ -62,8 +63,7 @@ pub struct Master {
     echo_due: bool,
     /// What came beside the answer that is waited for.
     beside: Beside,
-    /// What came in its place.
-    spoilt: Spoilt,
+    torn: Torn,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
     doubts: Doubts,
@@ -121,7 +121,7 @@ impl Master {
             strips_echo: false,
             echo_due: false,
             beside: Beside::NOTHING,
-            spoilt: Spoilt::NOTHING,
+            torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,
             tally: Tally::EMPTY,
@@ -273,7 +273,6 @@ impl Master {
                     self.echo_due = self.strips_echo;
                     self.doubts.goes_out();
                     self.beside.clear();
-                    self.spoilt.clear();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {
@@ -305,6 +304,7 @@ impl Master {
                 true
             }
             State::Waiting { unit, expected, timeout, .. } => {
+                self.tally.add_noise(self.beside.noise(true));
                 self.doubts.left_open(now, unit, expected, timeout);
                 true
             }
@@ -323,6 +323,7 @@ impl Master {
         self.framer.expect_anything();
         self.busy = self.busy.max(Some(now));
         self.doubts.opened(now);
+        self.torn.forget();
     }
 
     /// Says that what was taken for the answer of `unit` to `request` may have been none, so that it is still owed. It was

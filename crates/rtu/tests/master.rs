@@ -369,9 +369,9 @@ fn a_glitch_does_not_hide_the_adapters_echo() {
     let end = send(&mut master, 0, &write);
     master.receive(at(end), &[&[0x00], own.as_bytes()].concat());
     assert_eq!(master.poll(at(end)), None, "the echo is not the confirmation");
-    assert_eq!(master.take_tally(), Tally { own_echo: 1, noise: 1, noise_idle: 1, ..Tally::default() });
     master.receive(at(end + 3_000), own.as_bytes());
     assert!(matches!(master.poll(at(end + 3_000)), Some(Event::Answer(Answer::WriteSingle { .. }))));
+    assert_eq!(master.take_tally(), Tally { own_echo: 1, noise: 1, noise_idle: 1, ..Tally::default() });
 }
 
 #[test]
@@ -471,18 +471,28 @@ fn waiting_patiently(request: &Request<'_>) -> Master {
     master
 }
 
+/// Whole, and in lumps with a silence between them.
 #[test]
 fn an_answer_without_one_of_its_bytes_is_corrupt_before_the_time_is_over() {
     let request = Request::read(0x2100, 4).unwrap();
     let whole = words(1, &[0x1234, 0x5678, 0x9ABC, 0xDEF0]);
-    for lost in 0..whole.len() {
+    for (lost, lump) in (0..whole.len()).flat_map(|lost| [(lost, 1), (lost, 3), (lost, 12)]) {
         let mut bytes = whole.clone();
         bytes.remove(lost);
         let mut master = waiting_patiently(&request);
-        master.receive(at(9_000), &bytes);
-        assert_eq!(master.poll(at(18_999)), None, "without {lost}");
-        assert!(matches!(master.poll(at(19_000)), Some(Event::Corrupt { .. })), "without {lost}");
-        assert!(master.in_quarantine(at(20_000), unit(1)), "what comes later is late");
+        let mut now = 9_000;
+        for part in bytes.chunks(lump) {
+            now += 3_000;
+            assert_eq!(master.poll(at(now)), None, "without {lost}, by {lump}");
+            master.receive(at(now), part);
+        }
+        assert_eq!(master.poll(at(now + 9_999)), None, "without {lost}, by {lump}");
+        match master.poll(at(now + 10_000)) {
+            Some(Event::Corrupt { bytes: came, .. }) => assert_eq!(came, bytes, "without {lost}, by {lump}"),
+            other => panic!("without {lost}, by {lump}: {other:?}"),
+        }
+        let is_owed = |millis: u64| master.attribution(at(1_000 * millis), unit(1), &request).may_be_mistaken();
+        assert!(is_owed(1_000) && !is_owed(1_100), "it may come again, for a second");
     }
 }
 
@@ -505,8 +515,132 @@ fn the_right_answer_behind_one_that_cannot_be_is_taken() {
             Some(Event::Corrupt { bytes, .. } | Event::Wrong { frame: bytes, .. }) => assert_eq!(bytes, spoilt),
             other => panic!("{other:?}"),
         }
-        assert!(given_up.in_quarantine(at(20_000), unit(1)));
+        assert!(
+            given_up.in_quarantine(at(20_000), unit(1))
+                || matches!(given_up.attribution(at(20_000), unit(1), &request), Attribution::Repeat { words: 2, .. })
+        );
     }
+}
+
+/// A line on which every answer comes damaged, once: [`ask`](Self::ask) reads, and says whether the answer is still owed
+/// afterwards.
+struct Damaging {
+    master: Master,
+    /// In microseconds.
+    now: u64,
+}
+
+impl Damaging {
+    const READ: [u16; 2] = [0x2100, 2];
+
+    fn request() -> Request<'static> {
+        Request::read(Self::READ[0], Self::READ[1]).unwrap()
+    }
+
+    fn new() -> Self {
+        let mut master = Master::with_silence(Duration::from_micros(1_750));
+        master.be_patient(Some(PATIENCE_OF_10_MS));
+        Self { master, now: 0 }
+    }
+
+    fn ask(&mut self, came: &[u8]) -> bool {
+        self.master.begin_in_doubt(at(self.now), unit(1).into(), &Self::request(), Duration::from_millis(100)).unwrap();
+        self.now += 2_000;
+        assert!(matches!(self.master.poll(at(self.now)), Some(Event::Transmit(_))));
+        self.now += 8_000;
+        self.master.sent(at(self.now));
+        self.master.receive(at(self.now + 6_000), came);
+        self.now += 100_000;
+        let event = self.master.poll(at(self.now));
+        assert!(matches!(event, Some(Event::Corrupt { .. } | Event::NoAnswer { .. })), "{event:?}");
+        self.master.attribution(at(self.now), unit(1), &Self::request()).may_be_mistaken()
+    }
+
+    fn pass(&mut self, millis: u64) {
+        self.now += 1_000 * millis;
+    }
+
+    fn stray(&mut self, frame: &[u8]) {
+        self.now += 20_000;
+        self.master.receive(at(self.now), frame);
+        self.master.poll(at(self.now + 5_000));
+        self.now += 5_000;
+    }
+
+    /// What a damaged answer is known by: three of them, and a second.
+    fn known() -> Self {
+        let mut line = Self::new();
+        assert!((0..3).all(|_| line.ask(&damaged())), "nothing is known yet");
+        line.pass(900);
+        line
+    }
+}
+
+fn damaged() -> Vec<u8> {
+    let mut bytes = words(1, &[3, 4]);
+    bytes.remove(5);
+    bytes
+}
+
+#[test]
+fn damaged_answers_that_never_come_again_are_owed_no_more() {
+    assert!(!Damaging::known().ask(&damaged()));
+    let mut early = Damaging::new();
+    assert!((0..9).all(|_| early.ask(&damaged())), "within a second they may all come again");
+    for lost in 0..9 {
+        let mut bytes = words(1, &[3, 4]);
+        bytes.remove(lost);
+        assert!(!Damaging::known().ask(&bytes), "without {lost}");
+        if lost > 3 {
+            bytes.remove(lost - 1);
+            assert!(!Damaging::known().ask(&bytes), "without {lost} and the one before");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_told_for_the_answer_leaves_it_owed() {
+    let whole = words(1, &[3, 4]);
+    let other_length = {
+        let mut bytes = words(1, &[3, 4, 5]);
+        bytes.truncate(9);
+        bytes
+    };
+    let cases: [(&str, &[u8]); 7] = [
+        ("nothing", &[]),
+        ("noise", &[0x55; 9]),
+        ("the beginning of it", &whole[..6]),
+        ("another unit's", &[&[2][..], &damaged()[1..]].concat()),
+        ("another function's", &[&[1, 4][..], &damaged()[2..]].concat()),
+        ("another length's", &other_length),
+        ("one byte too many", &[&whole[..6], &[0x55, 0x55], &whole[7..]].concat()),
+    ];
+    for (name, came) in cases {
+        assert!(Damaging::known().ask(came), "{name}");
+    }
+}
+
+/// The rest of what broke off looks like the end of an answer when it comes behind the beginning of another.
+#[test]
+fn for_three_seconds_after_something_broke_off_no_damaged_answer_is_believed_to_be_all() {
+    for (after, is_owed) in [(2_800, true), (3_300, false)] {
+        let mut line = Damaging::known();
+        line.ask(&words(1, &[3, 4])[..5]);
+        line.pass(after);
+        assert_eq!(line.ask(&damaged()), is_owed, "{after} ms");
+    }
+}
+
+#[test]
+fn a_damaged_answer_that_comes_again_says_that_the_next_may_too() {
+    let mut line = Damaging::known();
+    assert!(!line.ask(&damaged()));
+    line.stray(&words(1, &[3, 4]));
+    assert!(line.ask(&damaged()) && line.ask(&damaged()) && line.ask(&damaged()));
+    line.pass(1_000);
+    assert!(!line.ask(&damaged()));
+    line.stray(&words(1, &[3, 4, 5]));
+    assert!(!line.ask(&damaged()), "that was no answer to this");
 }
 
 /// What looks damaged before the unit usually answers may be noise.

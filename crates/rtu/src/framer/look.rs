@@ -1,8 +1,6 @@
 //! What may stand at one place of the stream: which lengths a frame beginning there can have, and whether it is worth
 //! waiting for its end.
 
-use core::ops::Range;
-
 use super::Framer;
 use crate::UnitAddress;
 use crate::crc::{crc16, update};
@@ -11,7 +9,7 @@ use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_M
 
 const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
 /// Address, function code, exception code or byte count, CRC.
-const EXCEPTION_ADU: usize = 5;
+pub(crate) const EXCEPTION_ADU: usize = 5;
 /// Address, function code, two words, CRC.
 const SHORT_ADU: usize = 8;
 /// Bytes from which on a beginning is told from noise that happens to look like one: address, function, and a byte that
@@ -67,35 +65,6 @@ impl Framer {
             }
         }
         Look::Nothing(error)
-    }
-
-    /// Whether the bytes in `range` end with the answer looked for, or a refusal, that has lost the first byte, the second, or
-    /// the number of bytes that a read has third.
-    ///
-    /// All of them are known, so that the CRC tells. Without them nothing in these bytes looks like an answer.
-    #[cold]
-    pub(super) fn lost_its_head(&self, range: &Range<usize>) -> bool {
-        let Some((unit, expected)) = self.expect else {
-            return false;
-        };
-        let answer = self.answer_len().map(|len| (len, expected.function()));
-        let refusal = (EXCEPTION_ADU, expected.function() | EXCEPTION_BIT);
-        answer.into_iter().chain([refusal]).any(|(len, function)| {
-            let start = range.end.checked_sub(len - 1).filter(|&start| start >= range.start);
-            let Some([head, body @ .., low, high]) = start.map(|start| &self.bytes[start..range.end]) else {
-                return false;
-            };
-            let received = u16::from_le_bytes([*low, *high]);
-            let known = [unit.get(), function];
-            let is_second = *head == unit.get() || *head == function;
-            let is_third = |rest| {
-                let count = u8::try_from(len - EXCEPTION_ADU).unwrap_or_default();
-                update(crc16(&[unit.get(), function, count]), rest) == received
-            };
-            (is_second && update(crc16(&known), body) == received)
-                || matches!(*body, [second, ref rest @ ..]
-                    if function == READ_HOLDING && [*head, second] == known && is_third(rest))
-        })
     }
 
     /// Whether `here` is our own request, sent back to us.
@@ -209,4 +178,25 @@ impl Framer {
         });
         own.into_iter().chain(answer).min().map_or(0, |len| len.saturating_sub(here.len()))
     }
+}
+
+/// Whether `bytes` are the answer of `unit` with this function, `len` bytes long on the wire, that has lost the first byte, the
+/// second, or the number of bytes that a read has third.
+///
+/// All of them are known, so that the CRC tells.
+pub(crate) fn lost_its_head(bytes: &[u8], unit: UnitAddress, function: u8, len: usize) -> bool {
+    let [head, body @ .., low, high] = bytes else { return false };
+    if bytes.len() + 1 != len {
+        return false;
+    }
+    let received = u16::from_le_bytes([*low, *high]);
+    let known = [unit.get(), function];
+    let is_second = *head == unit.get() || *head == function;
+    let is_third = |rest| {
+        let count = u8::try_from(len - EXCEPTION_ADU).unwrap_or_default();
+        update(crc16(&[unit.get(), function, count]), rest) == received
+    };
+    (is_second && update(crc16(&known), body) == received)
+        || matches!(*body, [second, ref rest @ ..]
+            if function == READ_HOLDING && [*head, second] == known && is_third(rest))
 }

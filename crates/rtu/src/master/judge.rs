@@ -3,7 +3,8 @@
 use core::ops::Range;
 use core::time::Duration;
 
-use super::spoilt::Why;
+use super::beside::Why;
+use super::torn::{Open, is_left_of_answer};
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError, Expected};
 use crate::event::Event;
@@ -22,15 +23,17 @@ impl Master {
     ) -> Option<Event<'_>> {
         while let Some(step) = self.framer.step(now) {
             match step {
-                Step::Skipped { range, expected: false, .. } => self.add_noise(range),
-                Step::Skipped { range, error, expected: true } => {
-                    self.beside.add(self.framer.held(range.clone()));
-                    if self.patience.is_none() {
-                        self.state = State::Idle;
-                        self.doubts.left_open(now, unit, expected, timeout);
-                        return Some(Event::Corrupt { error, bytes: self.framer.held(range) });
+                Step::Skipped { range, error, expected: is_damaged } => {
+                    if is_damaged {
+                        self.beside.spoils(Why::Damaged(error));
                     }
-                    self.spoilt.keep(Why::Damaged(error), self.framer.held(range));
+                    self.add_beside(range);
+                    if !is_damaged && self.framer.pending().is_empty() {
+                        self.beside.look_for_lost_head(unit, expected);
+                    }
+                    if self.patience.is_none() && self.beside.is_spoilt() {
+                        return Some(self.end_in_vain(now, unit, expected, timeout));
+                    }
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
                     self.tally.add_own_echo();
@@ -68,7 +71,8 @@ impl Master {
                             self.tally.add_late();
                         }
                         Err(error) if self.patience.is_some() => {
-                            self.spoilt.keep(Why::Wrong(error), self.framer.held(range));
+                            self.beside.spoils(Why::Wrong(error));
+                            self.add_beside(range);
                         }
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
@@ -96,16 +100,42 @@ impl Master {
         if now < self.listens_until(until) {
             return None;
         }
+        Some(self.end_in_vain(now, unit, expected, timeout))
+    }
+
+    /// The request ends without its answer.
+    fn end_in_vain(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Event<'_> {
         self.give_account(false);
         self.state = State::Idle;
-        self.doubts.left_open(now, unit, expected, timeout);
-        Some(self.spoilt.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() }))
+        match self.is_still_open(now, unit, expected) {
+            Open::No => self.doubts.taken(now, unit, expected, false),
+            Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
+            Open::Long => self.doubts.left_open(now, unit, expected, timeout),
+        }
+        self.beside.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() })
+    }
+
+    /// How long the answer may still come: what came in its place may have been the answer, damaged.
+    fn is_still_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected) -> Open {
+        let is_told = |damaged: &[u8]| is_left_of_answer(unit, expected, self.request.as_bytes(), damaged);
+        if !self.beside.damaged().is_some_and(is_told) {
+            if !self.beside.noise(true).is_empty() || !self.framer.pending().is_empty() {
+                self.torn.broke_off(now);
+            }
+            return Open::Long;
+        }
+        // Where nothing was waited for, the right one may follow; a stranger's may have been damaged; and a write or an echo
+        // may have come back from the adapter.
+        if !expected.is_read() || self.patience.is_none() || self.doubts.first_contact_ends(now, unit).is_some() {
+            return Open::Long;
+        }
+        self.torn.came(now, unit, expected)
     }
 
     /// Until when the answer is waited for that has to be there by `until`: no longer than something may still follow what
     /// came in its place.
     pub(super) fn listens_until(&self, until: Instant) -> Instant {
-        if !self.spoilt.is_some() {
+        if !self.beside.is_spoilt() {
             return until;
         }
         self.framer.gives_up().map_or(until, |moment| moment.min(until))
@@ -131,8 +161,9 @@ impl Master {
 
     /// A frame came that answers nothing in flight.
     fn see(&mut self, now: Instant, range: Range<usize>) {
-        let at_once = self.at_once(range.len());
-        self.doubts.seen(now, &self.framer.frame(range), at_once);
+        let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
+        self.torn.see(&frame);
+        self.doubts.seen(now, &frame, at_once);
     }
 
     /// A frame came that answers what is in flight.
@@ -148,16 +179,16 @@ impl Master {
 
     /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
     fn give_account(&mut self, right: bool) {
-        if right && self.spoilt.is_some() {
-            self.tally.add_noise(self.spoilt.bytes());
+        self.tally.add_noise(self.beside.noise(right));
+        if right && self.beside.is_spoilt() {
+            self.torn.forget();
         }
-        self.tally.add_own_remnant(self.beside.may_be_left_of(self.request.as_bytes()));
+        self.tally.add_own_remnant(self.beside.holds_remnant_of(self.request.as_bytes()));
     }
 
-    fn add_noise(&mut self, range: Range<usize>) {
-        let bytes = self.framer.held(range);
-        self.tally.add_noise(bytes);
-        self.beside.add(bytes);
+    fn add_beside(&mut self, range: Range<usize>) {
+        let rest = self.beside.add(self.framer.held(range));
+        self.tally.add_noise(rest);
     }
 
     /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.

@@ -5,37 +5,18 @@
 //! or four and more in their order. 00H and FFH count only beside others: they are in many requests, and they are what an
 //! idle line gives that nothing pulls to its rest.
 
-/// Bytes that are remembered: an adapter sends back before any unit answers.
+/// Bytes that are looked at.
 const CAPACITY: usize = 64;
 /// So many in a row are no chance: noise of 30 bytes has them once in a hundred thousand times.
 const IN_A_ROW: usize = 3;
 /// Nor are so many in their order, with any others between.
 const IN_ORDER: u8 = 4;
 
-/// The first bytes that came beside the answer to one request.
-#[derive(Debug, Clone)]
-pub(super) struct Beside {
-    bytes: [u8; CAPACITY],
-    len: usize,
-}
-
-impl Beside {
-    pub(super) const NOTHING: Self = Self { bytes: [0; CAPACITY], len: 0 };
-
-    pub(super) const fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    pub(super) fn add(&mut self, bytes: &[u8]) {
-        let count = bytes.len().min(CAPACITY - self.len);
-        self.bytes[self.len..self.len + count].copy_from_slice(&bytes[..count]);
-        self.len += count;
-    }
-
-    /// Whether `request` may have come back, and lost something on its way.
-    pub(super) fn may_be_left_of(&self, request: &[u8]) -> bool {
-        self.len >= IN_A_ROW && is_left_of(&self.bytes[..self.len], &request[..request.len().min(CAPACITY)])
-    }
+/// Whether `request` may have come back in what `came` beside its answer, and lost something on its way.
+pub(super) fn may_be_left_of(came: &[u8], request: &[u8]) -> bool {
+    // An adapter sends back before any unit answers.
+    let came = &came[..came.len().min(CAPACITY)];
+    came.len() >= IN_A_ROW && is_left_of(came, &request[..request.len().min(CAPACITY)])
 }
 
 #[cold]
@@ -74,9 +55,7 @@ mod tests {
     const READ_OF_0: [u8; 8] = [0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x0A];
 
     fn looks_own(request: &[u8], came: &[u8]) -> bool {
-        let mut beside = Beside::NOTHING;
-        beside.add(came);
-        beside.may_be_left_of(request)
+        may_be_left_of(came, request)
     }
 
     #[test]

@@ -143,26 +143,45 @@ fn an_answer_that_lost_a_character_is_given_up_early() {
     }
 }
 
+/// Reads `rounds` times, each time words that nobody has read before, and counts the right answers; one that is not right must
+/// be none.
+fn right_or_none(rig: &Rig, rounds: u16, case: &str) -> usize {
+    let addresses = (0..rounds).map(|round| 0x100 + 2 * round);
+    let answered = addresses.filter_map(|address| Some((address, rig.read(address, 2).ok()?)));
+    answered.inspect(|(address, words)| assert_eq!(words, &[*address, *address + 1], "{case}")).count()
+}
+
 /// What is given up is not the answer any more, though it comes: neither to this question nor to the next.
 #[test]
 fn what_an_answer_lacked_and_comes_late_is_never_delivered() {
-    for pause in (20..480).step_by(20) {
+    for (lump, pause) in (1..9).flat_map(|lump| (20..480).step_by(11).map(move |pause| (lump, pause))) {
         let rig = Rig::new(move |number, request| {
             let whole = right(request);
             if number < 12 {
                 return at_once(&whole);
             }
-            let (first, second) = whole.split_at(4);
+            let (first, second) = whole.split_at(lump.min(whole.len() - 1));
             [after(Duration::ZERO, first), after(millis(pause), second)].concat()
         });
-        for address in 0..12 {
-            assert_eq!(rig.read(address, 2).unwrap(), [address, address + 1]);
-        }
-        for address in (0x100..0x180).step_by(2) {
-            if let Ok(words) = rig.read(address, 2) {
-                assert_eq!(words, [address, address + 1], "pauses of {pause} ms");
+        assert_eq!(right_or_none(&rig, 12, "undisturbed"), 12);
+        right_or_none(&rig, 64, &format!("pauses of {pause} ms behind {lump}"));
+    }
+}
+
+/// A damaged answer is the answer, unless the line brings it again: whole, and long after.
+#[test]
+fn what_comes_whole_long_after_it_came_damaged_is_never_the_answer_to_another_question() {
+    for (each, behind) in (1..4).flat_map(|each| (10..480).step_by(7).map(move |behind| (each, behind))) {
+        let rig = Rig::new(move |number, request| {
+            let whole = right(request);
+            if number < 12 || number % each > 0 {
+                return at_once(&whole);
             }
-        }
+            let end = FORMAT.chars(u32::try_from(whole.len()).unwrap());
+            [at_once(&without(&whole, 5)), after(end + millis(behind), &whole)].concat()
+        });
+        assert_eq!(right_or_none(&rig, 12, "undisturbed"), 12);
+        right_or_none(&rig, 64, &format!("each {each}. again after {behind} ms"));
     }
 }
 
