@@ -2,7 +2,8 @@
 
 `check_model.py` builds each broken copy of `crates/rtu` under the target folder, searches the line on which the rule
 matters, and prints the shortest run that shows what the rule is for. A rule that can be broken unnoticed is a finding:
-the exit code is 1 then, or where the text that a break replaces is no longer there. `check_model.py NAME …` takes those
+the exit code is 1 then, or where the text that a break replaces is no longer there. One rule waits for more than is needed
+where nothing comes twice; that everything holds there without it is searched too. `check_model.py NAME …` takes those
 whose names hold one of these words.
 """
 
@@ -24,6 +25,7 @@ DOUBT = "crates/rtu/src/doubt.rs"
 JUDGE = "crates/rtu/src/master/judge.rs"
 MASTER = "crates/rtu/src/master.rs"
 AGREEMENT = "crates/rtu/src/agreement.rs"
+TORN = "crates/rtu/src/master/torn.rs"
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,14 @@ class Break:
     old: str
     new: str
     search: str
-    # What is replaced too, so that the rule matters within the search's bounds.
-    beside: tuple[str, str] = ("", "")
+    # What is replaced too, so that the rule matters within the search's bounds: where, what, and by what.
+    beside: tuple[str, str, str] | None = None
+    # Whether it breaks nothing: the rule only holds back what is assumed here, and everything still holds.
+    holds: bool = False
 
+
+# A damaged answer is believed to be all, from the first on.
+BELIEVED = ("self.latest[0].is_some() && now >= *self.enough.get_or_insert(now) + AGAIN", "true")
 
 BREAKS = [
     # --- first contact
@@ -84,15 +91,15 @@ BREAKS = [
     Break(
         "a time-out leaves the request open",
         JUDGE,
-        "self.doubts.left_open(now, unit, expected, timeout);\n        Some(self.spoilt",
-        "Some(self.spoilt",
+        "Open::Long => self",
+        "Open::Long if !self.beside.is_spoilt() => {}\n            Open::Long => self",
         "in-order",
     ),
     Break(
         "a damaged answer leaves the request open",
         JUDGE,
-        "self.doubts.left_open(now, unit, expected, timeout);\n                        return Some(Event::Corrupt",
-        "return Some(Event::Corrupt",
+        "Open::Long => self",
+        "Open::Long if self.beside.is_spoilt() => {}\n            Open::Long => self",
         "in-order",
     ),
     Break(
@@ -105,9 +112,8 @@ BREAKS = [
     Break(
         "a request given up is left open",
         MASTER,
-        "State::Waiting { unit, expected, timeout, .. } => {\n"
-        "                self.doubts.left_open(now, unit, expected, timeout);",
-        "State::Waiting { .. } => {",
+        "self.doubts.left_open(now, unit, expected, timeout);\n                true",
+        "let _ = (unit, expected, timeout);\n                true",
         "in-order --aborts 1",
     ),
     Break(
@@ -309,7 +315,7 @@ BREAKS = [
         "self.forgotten.insert(oldest.unit);",
         "let _ = oldest.unit;",
         "overtaking --requests 4 --faults 0",
-        beside=("const KEPT: usize = 32;", "const KEPT: usize = 1;"),
+        beside=(DOUBT, "const KEPT: usize = 32;", "const KEPT: usize = 1;"),
     ),
     # --- the master
     Break(
@@ -328,6 +334,57 @@ BREAKS = [
         "(self.echo_due || !expected.may_repeat_request())",
         "self.echo_due",
         "adapter-echoes",
+    ),
+    # --- damaged answers
+    Break(
+        "what came damaged may come again",
+        JUDGE,
+        "Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),",
+        "Open::For(_) => {}",
+        "damaged-again",
+    ),
+    Break(
+        "for a second",
+        TORN,
+        "const AGAIN: Duration = Duration::from_secs(1);",
+        "const AGAIN: Duration = Duration::from_millis(500);",
+        "damaged-again",
+    ),
+    Break(
+        "one that did not is not enough",
+        TORN,
+        "const ALONE: usize = 3;",
+        "const ALONE: usize = 1;",
+        "damaged-again",
+    ),
+    Break(
+        "a second has to pass",
+        TORN,
+        "now >= *self.enough.get_or_insert(now) + AGAIN",
+        "now >= *self.enough.get_or_insert(now)",
+        "damaged-again --faults 3 --requests 4",
+    ),
+    Break(
+        "a damaged answer may have been another's",
+        JUDGE,
+        "Open::No => self.doubts.taken(now, unit, expected, timeout, false),",
+        "Open::No => {}",
+        "damaged-once --lingers 1",
+        beside=(TORN, *BELIEVED),
+    ),
+    Break(
+        "where none comes again, the first damaged answer could be believed",
+        TORN,
+        *BELIEVED,
+        "damaged-once --faults 3",
+        holds=True,
+    ),
+    Break(
+        "what is taken in its place has its own time",
+        DOUBT,
+        "open.window = open.window.max(window(timeout));",
+        "",
+        "damaged-again",
     ),
     # --- the agreement
     Break(
@@ -373,20 +430,19 @@ def build(place: Path) -> Path:
 
 def refutation(place: Path, broken: Break) -> str | None:
     """What refutes *broken*; None where nothing does."""
-    path = place / broken.file
-    text = path.read_text(encoding="utf-8")
-    for old in filter(None, (broken.old, broken.beside[0])):
-        if text.count(old) != 1:
-            raise SystemExit(f"check_model: out of date: {broken.file} holds {text.count(old)} times {old!r}")
-    patched = text.replace(broken.old, broken.new)
-    if broken.beside[0]:
-        patched = patched.replace(*broken.beside)
-    path.write_text(patched, encoding="utf-8")
+    changes = [(broken.file, broken.old, broken.new), *filter(None, [broken.beside])]
+    whole = {file: (place / file).read_text(encoding="utf-8") for file, _, _ in changes}
     try:
+        for file, old, new in changes:
+            text = (place / file).read_text(encoding="utf-8")
+            if text.count(old) != 1:
+                raise SystemExit(f"check_model: out of date: {file} holds {text.count(old)} times {old!r}")
+            (place / file).write_text(text.replace(old, new), encoding="utf-8")
         search = [str(build(place)), *broken.search.split()]
         done = subprocess.run(search, capture_output=True, text=True, check=False)
     finally:
-        path.write_text(text, encoding="utf-8")
+        for file, text in whole.items():
+            (place / file).write_text(text, encoding="utf-8")
     if done.returncode not in (0, 1):
         raise SystemExit(f"check_model: {' '.join(search)} failed:\n{done.stderr}")
     shown = [line for line in done.stdout.splitlines() if not line.startswith(("line ", "all "))]
@@ -405,14 +461,17 @@ def main() -> int:
     chosen = [broken for broken in BREAKS if not names or any(name in broken.name for name in names)]
     for broken in chosen:
         found = refutation(place, broken)
-        print(f'\n{"refuted" if found else "UNNOTICED"}: not "{broken.name}" ({broken.search})', flush=True)
+        if broken.holds:
+            print(f'\n{"REFUTED" if found else "holds"}: "{broken.name}" ({broken.search})', flush=True)
+        else:
+            print(f'\n{"refuted" if found else "UNNOTICED"}: not "{broken.name}" ({broken.search})', flush=True)
         if found:
             print(found, flush=True)
-        else:
+        if bool(found) == broken.holds:
             unnoticed.append(broken.name)
-    print(f"\n{len(chosen) - len(unnoticed)} of {len(chosen)} breaks refuted in {time.monotonic() - began:.0f} s")
+    print(f"\n{len(chosen) - len(unnoticed)} of {len(chosen)} as they should be, in {time.monotonic() - began:.0f} s")
     for name in unnoticed:
-        print(f"unnoticed: {name}", file=sys.stderr)
+        print(f"not as it should be: {name}", file=sys.stderr)
     return 1 if unnoticed else 0
 
 

@@ -146,7 +146,7 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.enter(now, unit, expected, OVERTAKING.max(timeout.saturating_mul(OVERTAKING_TIMEOUTS)));
+        self.enter(now, unit, expected, window(timeout));
         self.open.insert(unit);
     }
 
@@ -288,8 +288,15 @@ impl Doubts {
         }
     }
 
-    /// `unit` was asked for `expected`, and an answer or a refusal was taken for its own.
-    pub(crate) fn taken(&mut self, now: Instant, unit: UnitAddress, expected: Expected, refused: bool) {
+    /// `unit` was asked for `expected` with a time-out of `timeout`, and an answer or a refusal was taken for its own.
+    pub(crate) fn taken(
+        &mut self,
+        now: Instant,
+        unit: UnitAddress,
+        expected: Expected,
+        timeout: Duration,
+        refused: bool,
+    ) {
         if !self.listed.contains(unit) {
             return;
         }
@@ -298,6 +305,7 @@ impl Doubts {
             let rival =
                 open.expected.could_pass_for(expected) || (refused && open.expected.function() == expected.function());
             if open.unit == unit && rival && !open.is_past(now) {
+                open.window = open.window.max(window(timeout));
                 open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));
                 if open.expected != expected {
                     displaced = displaced.max(Some(open.window));
@@ -380,4 +388,9 @@ impl Doubts {
             self.listed.remove(unit);
         }
     }
+}
+
+/// How long an answer may be overtaken that was waited for for `timeout`.
+fn window(timeout: Duration) -> Duration {
+    OVERTAKING.max(timeout.saturating_mul(OVERTAKING_TIMEOUTS))
 }

@@ -110,6 +110,8 @@ pub struct Coming {
     pub content: Content,
     /// When its request ended without it.
     pub given_up: Option<Instant>,
+    /// When it arrived damaged, if it has.
+    pub damaged: Option<Instant>,
 }
 
 impl Coming {

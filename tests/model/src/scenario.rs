@@ -26,6 +26,17 @@ pub enum Adapter {
     Echoes,
 }
 
+/// What may become of an answer that arrives damaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Damage {
+    /// It does not come again, and the master does not wait for it.
+    Final,
+    /// It does not come again. The master learns from it, and waits no time for it.
+    Learned,
+    /// It may come again within a second. The master learns from it, and waits no time for it.
+    Again,
+}
+
 /// How often each thing may happen: with these used up a run is over. The search goes through every order of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Budget {
@@ -118,6 +129,8 @@ pub struct Scenario {
     pub replaced_by: Option<Echoing>,
     /// Whether the program asks only what the master says can be told.
     pub heeds: bool,
+    /// What may become of an answer that arrives damaged.
+    pub damage: Damage,
     /// What the program asks.
     pub kinds: &'static [Kind],
     /// How long an answer is waited for.
@@ -148,6 +161,9 @@ pub const PATIENCE: Duration = Duration::from_secs(3);
 /// How long after the last request was given up a doubt may last, whatever is answered meanwhile.
 pub const LONGEST: Duration = Duration::from_secs(9);
 
+/// How long after it arrived damaged an answer may come again.
+pub const AGAIN: Duration = Duration::from_secs(1);
+
 /// A unit that returned echoes and was then silent on so many is one that may never have returned any.
 pub const MUTE: u8 = 5;
 
@@ -173,6 +189,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: READS,
         timeout: HALF_A_SECOND,
         small: Budget { faults: 1, lingers: 1, ..Budget::requests(3) },
@@ -188,6 +205,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget { refusals: 1, ..Budget::requests(3) },
@@ -203,6 +221,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: SOMEBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget { openings: 1, ..Budget::requests(2) },
@@ -218,6 +237,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: SOMEBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: READS,
         timeout: HALF_A_SECOND,
         small: Budget { lingers: 1, ..Budget::requests(3) },
@@ -233,6 +253,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: SOMEBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: READS,
         timeout: HALF_A_SECOND,
         small: Budget { lingers: 1, ..Budget::requests(3) },
@@ -248,6 +269,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: READS,
         timeout: HALF_A_SECOND,
         small: Budget::requests(4),
@@ -263,6 +285,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget { refusals: 1, ..Budget::requests(3) },
@@ -278,6 +301,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: SOMEBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: READS,
         timeout: HALF_A_SECOND,
         small: Budget { faults: 1, ..Budget::requests(3) },
@@ -293,6 +317,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget::requests(3),
@@ -308,6 +333,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget { faults: 1, ..Budget::requests(3) },
@@ -323,6 +349,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: None,
         heeds: true,
+        damage: Damage::Final,
         kinds: COMMANDS,
         timeout: HALF_A_SECOND,
         small: Budget { faults: 1, ..Budget::requests(3) },
@@ -338,10 +365,43 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: NOBODY,
         replaced_by: Some(Echoing::Silent),
         heeds: true,
+        damage: Damage::Final,
         kinds: &[Kind::Echo(0)],
         timeout: HALF_A_SECOND,
         small: Budget { restarts: 1, ..Budget::requests(6) },
         deep: Budget { restarts: 1, ..Budget::requests(8) },
         sights: &[Sight::EndedByEcho],
+    },
+    Scenario {
+        name: "damaged-once",
+        about: "answers overtake each other, and one that is damaged never comes again",
+        units: &[Echoing::Returns],
+        overtaking: true,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        damage: Damage::Learned,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 2, ..Budget::requests(3) },
+        deep: Budget { faults: 3, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late, Sight::EndedByEcho],
+    },
+    Scenario {
+        name: "damaged-again",
+        about: "the same, and what is damaged may come again within a second",
+        units: &[Echoing::Returns],
+        overtaking: true,
+        adapter: Adapter::Known,
+        strangers: NOBODY,
+        replaced_by: None,
+        heeds: true,
+        damage: Damage::Again,
+        kinds: READS,
+        timeout: HALF_A_SECOND,
+        small: Budget { faults: 2, ..Budget::requests(3) },
+        deep: Budget { faults: 2, refusals: 1, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late],
     },
 ];

@@ -11,7 +11,7 @@ use crate::ends;
 use crate::frames::{Coming, Content, Kind};
 use crate::judge::{Source, Step};
 use crate::program::Question;
-use crate::scenario::{Budget, Scenario, Sight};
+use crate::scenario::{Budget, Damage, Scenario, Sight};
 use crate::trace;
 use crate::world::{State, TICK, Told, Wrong, address};
 
@@ -232,7 +232,12 @@ impl Search {
                 match how {
                     How::Whole => state.receive(step, &frame, Source::Unit(came)),
                     How::Twice => state.receive(step, &frame.repeat(2), Source::Unit(came)),
-                    How::Damaged => state.receive(step, &damaged(&frame), Source::Nowhere),
+                    How::Damaged => {
+                        state.receive(step, &damaged(&frame), Source::Nowhere);
+                        if self.scenario.damage == Damage::Again {
+                            state.units[unit].coming.push(Coming { damaged: Some(state.now), ..came });
+                        }
+                    }
                     How::Cut => state.receive(step, &frame[..frame.len() - 2], Source::Nowhere),
                 }
                 step.sights.extend((was_doubted && !state.is_doubted(unit)).then_some(Sight::EndedBySight));
@@ -310,7 +315,7 @@ impl Model for Search {
                 if faulty {
                     actions.push(Action::Arrive(unit, place, How::Twice));
                 }
-                if faulty && in_flight {
+                if faulty && in_flight && answers[place].damaged.is_none() {
                     actions.push(Action::Arrive(unit, place, How::Damaged));
                     actions.push(Action::Arrive(unit, place, How::Cut));
                 }

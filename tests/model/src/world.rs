@@ -4,12 +4,12 @@
 
 use std::hash::{Hash, Hasher};
 
-use drivebus_rtu::{Duration, Instant, Master, UnitAddress};
+use drivebus_rtu::{Duration, Instant, Master, Patience, UnitAddress};
 
 use crate::fingerprint::{self, offset};
 use crate::frames::{Asker, Coming, Content, Kind};
 use crate::program::{Knowledge, Program};
-use crate::scenario::{Adapter, Budget, Echoing, LONGEST, MUTE, PATIENCE, STRANGERS_COME_FOR, Scenario};
+use crate::scenario::{AGAIN, Adapter, Budget, Damage, Echoing, LONGEST, MUTE, PATIENCE, STRANGERS_COME_FOR, Scenario};
 
 /// When the search begins: far from the clock's own start, which would be a special moment.
 pub const START: Instant = Instant::from_nanos(1_000_000_000_000);
@@ -104,7 +104,10 @@ impl State {
             gave_up: None,
             touched: None,
         };
-        let master = Master::with_silence(Duration::ZERO);
+        let mut master = Master::with_silence(Duration::ZERO);
+        if scenario.damage != Damage::Final {
+            master.be_patient(Some(Patience { pause: Duration::ZERO, usual: Duration::ZERO }));
+        }
         let mut state = Self {
             now: START,
             master: Box::new(master),
@@ -131,7 +134,8 @@ impl State {
         self.program.knowledge = Knowledge::at_opening(scenario.adapter);
         self.master.strip_echo(false);
         self.opened = Some(self.now);
-        let coming = strangers.iter().map(|&content| Coming { asker: Asker::Stranger, content, given_up: None });
+        let coming =
+            strangers.iter().map(|&content| Coming { asker: Asker::Stranger, content, given_up: None, damaged: None });
         self.units[0].coming.extend(coming);
     }
 
@@ -185,10 +189,14 @@ impl State {
 
     /// Until when `coming` can arrive; `None`: for as long as it takes.
     pub fn comes_until(&self, scenario: &Scenario, unit: usize, coming: &Coming) -> Option<Instant> {
-        match coming.asker {
+        let again = coming.damaged.map(|damaged| damaged + AGAIN);
+        let once = match coming.asker {
             Asker::Stranger => self.opened.map(|opened| opened + STRANGERS_COME_FOR),
-            Asker::Request(_) => Some(coming.given_up? + scenario.may_come_for(self.units[unit].echoed)?),
-        }
+            Asker::Request(_) => {
+                coming.given_up.and_then(|given_up| Some(given_up + scenario.may_come_for(self.units[unit].echoed)?))
+            }
+        };
+        [once, again].into_iter().flatten().min()
     }
 
     /// The next moment at which something is over, by the assumptions or by the rules.
@@ -224,7 +232,7 @@ impl State {
             (Kind::Read(count), _) => Content::Words(count, self.changed),
             (Kind::Run | Kind::Stop, _) => Content::Done(kind),
         };
-        unit.coming.push(Coming { asker: Asker::Request(self.requests), content, given_up: None });
+        unit.coming.push(Coming { asker: Asker::Request(self.requests), content, given_up: None, damaged: None });
     }
 
     /// Takes the answer at `place` of what comes of unit `index` off the line, and with it what cannot come any more.
@@ -242,11 +250,12 @@ impl State {
     }
 
     /// All of `coming` that can make a difference from now on.
-    pub fn signature(&self, coming: &Coming) -> (Content, Option<i64>, bool, bool, bool) {
+    pub fn signature(&self, coming: &Coming) -> (Content, Option<i64>, Option<i64>, bool, bool, bool) {
         let given_up = coming.given_up.map(|at| offset(self.now, at));
+        let damaged = coming.damaged.map(|at| offset(self.now, at));
         let in_flight = self.program.in_flight().is_some_and(|(.., number)| coming.is_since(number));
         let current = self.program.first().is_some_and(|first| coming.is_since(first));
-        (coming.content, given_up, coming.asker == Asker::Stranger, in_flight, current)
+        (coming.content, given_up, damaged, coming.asker == Asker::Stranger, in_flight, current)
     }
 
     /// Whether the adapter of the line sends requests back.

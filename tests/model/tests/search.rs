@@ -37,6 +37,8 @@ lines! {
     adapter_that_echoes: "adapter-echoes",
     adapter_that_nobody_knows: "adapter-unknown",
     unit_replaced: "replaced",
+    damaged_once: "damaged-once",
+    damaged_again: "damaged-again",
 }
 
 #[test]

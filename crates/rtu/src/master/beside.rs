@@ -1,6 +1,8 @@
 //! What came beside the answer that is waited for, or in its place: noise, and a damaged or wrong answer, which is kept while
 //! the right one may still follow.
 
+use core::fmt;
+
 use crate::UnitAddress;
 use crate::answer::{AnswerError, Expected};
 use crate::event::Event;
@@ -21,7 +23,7 @@ pub(super) enum Why {
 }
 
 /// All that came since the request, in its order.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Beside {
     bytes: [u8; CAPACITY],
     len: usize,
@@ -98,5 +100,11 @@ impl Beside {
     pub(super) fn holds_remnant_of(&self, request: &[u8]) -> bool {
         let is_wrong = matches!(self.spoilt, Some((_, Why::Wrong(_))));
         may_be_left_of(self.noise(!is_wrong), request)
+    }
+}
+
+impl fmt::Debug for Beside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Beside").field("bytes", &self.noise(true)).field("spoilt", &self.spoilt).finish_non_exhaustive()
     }
 }

@@ -89,7 +89,7 @@ impl Master {
                                 (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
                                 (true, true, true) => self.doubts.refused_echo(now, unit),
                                 (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
-                                (true, refused, _) => self.doubts.taken(now, unit, expected, refused),
+                                (true, refused, _) => self.doubts.taken(now, unit, expected, timeout, refused),
                             }
                             return Some(self.tell(expected, range));
                         }
@@ -108,7 +108,7 @@ impl Master {
         self.give_account(false);
         self.state = State::Idle;
         match self.is_still_open(now, unit, expected) {
-            Open::No => self.doubts.taken(now, unit, expected, false),
+            Open::No => self.doubts.taken(now, unit, expected, timeout, false),
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
             Open::Long => self.doubts.left_open(now, unit, expected, timeout),
         }
