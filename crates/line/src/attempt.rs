@@ -195,6 +195,9 @@ impl<'b> Call<'b, '_> {
     fn go_on_hearing(&self, course: &mut Course, owner: &Owner, attribution: Attribution) -> bool {
         // Whatever else is repeated would be done twice.
         let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
+        if course.hearing.is_none() && attribution == Attribution::Certain && !twice {
+            return false;
+        }
         let asked = self.unit.map(|unit| owner.asked(unit));
         if course.hearing.as_ref().is_none_or(|hearing| hearing.known != asked) {
             let agreement = Agreement::new(attribution, 1 + u8::from(twice));

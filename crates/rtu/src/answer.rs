@@ -344,6 +344,18 @@ impl Expected {
         self.judge(frame.pdu())
     }
 
+    /// `pdu`, which was [judged](Self::judge) to be the answer or the refusal of it.
+    ///
+    /// # Errors
+    ///
+    /// [`AnswerError`]: it is neither.
+    pub(crate) fn parse(self, pdu: &[u8]) -> Result<Answer<'_>, AnswerError> {
+        match (self.0, pdu) {
+            (Kind::Custom { .. }, [function, ..]) if function & EXCEPTION_BIT == 0 => Ok(Answer::Custom { pdu }),
+            _ => Answer::parse(pdu),
+        }
+    }
+
     /// `pdu` as the answer that was expected, or as the refusal of it. Of a custom request more is known than this:
     /// [`Request::judge`].
     ///

@@ -39,6 +39,10 @@ impl Beside {
         self.spoilt = None;
     }
 
+    pub(super) const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     /// Adds `bytes`, and returns what there is no room for.
     pub(super) fn add<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let (kept, rest) = bytes.split_at(bytes.len().min(CAPACITY - self.len));

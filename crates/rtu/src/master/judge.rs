@@ -76,7 +76,8 @@ impl Master {
                         }
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
-                            let right = outcome.is_ok();
+                            let wrong = outcome.err();
+                            let right = wrong.is_none();
                             self.give_account(right);
                             self.state = State::Idle;
                             self.hear(now, range.clone());
@@ -91,7 +92,7 @@ impl Master {
                                 (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
                                 (true, refused, _) => self.doubts.taken(now, unit, expected, timeout, refused),
                             }
-                            return Some(self.tell(expected, range));
+                            return Some(self.tell(expected, range, wrong));
                         }
                     }
                 }
@@ -141,11 +142,11 @@ impl Master {
         self.framer.gives_up().map_or(until, |moment| moment.min(until))
     }
 
-    /// The frame that ends the request.
-    fn tell(&self, expected: Expected, range: Range<usize>) -> Event<'_> {
+    /// The frame that ends the request, and what is wrong with it.
+    fn tell(&self, expected: Expected, range: Range<usize>, wrong: Option<AnswerError>) -> Event<'_> {
         let frame = self.framer.frame(range);
-        // Judged again, because the first verdict could not be kept beside the change of state.
-        match expected.judge(frame.pdu()).and_then(|answer| self.check(expected, answer)) {
+        // Parsed again, because the answer could not be kept beside the change of state.
+        match wrong.map_or_else(|| expected.parse(frame.pdu()), Err) {
             Ok(answer) => Event::Answer(answer),
             Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
         }
@@ -178,7 +179,15 @@ impl Master {
     }
 
     /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
+    #[inline]
     fn give_account(&mut self, right: bool) {
+        if !self.beside.is_empty() {
+            self.account_for_it(right);
+        }
+    }
+
+    #[cold]
+    fn account_for_it(&mut self, right: bool) {
         self.tally.add_noise(self.beside.noise(right));
         if right && self.beside.is_spoilt() {
             self.torn.forget();
