@@ -252,9 +252,14 @@ impl State {
             self.wrong = truth.err();
             step.sights.push(Sight::Stopped);
         } else {
-            self.master.still_owed(self.now, address(look.unit), &Kind::Stop.request(), step.scenario.timeout);
-            self.left_open(look.unit, Kind::Stop);
+            self.stop_is_still_owed(step.scenario, look.unit);
         }
+    }
+
+    /// Nobody knows whether `unit` confirmed its stop, or the adapter did (`Owner::unless_echoed`).
+    pub(crate) fn stop_is_still_owed(&mut self, scenario: &Scenario, unit: usize) {
+        self.master.still_owed(self.now, address(unit), &Kind::Stop.request(), scenario.timeout);
+        self.left_open(unit, Kind::Stop);
     }
 
     /// Whether unit `index` is in quarantine.

@@ -121,6 +121,20 @@ impl Program {
         self.call().map(|call| call.first)
     }
 
+    /// Whether a stop was confirmed, and it has to be seen first whether the adapter did it.
+    pub(crate) fn must_look(&self) -> bool {
+        matches!(self.standing, Standing::MustLook(..))
+    }
+
+    /// The unit whose stop was confirmed, where it is not known yet whether the adapter did it.
+    pub(crate) fn stop_to_look_for(&self) -> Option<usize> {
+        match &self.standing {
+            Standing::MustLook(call, _) => Some(call.unit),
+            Standing::InFlight(look) if look.stop_before.is_some() => Some(look.unit),
+            _ => None,
+        }
+    }
+
     /// Whatever was asked is not waited for any more.
     pub(crate) fn forget_call(&mut self) {
         self.standing = Standing::Free;

@@ -153,7 +153,7 @@ impl Search {
         }
         if heard == Heard::Broken {
             state.master.abort(now);
-            state.give_up_what_is_asked();
+            state.give_up_what_is_asked(&self.scenario);
             if State::is_sent_back(&self.scenario) {
                 state.receive(step, &frame, Source::Adapter);
             }
@@ -255,7 +255,7 @@ impl Search {
             Action::Abort => {
                 state.left.aborts -= 1;
                 state.master.abort(state.now);
-                state.give_up_what_is_asked();
+                state.give_up_what_is_asked(&self.scenario);
             }
             Action::Wait(until) => {
                 let doubted: Vec<_> = (0..state.units.len()).map(|unit| state.is_doubted(unit)).collect();
@@ -342,7 +342,8 @@ impl Model for Search {
         }
         if state.left.requests > 0 {
             self.asks(state, actions);
-            if let Some(end) = state.next_end(&self.scenario) {
+            // The look after a stop follows at once, in the same turn.
+            if let Some(end) = state.next_end(&self.scenario).filter(|_| !state.program.must_look()) {
                 actions.push(Action::Wait(end));
                 let before = Instant::from_nanos(end.as_nanos() - u64::try_from(TICK.as_nanos()).unwrap_or_default());
                 if before > state.now {

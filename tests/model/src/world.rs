@@ -129,7 +129,7 @@ impl State {
 
     /// The port is opened; `strangers` is what another program's last questions to unit 1 are answered with.
     pub fn open(&mut self, scenario: &Scenario, strangers: &[Content]) {
-        self.give_up_what_is_asked();
+        self.give_up_what_is_asked(scenario);
         self.master.opened(self.now);
         self.program.knowledge = Knowledge::at_opening(scenario.adapter);
         self.master.strip_echo(false);
@@ -140,7 +140,10 @@ impl State {
     }
 
     /// The program waits for nothing any more; a request in flight has ended without its answer.
-    pub fn give_up_what_is_asked(&mut self) {
+    pub fn give_up_what_is_asked(&mut self, scenario: &Scenario) {
+        if let Some(unit) = self.program.stop_to_look_for() {
+            self.stop_is_still_owed(scenario, unit);
+        }
         if let Some((unit, kind, number)) = self.program.in_flight() {
             self.ended(number);
             self.left_open(unit, kind);
