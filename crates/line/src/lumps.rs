@@ -24,8 +24,8 @@ const REMEMBERED: u32 = 256;
 /// So many times a pause is waited.
 const MARGIN: u32 = 2;
 
-/// So many answers have to break off for each that is given up before it goes on.
-const WORTH: u32 = 4;
+/// So many answers have to break off for each that is given up before it goes on: that one may leave three seconds of doubt.
+const WORTH: u32 = 64;
 
 /// Pauses are told apart in so many steps, each twice the one before.
 const STEPS: usize = 8;
