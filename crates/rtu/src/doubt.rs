@@ -362,9 +362,11 @@ impl Doubts {
             && asked.is_none_or(|asked| now >= asked + PATIENCE)
     }
 
-    /// Whether of what `unit` was asked something may still come that is not in the ledger.
+    /// Whether of what `unit` was asked something may still come that is not in the ledger. Where only an echo ends its
+    /// quarantine, that is until then.
     fn has_forgotten(&self, now: Instant, unit: UnitAddress) -> bool {
-        self.forgotten.contains(unit) && now < self.forgotten_until
+        let is_left = now < self.forgotten_until || (self.echoers.contains(unit) && self.open.contains(unit));
+        is_left && self.forgotten.contains(unit)
     }
 
     /// What may still come of `unit`, in order or not. Echoes aside: they can be mistaken for nothing but echoes.
