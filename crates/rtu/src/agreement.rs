@@ -42,9 +42,8 @@ impl Agreement {
         self.words <= 1 && self.refusal <= 1
     }
 
-    /// The longest sequence of answers after which a unit whose words do not change must have been agreed with.
-    ///
-    /// Late answers interrupt it once each at most.
+    /// The longest sequence of answers after which a unit whose words do not change must have been agreed with, where another
+    /// answer interrupts it once.
     pub const fn longest(&self) -> u8 {
         let times = if self.words > self.refusal { self.words } else { self.refusal };
         times.saturating_mul(2)

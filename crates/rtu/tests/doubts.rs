@@ -1,9 +1,9 @@
 //! What is left open, and how sure the answer to the next request can be, until no open answer can overtake any more.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
+mod asker;
 
-use common::asker::*;
+use asker::*;
 use drivebus_rtu::*;
 
 const SECOND: Duration = Duration::from_secs(1);

@@ -1,9 +1,9 @@
 //! More open requests than are kept: of what had to be forgotten anything may still come, for as long as it could have.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
+mod asker;
 
-use common::asker::*;
+use asker::*;
 use drivebus_rtu::*;
 
 /// Kinds of open requests that are kept.

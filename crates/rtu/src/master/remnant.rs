@@ -100,4 +100,13 @@ mod tests {
             assert!(!looks_own(&READ, came) && !looks_own(&READ_OF_0, came), "{came:02X?}");
         }
     }
+    #[test]
+    fn of_a_long_request_the_first_bytes_are_looked_for() {
+        let request: [u8; 2 * CAPACITY] = core::array::from_fn(|at| u8::try_from(at + 1).unwrap());
+        let with_others_between = |last: usize| [10, 30, 50, last].map(|at| [request[at], 0xEE]).concat();
+        assert!(looks_own(&request, &with_others_between(CAPACITY - 1)));
+        assert!(!looks_own(&request, &with_others_between(CAPACITY)));
+        assert!(looks_own(&request, &request[CAPACITY - IN_A_ROW..]));
+        assert!(!looks_own(&request, &request[CAPACITY - IN_A_ROW + 1..]));
+    }
 }

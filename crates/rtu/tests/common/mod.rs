@@ -3,8 +3,6 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 #![allow(unreachable_pub, reason = "a module of several test crates")]
 
-pub mod asker;
-
 use drivebus_rtu::*;
 use proptest::prelude::*;
 

@@ -1,4 +1,7 @@
 //! A master on a line where nothing takes time: what it asks goes out at once, and what comes is there as a whole.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(unreachable_pub, reason = "a module of several test crates")]
 
 use drivebus_rtu::*;
 

@@ -1,0 +1,145 @@
+//! How long an answer that came damaged may still come, to the nanosecond. Each unit is asked once, so that nothing else is open.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod asker;
+
+use asker::*;
+use drivebus_rtu::*;
+
+/// How long is listened on for the rest of an answer.
+const PAUSE: u64 = 10;
+
+fn patient() -> Asker {
+    let mut asker = Asker::new();
+    let (pause, usual) = (Duration::from_millis(PAUSE), Duration::ZERO);
+    asker.master.be_patient(Some(Patience { pause, usual }));
+    asker
+}
+
+/// The answer of unit `raw` to a read of two words, without its fifth byte.
+fn damaged(raw: u8) -> Vec<u8> {
+    let mut bytes = words(unit(raw), 2, 7).as_bytes().to_vec();
+    bytes.remove(5);
+    bytes
+}
+
+/// Unit `raw` is asked for two words with a time-out of `timeout`, `bytes` come, and at `given_up` the request ends. How long its
+/// answer is owed from then on, in milliseconds.
+fn owed(asker: &mut Asker, given_up: u64, raw: u8, bytes: &[u8], timeout: Duration) -> u64 {
+    asker.sends(given_up - PAUSE, unit(raw), &read(2), timeout);
+    asker.master.receive(ms(given_up - PAUSE), bytes);
+    assert!(asker.master.poll(before(ms(given_up))).is_none());
+    assert!(asker.master.poll(ms(given_up)).is_some());
+    let is_owed = |now| asker.master.attribution(now, unit(raw), &read(2)).may_be_mistaken();
+    let times = [0, 1_000, 2_000, 3_000];
+    let over =
+        |&millis: &u64| !is_owed(ms(given_up + millis)) && (millis == 0 || is_owed(before(ms(given_up + millis))));
+    times.into_iter().find(over).unwrap()
+}
+
+fn comes_damaged(asker: &mut Asker, given_up: u64, raw: u8) -> u64 {
+    owed(asker, given_up, raw, &damaged(raw), Duration::from_millis(50))
+}
+
+/// Three have come damaged by 1 s, and none again.
+fn known() -> Asker {
+    let mut asker = patient();
+    for (raw, given_up) in [(1, 100), (2, 500), (3, 1_000)] {
+        assert_eq!(comes_damaged(&mut asker, given_up, raw), 1_000, "unit {raw}");
+    }
+    asker
+}
+
+#[test]
+fn three_damaged_answers_and_a_second_say_that_the_next_does_not_come_again() {
+    assert_eq!(comes_damaged(&mut known(), 1_999, 4), 1_000);
+    assert_eq!(comes_damaged(&mut known(), 2_000, 4), 0);
+    // Two are not enough, however long ago.
+    let mut asker = patient();
+    for (raw, given_up) in [(1, 100), (2, 5_000), (3, 9_000), (4, 9_999)] {
+        assert_eq!(comes_damaged(&mut asker, given_up, raw), 1_000, "unit {raw}");
+    }
+    assert_eq!(comes_damaged(&mut asker, 10_000, 5), 0);
+}
+
+#[test]
+fn a_damaged_answer_may_come_again_for_its_time_out_if_that_is_longer() {
+    let timeout = Duration::from_secs(2);
+    assert_eq!(owed(&mut patient(), 1_000, 1, &damaged(1), timeout), 2_000);
+    assert_eq!(owed(&mut known(), 2_000, 4, &damaged(4), timeout), 0);
+}
+
+#[test]
+fn for_three_seconds_after_something_came_that_cannot_be_told_nothing_is_believed() {
+    let whole = words(unit(9), 2, 7);
+    let beginning = &whole.as_bytes()[..5];
+    for (what, bytes) in [("the beginning of an answer", beginning), ("noise", &[0x55; 9])] {
+        for (given_up, expected) in [(5_999, 3_000), (6_000, 0)] {
+            let mut asker = known();
+            asker.sends(2_900, unit(9), &read(2), Duration::from_millis(100));
+            asker.master.receive(ms(2_900), bytes);
+            assert!(asker.master.poll(ms(3_000)).is_some());
+            assert_eq!(comes_damaged(&mut asker, given_up, 4), expected, "{what}");
+        }
+    }
+    // What came just before the time was over is not yet decided.
+    let mut asker = known();
+    asker.sends(2_950, unit(9), &read(2), Duration::from_millis(50));
+    asker.master.receive(ms(2_995), beginning);
+    assert!(matches!(asker.master.poll(ms(3_000)), Some(Event::NoAnswer { bytes }) if bytes == beginning));
+    assert_eq!(comes_damaged(&mut asker, 5_999, 4), 3_000);
+    // Nothing is no beginning.
+    let mut asker = known();
+    asker.sends(2_950, unit(9), &read(2), Duration::from_millis(50));
+    assert!(asker.master.poll(ms(3_000)).is_some());
+    assert_eq!(comes_damaged(&mut asker, 5_999, 4), 0);
+}
+
+/// That the line was opened anew, or brought one again, says nothing of what broke off before.
+#[test]
+fn what_broke_off_is_kept_in_mind_when_all_else_is_forgotten() {
+    for broke_off in [false, true] {
+        let mut asker = patient();
+        if broke_off {
+            asker.sends(40, unit(9), &read(2), TIMEOUT);
+            asker.master.receive(ms(40), &words(unit(9), 2, 7).as_bytes()[..5]);
+            assert!(asker.master.poll(ms(50)).is_some());
+        }
+        comes_damaged(&mut asker, 60, 8);
+        asker.hears(70, &words(unit(8), 2, 7));
+        let expected = if broke_off { 3_000 } else { 1_000 };
+        for (raw, given_up) in [(1, 100), (2, 500), (3, 1_000)] {
+            assert_eq!(comes_damaged(&mut asker, given_up, raw), expected, "unit {raw}");
+        }
+        assert_eq!(comes_damaged(&mut asker, 2_500, 4), if broke_off { 3_000 } else { 0 });
+    }
+}
+
+#[test]
+fn one_that_comes_again_or_a_line_that_is_opened_anew_begins_the_count_again() {
+    let again = |asker: &mut Asker| assert_eq!(asker.hears(2_000, &words(unit(2), 2, 7)), Came::Nothing);
+    let opened = |asker: &mut Asker| asker.master.opened(ms(1_000));
+    let instead = |asker: &mut Asker| {
+        asker.sends(2_000, unit(9), &read(2), TIMEOUT);
+        let mut damaged = words(unit(9), 2, 7).as_bytes().to_vec();
+        damaged[5] ^= 0x10;
+        asker.master.receive(ms(2_000), &damaged);
+        assert!(asker.master.poll(ms(2_001)).is_none());
+        assert_eq!(asker.hears(2_002, &words(unit(9), 2, 7)), Came::Answer);
+    };
+    let forgets: [&dyn Fn(&mut Asker); 3] = [&again, &opened, &instead];
+    for forget in forgets {
+        let mut asker = known();
+        forget(&mut asker);
+        for (raw, given_up) in [(4, 3_000), (5, 3_100), (6, 3_200), (7, 4_199)] {
+            assert_eq!(comes_damaged(&mut asker, given_up, raw), 1_000, "unit {raw}");
+        }
+        assert_eq!(comes_damaged(&mut asker, 4_200, 8), 0);
+    }
+    // A refusal, another length and another unit's are none of those.
+    let mut asker = known();
+    for other in [refuses(unit(2), &read(2)), words(unit(2), 3, 7), words(unit(9), 2, 7)] {
+        asker.hears(2_000, &other);
+    }
+    assert_eq!(comes_damaged(&mut asker, 2_100, 4), 0);
+}
