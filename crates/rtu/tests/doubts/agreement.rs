@@ -1,9 +1,6 @@
 //! How often an answer has to come before it is believed.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::unit;
+use crate::asker::unit;
 use drivebus_rtu::*;
 
 /// Repetitions from 1 on of words and of refusals, and how often the caller wants the words at least.

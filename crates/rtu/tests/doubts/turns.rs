@@ -1,9 +1,6 @@
 //! When the next request goes out: the silence that is kept before it, and from when that counts.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 const SILENCE: Duration = Duration::from_millis(2);

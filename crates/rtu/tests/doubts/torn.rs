@@ -1,9 +1,6 @@
 //! How long an answer that came damaged may still come, to the nanosecond. Each unit is asked once, so that nothing else is open.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 /// How long is listened on for the rest of an answer.

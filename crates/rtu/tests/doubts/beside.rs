@@ -1,9 +1,6 @@
 //! What comes beside the answer or in its place: what is counted, and how the request ends.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 const WRITE: Request<'_> = Request::write(0x2001, 1000);

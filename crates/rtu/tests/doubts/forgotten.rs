@@ -1,9 +1,6 @@
 //! More open requests than are kept: of what had to be forgotten anything may still come, for as long as it could have.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 /// Kinds of open requests that are kept.

@@ -1,9 +1,6 @@
 //! Which units are in quarantine, what may be asked there, and what ends it.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 const WRITE: Request<'_> = Request::write(0x2000, 1);

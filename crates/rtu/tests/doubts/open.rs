@@ -1,9 +1,6 @@
 //! What is left open, and how sure the answer to the next request can be, until no open answer can overtake any more.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod asker;
-
-use asker::*;
+use crate::asker::*;
 use drivebus_rtu::*;
 
 const SECOND: Duration = Duration::from_secs(1);
