@@ -26,7 +26,9 @@ fn noise(count: usize) -> Tally {
 fn counted(request: &Request<'_>, before: &[&[u8]], is_answered: bool) -> Tally {
     let mut asker = patient();
     asker.sends(0, unit(1), request, TIMEOUT);
-    before.iter().for_each(|bytes| comes(&mut asker, 1, bytes));
+    for bytes in before {
+        comes(&mut asker, 1, bytes);
+    }
     if is_answered {
         let answer = if *request == WRITE { confirms(unit(1), &WRITE) } else { words(unit(1), 1, 0x5555) };
         assert_eq!(asker.hears(2, &answer), Came::Answer);
@@ -154,7 +156,9 @@ fn what_does_not_fit_is_late_only_where_something_is_owed() {
     for (settled_at, now, expected) in [(None, 2_999, true), (Some(500), 2_999, true), (Some(500), 3_000, false)] {
         let mut asker = Asker::new();
         asker.leaves_open(0, unit(1), &read(2));
-        settled_at.into_iter().for_each(|at| asker.echoes(at, unit(1)));
+        if let Some(at) = settled_at {
+            asker.echoes(at, unit(1));
+        }
         assert_eq!(ask_four(&mut asker, now, 1), if expected { Came::Nothing } else { wrong(1) }, "at {now} ms");
         assert_eq!(late(&mut asker), u32::from(expected));
     }
