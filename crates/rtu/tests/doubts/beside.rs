@@ -124,6 +124,26 @@ fn an_answer_that_begins_behind_one_without_its_head_is_waited_for() {
     assert!(matches!(asker.master.poll(ms(11)), Some(Event::Corrupt { .. })));
 }
 
+/// Who searches the states of a master tells them apart by what it prints.
+#[test]
+fn a_master_prints_what_came_beside_the_answer_until_the_next_request() {
+    let mut came = [0x55, 0x66].map(|byte| {
+        let mut asker = patient();
+        asker.sends(0, unit(1), &read(1), TIMEOUT);
+        comes(&mut asker, 1, &[byte; 3]);
+        asker
+    });
+    let prints = |came: &[Asker; 2]| came.each_ref().map(|asker| format!("{:?}", asker.master));
+    let [one, other] = prints(&came);
+    assert_ne!(one, other);
+    for asker in &mut came {
+        asker.master.abort(ms(49));
+        asker.leaves_open(50, unit(1), &read(1));
+    }
+    let [one, other] = prints(&came);
+    assert_eq!(one, other);
+}
+
 /// While the units act on a broadcast, the adapter's echo of it is that, and all else is late.
 #[test]
 fn only_the_broadcast_itself_is_the_adapters_echo() {

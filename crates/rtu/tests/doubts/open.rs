@@ -162,6 +162,22 @@ fn an_answer_taken_where_another_could_come_leaves_one_open() {
     assert_eq!(asker.attribution(ms(10_000), &read(1)), Attribution::Certain, "it is past");
 }
 
+/// It may be as late as the one that was asked for longer.
+#[test]
+fn the_longer_time_out_of_both_tells_how_long_the_one_that_is_left_may_come() {
+    let long = Duration::from_secs(2);
+    for (first, second) in [(TIMEOUT, long), (long, TIMEOUT)] {
+        let mut asker = Asker::new();
+        asker.leaves_open_for(1_000, unit(1), &read(1), first);
+        asker.echoes(1_000, unit(1));
+        asker.sends(3_000, unit(1), &read(1), second);
+        assert_eq!(asker.hears(3_000, &words(unit(1), 1, 7)), Came::Answer);
+        let over = ms(3_000 + 8_000);
+        assert_eq!(asker.attribution(before(over), &read(1)), repeat(2, 2), "{first:?}, {second:?}");
+        assert_eq!(asker.attribution(over, &read(1)), Attribution::Certain, "{first:?}, {second:?}");
+    }
+}
+
 #[test]
 fn an_answer_taken_for_which_no_open_one_could_pass_changes_nothing() {
     let mut asker = Asker::new();

@@ -66,6 +66,18 @@ fn a_damaged_answer_may_come_again_for_its_time_out_if_that_is_longer() {
     assert_eq!(owed(&mut known(), 2_000, 4, &damaged(4), timeout), 0);
 }
 
+/// The one that may come again may have been taken; then the other is as open as any.
+#[test]
+fn an_answer_taken_while_a_damaged_one_may_come_again_leaves_one_open() {
+    for (taken, over) in [(1_099, 1_099 + 3_000), (1_100, 1_100)] {
+        let mut asker = patient();
+        assert_eq!(comes_damaged(&mut asker, 100, 1), 1_000);
+        asker.reads(taken, unit(1), 2);
+        let is_owed = |now| asker.master.attribution(now, unit(1), &read(2)).may_be_mistaken();
+        assert!(!is_owed(ms(over)) && (over == taken || is_owed(before(ms(over)))), "taken at {taken} ms");
+    }
+}
+
 #[test]
 fn for_three_seconds_after_something_came_that_cannot_be_told_nothing_is_believed() {
     let whole = words(unit(9), 2, 7);
