@@ -237,7 +237,7 @@ fn only_the_very_same_frame_can_be_one_that_the_line_brought_twice() {
     assert_eq!(one, words(unit(1), 1, 7));
     assert_eq!(twice(&|asker| assert_eq!(asker.hears(1_500, &other), Came::Nothing)), [1, 1]);
     let after_a_request = twice(&|asker| {
-        asker.reads(1_500, unit(3), 1);
+        asker.leaves_open(1_500, unit(3), &read(1));
         assert_eq!(asker.hears(1_500, &words(unit(1), 1, 7)), Came::Nothing);
     });
     assert_eq!(after_a_request, [0, 2]);
