@@ -1,5 +1,7 @@
 //! Who is next among those who wait for the line: the rule alone, without threads and without a clock.
 
+use std::cmp::Ordering;
+
 use drivebus_rtu::UnitAddress;
 
 use crate::queue::Priority;
@@ -138,14 +140,11 @@ impl<T> Order<T> {
         self.turns += 1;
         self.last_turn[ticket.place()] = self.turns;
         for other in &mut self.waiting {
-            if late && other.ticket.number > ticket.number {
+            match other.ticket.number.cmp(&ticket.number) {
                 // One turn for all who came later, else a crowd of them would hold up the higher classes at one go.
-                other.overtaken = 0;
-            } else if ticket.number > other.ticket.number
-                && ticket.priority < other.ticket.priority
-                && !ticket.is_stop()
-            {
-                other.overtaken += 1;
+                Ordering::Greater if late => other.overtaken = 0,
+                Ordering::Less if ticket.priority < other.ticket.priority && !ticket.is_stop() => other.overtaken += 1,
+                _ => {}
             }
         }
     }

@@ -100,8 +100,11 @@ fn who_is_dismissed_waits_no_longer() {
     let mut order = Order::default();
     for name in 0..6 {
         come(&mut order, Read, 1, name);
+        assert_eq!(order.len(), order.waiting().count());
     }
+    assert_eq!((order.len(), order.waiting().copied().collect()), (6, vec![0, 1, 2, 3, 4, 5]));
     assert_eq!(order.dismiss(|name| name % 2 == 0), [0, 2, 4]);
+    assert_eq!((order.len(), order.next()), (3, Some(&1)));
     assert_eq!(serve_all(&mut order), [1, 3, 5]);
     assert_eq!(order.next_ticket(), None);
 }
