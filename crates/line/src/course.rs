@@ -216,3 +216,6 @@ pub(crate) fn is_unanswered(failure: &Failure) -> bool {
 fn is_damaged(failure: &Failure) -> bool {
     matches!(failure, Failure::Wrong(_) | Failure::Corrupt(_))
 }
+
+#[cfg(test)]
+mod tests;
