@@ -145,4 +145,20 @@ mod tests {
         longer.silent(UNIT, 100, 2);
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &read), None);
     }
+
+    #[test]
+    fn so_many_places_are_remembered_and_with_one_more_all_are_learned_again() {
+        let (mut longer, master) = (Longer::default(), owed(&[1]));
+        let is_refused = |longer: &Longer, address| {
+            longer.form(&master, Instant::ZERO, UNIT, &Request::read(address, 1).unwrap()).is_none()
+        };
+        let places = u16::try_from(REMEMBERED).unwrap();
+        (0..places).for_each(|address| longer.refused(UNIT, address, 2));
+        assert!((0..places).all(|address| is_refused(&longer, address)));
+        longer.refused(UNIT, 0, 2);
+        assert!((0..places).all(|address| is_refused(&longer, address)), "what is known already needs no new place");
+        longer.refused(UNIT, places, 2);
+        assert!(!(0..places).any(|address| is_refused(&longer, address)));
+        assert!(is_refused(&longer, places));
+    }
 }
