@@ -111,7 +111,7 @@ struct Known {
     silent_echoes: u32,
     /// A register that it answered a read of.
     readable: Option<u16>,
-    /// Nothing is known of it, and the latest probe was an echo.
+    /// The latest probe was an echo.
     echo_was_last: bool,
     /// Reads of another length since it was last sure.
     other_reads: u32,
@@ -182,8 +182,14 @@ impl Resync {
         } else {
             echo
         };
-        known.echo_was_last = probe == Some(Probe::Echo);
-        known.other_reads += u32::from(matches!(probe, Some(Probe::OtherRead { .. })));
+        match probe {
+            Some(Probe::Echo) => known.echo_was_last = true,
+            Some(Probe::OtherRead { .. }) => {
+                known.echo_was_last = false;
+                known.other_reads += 1;
+            }
+            None => {} // the latest probe is still the one before
+        }
         probe
     }
 
@@ -216,15 +222,4 @@ impl Resync {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::collections::BTreeSet;
-
-    use super::*;
-
-    #[test]
-    fn no_word_comes_twice_before_all_have_come() {
-        let fresh = FreshWords::new();
-        let words: BTreeSet<u16> = (0..=u16::MAX).map(|_| fresh.next()).collect();
-        assert_eq!(words.len(), 65_536);
-    }
-}
+mod tests;

@@ -8,5 +8,6 @@ mod echoing;
 mod hints;
 mod masters_table;
 mod odd;
+mod probes;
 mod scripted;
 mod written;
