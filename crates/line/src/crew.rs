@@ -249,41 +249,16 @@ impl State {
 mod tests {
     use std::sync::mpsc::channel;
 
-    use drivebus_rtu::{Instant, Request, SerialFormat};
+    use drivebus_rtu::{Request, SerialFormat};
 
     use super::*;
     use crate::call::CallOptions;
     use crate::error::Failure;
-    use crate::{BusOptions, Line, PortError};
-
-    /// A line on which nobody is.
-    #[derive(Debug)]
-    struct Nobody;
-
-    impl Line for Nobody {
-        fn now(&self) -> Instant {
-            Instant::ZERO
-        }
-
-        fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
-            Ok(Instant::ZERO)
-        }
-
-        fn receive(&mut self, _: &mut [u8], _: Instant) -> Result<usize, PortError> {
-            Ok(0)
-        }
-
-        fn sleep(&mut self, _: Instant) {}
-
-        fn name(&self) -> String {
-            "nobody".to_owned()
-        }
-    }
+    use crate::{BusOptions, nobody};
 
     #[test]
     fn who_is_told_that_there_is_no_thread_may_use_the_queue() {
-        let opener = || -> Result<Box<dyn Line>, PortError> { Ok(Box::new(Nobody)) };
-        let bus = Bus::open(Box::new(opener), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
+        let bus = Bus::open(nobody::opener(), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
         let bus = Arc::new(bus);
         bus.queue.lock().crew.spawn = |_| false;
         let (tell, told) = channel();

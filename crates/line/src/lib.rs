@@ -27,6 +27,8 @@ mod listen;
 mod longer;
 mod lumps;
 pub mod mbap;
+#[cfg(test)]
+mod nobody;
 mod opener;
 mod order;
 mod owner;

@@ -16,11 +16,11 @@ struct Doubt {
 }
 
 /// A read of so many words from an address.
-const fn other_read(address: u16, count: u16) -> Option<Probe> {
-    Some(Probe::OtherRead { address, count })
+const fn other_read(address: u16, count: u16) -> Probe {
+    Probe::OtherRead { address, count }
 }
 
-const ECHO: Option<Probe> = Some(Probe::Echo);
+const ECHO: Probe = Probe::Echo;
 
 /// Whether a unit refused the echo that it answered.
 const RETURNED: bool = false;
@@ -76,10 +76,6 @@ impl Doubt {
     }
 }
 
-fn probes<const N: usize>(probes: [Option<Probe>; N]) -> Vec<Probe> {
-    probes.into_iter().flatten().collect()
-}
-
 #[test]
 fn no_word_comes_twice_before_all_have_come() {
     let fresh = FreshWords::new();
@@ -111,15 +107,15 @@ fn an_echo_is_known_to_have_gone_out() {
 #[test]
 fn a_unit_that_never_answered_is_sent_one_probe_an_attempt() {
     let mut doubt = Doubt::about([1]);
-    assert_eq!(doubt.attempt(), probes([ECHO]));
-    assert_eq!(doubt.attempt(), probes([other_read(100, 2)]), "from where the caller reads");
-    assert_eq!(doubt.attempt(), probes([ECHO]));
-    assert_eq!(doubt.attempt(), probes([other_read(100, 2)]));
+    assert_eq!(doubt.attempt(), [ECHO]);
+    assert_eq!(doubt.attempt(), [other_read(100, 2)], "from where the caller reads");
+    assert_eq!(doubt.attempt(), [ECHO]);
+    assert_eq!(doubt.attempt(), [other_read(100, 2)]);
     // Two reads are what the doubt is worth.
-    assert_eq!(doubt.attempt(), probes([ECHO]));
-    assert_eq!(doubt.attempt(), probes([ECHO]));
+    assert_eq!(doubt.attempt(), [ECHO]);
+    assert_eq!(doubt.attempt(), [ECHO]);
     doubt.resync.is_sure(UNIT);
-    assert_eq!(doubt.attempt(), probes([other_read(100, 2)]));
+    assert_eq!(doubt.attempt(), [other_read(100, 2)]);
 }
 
 /// No register of it is known, and a write names none that may be read.
@@ -127,7 +123,7 @@ fn a_unit_that_never_answered_is_sent_one_probe_an_attempt() {
 fn a_unit_that_never_answered_is_sent_no_read_before_a_write() {
     let mut doubt = Doubt::about([1]);
     for _ in 0..4 {
-        assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), probes([ECHO]));
+        assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), [ECHO]);
     }
 }
 
@@ -139,7 +135,7 @@ fn a_unit_that_was_not_silent_on_an_echo_is_echoed_again() {
         doubt.again();
         let probe =
             doubt.resync.probe(&doubt.master, Instant::ZERO, UNIT, &Request::read(100, 1).unwrap(), &doubt.tried, true);
-        assert_eq!(probe, ECHO);
+        assert_eq!(probe, Some(ECHO));
     }
 }
 
@@ -147,10 +143,10 @@ fn a_unit_that_was_not_silent_on_an_echo_is_echoed_again() {
 fn a_unit_that_returns_echoes_is_echoed_twice_an_attempt_and_once_when_time_is_over() {
     let mut doubt = Doubt::about_one_that_lives().echoed(RETURNED);
     assert!(!doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
-    assert_eq!(doubt.attempt(), probes([ECHO, ECHO]));
+    assert_eq!(doubt.attempt(), [ECHO, ECHO]);
     doubt = doubt.echoed(RETURNED);
-    assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), probes([ECHO, ECHO]));
-    assert_eq!(doubt.attempt_before(&Request::read(100, 1).unwrap(), false), probes([ECHO]));
+    assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), [ECHO, ECHO]);
+    assert_eq!(doubt.attempt_before(&Request::read(100, 1).unwrap(), false), [ECHO]);
 }
 
 /// Another unit may have its address after five silences in a row.
@@ -168,7 +164,7 @@ fn a_unit_that_returned_echoes_is_asked_a_read_after_five_silences() {
     assert!(!doubt.resync.knows_no_echo(UNIT));
     doubt.resync.silent_on_echo(UNIT);
     assert!(doubt.resync.knows_no_echo(UNIT));
-    assert_eq!(doubt.attempt(), probes([other_read(7, 2), ECHO]));
+    assert_eq!(doubt.attempt(), [other_read(7, 2), ECHO]);
     assert!(!doubt.echoed(RETURNED).resync.knows_no_echo(UNIT));
 }
 
@@ -177,12 +173,12 @@ fn a_unit_that_returned_echoes_is_asked_a_read_after_five_silences() {
 fn a_unit_that_lives_and_never_returned_an_echo_is_asked_a_read() {
     let mut doubt = Doubt::about_one_that_lives();
     assert!(!doubt.resync.knows_no_echo(UNIT));
-    assert_eq!(doubt.attempt(), probes([ECHO, other_read(7, 2)]), "the register that is known to be readable");
+    assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)], "the register that is known to be readable");
     assert!(doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
-    assert_eq!(doubt.attempt(), probes([other_read(7, 2), ECHO]));
-    assert_eq!(doubt.attempt(), probes([ECHO]), "two reads are what a doubt is worth");
+    assert_eq!(doubt.attempt(), [other_read(7, 2), ECHO]);
+    assert_eq!(doubt.attempt(), [ECHO], "two reads are what a doubt is worth");
     doubt.resync.is_sure(UNIT);
-    assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), probes([other_read(7, 2), ECHO]));
+    assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), [other_read(7, 2), ECHO]);
 }
 
 /// It answers an echo, by a refusal, and may have caught up by that; what it says of one it says of each.
@@ -190,9 +186,9 @@ fn a_unit_that_lives_and_never_returned_an_echo_is_asked_a_read() {
 fn a_unit_that_refuses_echoes_is_echoed_once_and_then_asked_a_read() {
     let mut doubt = Doubt::about_one_that_lives().echoed(REFUSED);
     assert!(doubt.resync.knows_no_echo(UNIT) && doubt.resync.refuses_echoes(UNIT));
-    assert_eq!(doubt.attempt(), probes([ECHO, other_read(7, 2)]));
-    assert_eq!(doubt.attempt(), probes([ECHO, other_read(7, 2)]));
-    assert_eq!(doubt.attempt(), probes([ECHO]));
+    assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)]);
+    assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)]);
+    assert_eq!(doubt.attempt(), [ECHO]);
     let doubt = doubt.echoed(RETURNED);
     assert!(!doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
 }
@@ -215,17 +211,17 @@ fn the_other_read_has_a_length_that_no_open_answer_has() {
 
     let mut doubt = silent(1..=3);
     lives(&mut doubt, &Request::write(200, 1), false);
-    assert_eq!(doubt.attempt(), probes([other_read(100, 4), ECHO]), "no register of it is known");
+    assert_eq!(doubt.attempt(), [other_read(100, 4), ECHO], "no register of it is known");
     let mut doubt = silent(1..=3);
     lives(&mut doubt, &Request::write(200, 1), false);
-    assert_eq!(doubt.attempt_before(&Request::write(300, 1), true), probes([ECHO]));
+    assert_eq!(doubt.attempt_before(&Request::write(300, 1), true), [ECHO]);
     let mut doubt = silent(1..=3);
     lives(&mut doubt, &Request::read(50, 1).unwrap(), true);
-    assert_eq!(doubt.attempt(), probes([other_read(100, 4), ECHO]), "what was refused is not readable");
+    assert_eq!(doubt.attempt(), [other_read(100, 4), ECHO], "what was refused is not readable");
     let mut doubt = silent(15..=15);
     lives(&mut doubt, &Request::read(50, 1).unwrap(), false);
-    assert_eq!(doubt.attempt(), probes([other_read(50, 16), ECHO]));
+    assert_eq!(doubt.attempt(), [other_read(50, 16), ECHO]);
     let mut doubt = silent(16..=16);
     lives(&mut doubt, &Request::read(50, 1).unwrap(), false);
-    assert_eq!(doubt.attempt(), probes([ECHO]), "no unit known here gives more");
+    assert_eq!(doubt.attempt(), [ECHO], "no unit known here gives more");
 }

@@ -9,5 +9,8 @@ mod hints;
 mod masters_table;
 mod odd;
 mod probes;
+mod repeated;
 mod scripted;
+mod silent;
+mod unproven;
 mod written;

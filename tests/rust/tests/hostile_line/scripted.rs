@@ -66,6 +66,8 @@ pub(crate) struct Wire {
     echo: Script,
     /// Fails once after the next request, as an adapter does that is pulled out and put in again.
     pub(crate) vanish_after_sending: bool,
+    /// The same, before the next request is out.
+    pub(crate) vanish_before_sending: bool,
     pub(crate) opened: u32,
 }
 
@@ -112,7 +114,10 @@ impl Line for Scripted {
 
     fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
         let mut wire = self.0.lock().unwrap();
-        if wire.busy > wire.now && std::mem::take(&mut wire.vanish_after_sending) {
+        let is_sent = wire.busy > wire.now;
+        if std::mem::take(&mut wire.vanish_before_sending)
+            || (is_sent && std::mem::take(&mut wire.vanish_after_sending))
+        {
             return Err(PortError::new(PortErrorKind::Lost, "script", "pulled out"));
         }
         let Some((at, _)) = wire.coming.first().filter(|(at, _)| *at <= until.max(wire.now)) else {
@@ -156,7 +161,7 @@ impl Line for Scripted {
 /// A bus on a scripted line.
 #[derive(Debug)]
 pub(crate) struct Rig {
-    pub(crate) bus: Bus,
+    pub(crate) bus: Arc<Bus>,
     pub(crate) wire: Arc<Mutex<Wire>>,
     /// Who holds it keeps the port from opening.
     pub(crate) opening: Arc<Mutex<()>>,
@@ -191,6 +196,7 @@ impl Rig {
             script: Box::new(script),
             echo: Box::new(echo),
             vanish_after_sending: false,
+            vanish_before_sending: false,
             opened: 0,
         }));
         let line = Scripted(Arc::clone(&wire));
@@ -202,7 +208,8 @@ impl Rig {
             Ok(Box::new(line.clone()) as Box<dyn Line>)
         };
         let options = BusOptions { retries: 0, ..BusOptions::new(FORMAT) };
-        Self { bus: Bus::open(Box::new(opener), options, &mut || false).unwrap(), wire, opening }
+        let bus = Bus::open(Box::new(opener), options, &mut || false).unwrap();
+        Self { bus: Arc::new(bus), wire, opening }
     }
 
     /// Asks unit 1; the words read, or none.
@@ -229,6 +236,15 @@ impl Rig {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         self.bus.call(destination, request, options, give_up, take)
+    }
+
+    pub(crate) fn now(&self) -> Instant {
+        self.wire.lock().unwrap().now
+    }
+
+    /// How long ago `then` is.
+    pub(crate) fn since(&self, then: Instant) -> Duration {
+        self.now().saturating_duration_since(then)
     }
 
     /// The program does something else for `time`; what arrives meanwhile waits in the driver.

@@ -85,7 +85,7 @@ fn write(rig: &Rig, request: &Request<'_>, read_back: Option<u16>) -> Result<(),
 
 #[test]
 fn a_lost_confirmation_is_found_by_reading_and_the_write_is_not_repeated() {
-    let (rig, unit) = rig(&[Fate::Unconfirmed]);
+    let (rig, unit) = rig(&[Fate::Unconfirmed, Fate::Unconfirmed]);
     write(&rig, &Request::write(100, 5), Some(100)).unwrap();
     assert_eq!(unit.lock().unwrap().log, [(100, 5)]);
     let words = [1, 2, 3];
