@@ -236,28 +236,32 @@ impl<'b> Call<'b, '_> {
         });
         *known = Some(owner.asked(unit));
         let is_last = *asked >= u32::from(agreement.longest());
-        match result {
-            Ok(done) if agreed => Ok(Some(done)),
-            Ok(done) if is_last => {
-                let failure = Failure::Disagreeing { asked: *asked };
-                course.hearing = None;
-                Err(self.ask.failed(failure, Some(done.sent), done.ended, &[]))
-            }
+        let (sent, ended) = match result {
+            Ok(done) if agreed => return Ok(Some(done)),
+            Ok(done) if is_last => (Some(done.sent), Some(done.ended)),
             Ok(_) => {
                 // What this call left open before may still come; it is an answer like this one.
                 course.repeats(owner, unit, again);
-                Ok(None)
+                return Ok(None);
             }
             Err(error) => {
-                if let Failure::Refused { function, code } = error.failure {
-                    let enough = agreement.hear(unit, &Answer::exception(function, code));
-                    return if enough || is_last { Err(error) } else { Ok(None) };
+                let Failure::Refused { function, code } = error.failure else {
+                    let result = Err(error);
+                    course.leaves_open(owner, &self.ask, Form::Repeated, &result);
+                    return result.map(|_: Done| None);
+                };
+                if agreement.hear(unit, &Answer::exception(function, code)) {
+                    return Err(error);
                 }
-                let result = Err(error);
-                course.leaves_open(owner, &self.ask, Form::Repeated, &result);
-                result.map(|_: Done| None)
+                if !is_last {
+                    return Ok(None);
+                }
+                (error.sent, error.ended)
             }
-        }
+        };
+        let failure = Failure::Disagreeing { asked: *asked };
+        course.hearing = None;
+        Err(self.ask.failed(failure, sent, ended, &[]))
     }
 }
 
@@ -265,3 +269,7 @@ impl<'b> Call<'b, '_> {
 fn is_refusal(failure: &Failure) -> bool {
     matches!(failure, Failure::Refused { .. } | Failure::Wrong(AnswerError::Refusal { .. }))
 }
+
+#[cfg(test)]
+#[allow(clippy::panic, reason = "a test may panic")]
+mod tests;
