@@ -63,8 +63,7 @@ impl<'b> Call<'b, '_> {
                 }
                 Question::Unproven => {
                     course.is_unproven();
-                    let ask = Ask { in_doubt: true, ..self.ask };
-                    let result = course.ask(&mut owner, &ask, Form::Plain, give_up, &mut |_| ());
+                    let result = course.ask(&mut owner, &self.ask, Form::Plain, give_up, &mut |_| ());
                     return owner.unless_echoed(&self.ask, result, give_up);
                 }
                 // What was heard goes on.
