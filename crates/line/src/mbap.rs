@@ -13,6 +13,8 @@
 //!
 //! Numbers are big-endian. Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3.
 
+use std::collections::VecDeque;
+
 use drivebus_rtu::{Duration, Instant, crc16};
 
 use crate::clock::{monotonic, sleep_until};
@@ -27,6 +29,8 @@ const PREFIX: usize = 6;
 /// Fewest and most bytes of unit and PDU.
 const MIN_BODY: usize = 2;
 const MAX_BODY: usize = 254;
+/// Transactions without an answer that are kept.
+const MAX_OPEN: usize = 32;
 /// Bytes of a CRC.
 const CRC: usize = 2;
 
@@ -44,6 +48,10 @@ pub struct ModbusTcp {
     frame: Vec<u8>,
     /// Answers that came with another transaction than the latest.
     foreign: u64,
+    /// The latest transactions that were not answered.
+    open: VecDeque<u16>,
+    /// Answers to them, as RTU frames, that nobody has taken yet.
+    late: VecDeque<Vec<u8>>,
 }
 
 impl ModbusTcp {
@@ -63,6 +71,8 @@ impl ModbusTcp {
             incoming: Vec::with_capacity(2 * (PREFIX + MAX_BODY)),
             frame: Vec::with_capacity(MAX_BODY + CRC),
             foreign: 0,
+            open: VecDeque::new(),
+            late: VecDeque::new(),
         })
     }
 
@@ -83,12 +93,18 @@ impl ModbusTcp {
             if self.incoming.len() < end {
                 return Ok(());
             }
+            let body = &self.incoming[PREFIX..end];
             if self.waiting && u16::from_be_bytes([high, low]) == self.transaction {
                 self.waiting = false;
-                self.frame.extend_from_slice(&self.incoming[PREFIX..end]);
-                self.frame.extend_from_slice(&crc16(&self.incoming[PREFIX..end]).to_le_bytes());
+                self.frame.extend_from_slice(body);
+                self.frame.extend_from_slice(&crc16(body).to_le_bytes());
             } else {
                 self.foreign += 1;
+                // One that comes twice is late once.
+                if let Some(place) = self.open.iter().position(|&open| open.to_be_bytes() == [high, low]) {
+                    self.open.remove(place);
+                    self.late.push_back([body, &crc16(body).to_le_bytes()].concat());
+                }
             }
             self.incoming.drain(..end);
         }
@@ -114,6 +130,12 @@ impl Line for ModbusTcp {
             return Err(PortError::new(PortErrorKind::Unsupported, &self.connection.name, message));
         };
         self.frame.clear();
+        if self.waiting {
+            if self.open.len() == MAX_OPEN {
+                self.open.pop_front();
+            }
+            self.open.push_back(self.transaction);
+        }
         self.transaction = self.transaction.wrapping_add(1);
         self.waiting = true;
         let [length_high, length_low] = u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes();
@@ -157,6 +179,10 @@ impl Line for ModbusTcp {
 
     fn gapless(&self) -> bool {
         true
+    }
+
+    fn take_late(&mut self) -> Option<Vec<u8>> {
+        self.late.pop_front()
     }
 
     fn notes(&self) -> Vec<String> {

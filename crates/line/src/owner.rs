@@ -287,7 +287,11 @@ impl Owner {
         let result = match self.line.as_deref_mut() {
             Some(line) => {
                 let usual = unit.and_then(|unit| self.delays.longest(unit));
-                exchange(line, &mut self.master, ask, (usual, &mut self.lumps), give_up, take)
+                let result = exchange(line, &mut self.master, ask, (usual, &mut self.lumps), give_up, take);
+                while let Some(late) = line.take_late() {
+                    self.master.saw_late(line.now(), &late);
+                }
+                result
             }
             None => Err(ask.failed(Failure::Closed, None, None, &[])),
         };

@@ -57,6 +57,11 @@ pub trait Line: Send + fmt::Debug {
         false
     }
 
+    /// The next frame that came and is known to answer an earlier request, where frames are told apart so.
+    fn take_late(&mut self) -> Option<Vec<u8>> {
+        None
+    }
+
     /// Whether its clock is a simulation's, which only moves while somebody waits.
     fn is_virtual(&self) -> bool {
         false

@@ -16,7 +16,7 @@ use core::time::Duration;
 use crate::answer::Expected;
 use crate::doubt::{Attribution, Doubts};
 use crate::event::{BeginError, Event, Tally};
-use crate::frame::Adu;
+use crate::frame::{Adu, Frame};
 use crate::framer::Framer;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
@@ -330,6 +330,14 @@ impl Master {
     /// waited for for `timeout`.
     pub fn still_owed(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>, timeout: Duration) {
         self.doubts.left_open(now, unit, request.expected(), timeout);
+    }
+
+    /// Says that `frame` came by `now`, and is known by other means than its bytes to answer a request before the one in flight.
+    /// What it answers is owed no more. Bytes that are no frame change nothing.
+    pub fn saw_late(&mut self, now: Instant, frame: &[u8]) {
+        if let Ok(frame) = Frame::parse(frame) {
+            self.doubts.seen(now, &frame, Duration::ZERO);
+        }
     }
 
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or

@@ -141,6 +141,31 @@ fn answers_of_other_transactions_are_dropped_and_counted() {
     assert_eq!(line.notes(), ["answers with another transaction than asked, dropped: 2"]);
 }
 
+/// So that it is known to be owed no more: once, whatever comes again.
+#[test]
+fn what_answers_an_earlier_transaction_is_handed_over_as_late_once() {
+    let (mut line, mut far) = mbap();
+    let transactions = [(); 3].map(|()| {
+        line.send(&REQUEST).unwrap();
+        next_request(&mut far).0
+    });
+    let late = answer(transactions[1], &[0x01, 0x83, 0x02]);
+    let unknown = answer([0x7F, 0xFF], &BODY);
+    let latest = answer(transactions[2], &BODY);
+    far.write_all(&[&late[..], &late, &unknown, &latest, &latest].concat()).unwrap();
+    assert_eq!(receive_exactly(&mut line, FRAME.len()), FRAME);
+    assert_eq!(line.receive(&mut [0; 8], line.now() + Duration::from_millis(2)).unwrap(), 0);
+    assert_eq!(line.take_late().unwrap(), [0x01, 0x83, 0x02, 0xC0, 0xF1]);
+    assert_eq!(line.take_late(), None);
+
+    // The answer to the latest came: a second one answers nothing that is open.
+    line.send(&REQUEST).unwrap();
+    far.write_all(&[latest, answer(transactions[0], &BODY)].concat()).unwrap();
+    assert_eq!(line.receive(&mut [0; 8], line.now() + Duration::from_millis(2)).unwrap(), 0);
+    assert_eq!(line.take_late().unwrap(), FRAME);
+    assert_eq!(line.take_late(), None);
+}
+
 #[test]
 fn an_answer_left_over_is_gone_with_the_next_request() {
     let (mut line, mut far) = mbap();

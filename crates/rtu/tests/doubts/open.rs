@@ -240,3 +240,22 @@ fn an_answer_that_turns_out_to_be_none_is_still_owed() {
     assert_eq!(asker.attribution(before(ms(5_500)), &read(1)), repeat(2, 2));
     assert_eq!(asker.attribution(ms(5_500), &read(1)), Attribution::Certain);
 }
+
+/// Over Modbus TCP a number tells what is late.
+#[test]
+fn what_is_known_to_be_late_is_owed_no_more() {
+    let mut asker = Asker::new();
+    asker.leaves_open(1_000, unit(1), &read(1));
+    asker.leaves_open(1_010, unit(1), &read(1));
+    let after = |asker: &Asker| asker.attribution(ms(1_020), &read(1));
+    for (frame, words) in [(words(unit(1), 2, 7), 3), (words(unit(1), 1, 7), 2), (words(unit(1), 1, 7), 1)] {
+        asker.master.saw_late(ms(1_020), frame.as_bytes());
+        match after(&asker) {
+            Attribution::Certain => assert_eq!(words, 1),
+            other => assert_eq!(other, Attribution::Repeat { words, refusal: words }),
+        }
+    }
+    assert!(!asker.in_quarantine(ms(1_020)));
+    asker.master.saw_late(ms(1_020), &[1, 3]);
+    assert_eq!(after(&asker), Attribution::Certain);
+}
