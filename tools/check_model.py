@@ -2,9 +2,9 @@
 
 `check_model.py` builds each broken copy of `crates/rtu` under the target folder, searches the line on which the rule
 matters, and prints the shortest run that shows what the rule is for. A rule that can be broken unnoticed is a finding:
-the exit code is 1 then, or where the text that a break replaces is no longer there. One rule waits for more than is needed
-where nothing comes twice; that everything holds there without it is searched too. `check_model.py NAME …` takes those
-whose names hold one of these words.
+the exit code is 1 then, or where the text that a break replaces is no longer there. One rule waits for more than is
+needed where nothing comes twice; that everything holds there without it is searched too. `check_model.py NAME …` takes
+those whose names hold one of these words.
 """
 
 from __future__ import annotations
