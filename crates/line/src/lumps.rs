@@ -231,42 +231,7 @@ mod tests {
     use drivebus_rtu::SerialFormat;
 
     use super::*;
-    use crate::PortError;
-
-    /// A line that is asked nothing but how it hands over.
-    #[derive(Debug)]
-    struct Known {
-        char_time: Option<Duration>,
-        latency: Duration,
-    }
-
-    impl Line for Known {
-        fn now(&self) -> Instant {
-            Instant::ZERO
-        }
-
-        fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
-            Ok(Instant::ZERO)
-        }
-
-        fn receive(&mut self, _: &mut [u8], _: Instant) -> Result<usize, PortError> {
-            Ok(0)
-        }
-
-        fn sleep(&mut self, _: Instant) {}
-
-        fn char_time(&self) -> Option<Duration> {
-            self.char_time
-        }
-
-        fn latency(&self) -> Duration {
-            self.latency
-        }
-
-        fn name(&self) -> String {
-            "known".to_owned()
-        }
-    }
+    use crate::nobody::Nobody;
 
     const ANSWER: usize = 7;
 
@@ -279,7 +244,7 @@ mod tests {
     }
 
     fn lumps(char_time: Option<Duration>, latency: u64) -> Lumps {
-        Lumps::of(&Known { char_time, latency: millis(latency) })
+        Lumps::of(&Nobody { char_time, latency: millis(latency) })
     }
 
     fn by_characters() -> Lumps {

@@ -1,11 +1,15 @@
 //! A line on which nobody is, for tests of what is decided beside it.
 
-use drivebus_rtu::Instant;
+use drivebus_rtu::{Duration, Instant};
 
 use crate::{Line, Opener, PortError};
 
-#[derive(Debug)]
-struct Nobody;
+/// What the line says of itself.
+#[derive(Debug, Default)]
+pub(crate) struct Nobody {
+    pub(crate) char_time: Option<Duration>,
+    pub(crate) latency: Duration,
+}
 
 impl Line for Nobody {
     fn now(&self) -> Instant {
@@ -22,6 +26,14 @@ impl Line for Nobody {
 
     fn sleep(&mut self, _: Instant) {}
 
+    fn char_time(&self) -> Option<Duration> {
+        self.char_time
+    }
+
+    fn latency(&self) -> Duration {
+        self.latency
+    }
+
     fn name(&self) -> String {
         "nobody".to_owned()
     }
@@ -34,5 +46,5 @@ impl Line for Nobody {
 
 /// What opens such a line.
 pub(crate) fn opener() -> Opener {
-    Box::new(|| Ok(Box::new(Nobody)))
+    Box::new(|| Ok(Box::new(Nobody::default())))
 }
