@@ -26,7 +26,7 @@ settings.load_profile("drivebus")
 
 # Whoever starts the tests in the background may have them ignore these, and the programs under test would inherit it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-for name in ("SIGHUP", "SIGTERM"):
+for name in ("SIGHUP", "SIGQUIT", "SIGTERM"):
     if hasattr(signal, name):
         signal.signal(getattr(signal, name), signal.SIG_DFL)
 
