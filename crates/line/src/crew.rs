@@ -270,4 +270,23 @@ mod tests {
         bus.send(errand);
         assert_eq!(told.recv(), Ok((Failure::Closed, true)));
     }
+
+    #[test]
+    fn whose_turn_has_come_waits_no_longer_however_late_its_thread_comes() {
+        let (tell, told) = channel();
+        let options = BusOptions { queue: 2, ..BusOptions::new(SerialFormat::DEFAULT) };
+        let bus = Arc::new(Bus::open(nobody::opener(), options, &mut || false).unwrap());
+        bus.queue.lock().crew.spawn = |_| true;
+        let unit = UnitAddress::new(1).unwrap();
+        for number in 0..5 {
+            let tell = tell.clone();
+            bus.send(Errand::new(unit.into(), &Request::write(0x2000, 5), CallOptions::default(), move |outcome| {
+                tell.send((number, outcome.unwrap_err().failure)).unwrap();
+            }));
+        }
+        assert_eq!(
+            told.try_iter().collect::<Vec<_>>(),
+            [(3, Failure::QueueFull { room: 2 }), (4, Failure::QueueFull { room: 2 })]
+        );
+    }
 }

@@ -222,8 +222,11 @@ impl Drop for Turn<'_> {
 
 impl State {
     /// Whether who comes with `priority` finds no room among the `room` who may wait. A stop always does.
+    ///
+    /// On a free line the next has been called: it counts no longer, however late its thread comes.
     pub(crate) fn is_full_for(&self, priority: Priority, room: usize) -> bool {
-        priority != Priority::Stop && self.order.len() >= room
+        let called = usize::from(self.owner.is_none());
+        priority != Priority::Stop && self.order.len().saturating_sub(called) >= room
     }
 
     /// Whether `this` thread has the line or waits for it.
