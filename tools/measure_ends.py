@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from tests.python import endings  # noqa: E402  # the tests' own programs
-from tests.python.ends import DEAD, FORWARD, STOP, Line, line  # noqa: E402
+from tests.python.ends import DEAD, FORWARD, STOP, Line, dispositions_as_usual, line  # noqa: E402
 
 PORTS = ("native", "serial.Serial", "spy", "socket", "asyncio")
 STORM = "Ctrl-C, 2 to 20 times"
@@ -109,6 +109,7 @@ def main() -> int:
     parser.add_argument("--port", action="append", choices=PORTS)
     parser.add_argument("--only", action="append", default=[], help=f"a row of docs/ends.md, or {STORM!r}")
     given = parser.parse_args()
+    dispositions_as_usual()
     ports = given.port or PORTS
     with ThreadPoolExecutor(len(ports)) as pool:
         jobs = {port: pool.submit(measure, port, given.times, given.seed, set(given.only)) for port in ports}

@@ -10,7 +10,6 @@ import asyncio
 import functools
 import importlib.util
 import os
-import signal
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any
@@ -20,15 +19,13 @@ from hypothesis import settings
 
 import drivebus
 
+from .ends import dispositions_as_usual
+
 # A busy machine takes its time: nothing here is judged by the clock on the wall.
 settings.register_profile("drivebus", deadline=None)
 settings.load_profile("drivebus")
 
-# Whoever starts the tests in the background may have them ignore these, and the programs under test would inherit it.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-for name in ("SIGHUP", "SIGQUIT", "SIGTERM"):
-    if hasattr(signal, name):
-        signal.signal(getattr(signal, name), signal.SIG_DFL)
+dispositions_as_usual()
 
 TRANSPORTS = ["process", pytest.param("pty", marks=pytest.mark.skipif(os.name == "nt", reason="no pty")), "tcp"]
 # Seconds for an answer. Behind a port a thread of the simulator has to run for it; on a busy machine that takes long.

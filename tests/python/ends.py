@@ -7,6 +7,7 @@ other. `tools/measure_ends.py` runs the same programs many times.
 from __future__ import annotations
 
 import contextlib
+import signal
 import socket
 import subprocess
 import sys
@@ -110,6 +111,14 @@ class Line:
             text=True,
         )
         return Program(child)
+
+
+def dispositions_as_usual() -> None:
+    """Sets back the signals that whoever starts this in the background may have it ignore: programs inherit that."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for name in ("SIGHUP", "SIGQUIT", "SIGTERM"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 
 class Program:
