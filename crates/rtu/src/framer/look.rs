@@ -37,6 +37,16 @@ impl Framer {
         if expected && let Some(look) = self.look_for_own(here, is_over) {
             return look;
         }
+        // Its own account of its length agrees with what was asked for: nothing shorter can be it. Said before anything is
+        // weighed, for who hands bytes over one by one.
+        if let [_, READ_HOLDING, bytes, ..] = *here
+            && here.len() < EXCEPTION_ADU + usize::from(bytes)
+            && expected
+            && !is_over
+            && self.answer_len() == Some(EXCEPTION_ADU + usize::from(bytes))
+        {
+            return Look::Wait;
+        }
         let mut error = None;
         let mut incomplete = false;
         for len in self.lengths(here, expected, fresh).into_iter().flatten() {
