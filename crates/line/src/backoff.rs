@@ -2,10 +2,11 @@
 //!
 //! A rule over time, which is an argument; who waits for what is not known here.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
+
+use crate::by_unit::ByUnit;
 
 /// After so many calls in a row that brought silence a unit counts as dead. One may be a single bad moment.
 const DEAD_AFTER: u32 = 2;
@@ -35,7 +36,7 @@ pub(crate) enum Verdict {
 ///
 /// The verdict holds for who has the line: of two who asked for it while they waited, the second would be told the same.
 #[derive(Debug, Default)]
-pub(crate) struct DeadUnits(BTreeMap<UnitAddress, Known>);
+pub(crate) struct DeadUnits(ByUnit<Known>);
 
 #[derive(Debug, Default)]
 struct Known {
@@ -51,13 +52,13 @@ struct Known {
 impl DeadUnits {
     /// `unit` answered at `now`, or refused.
     pub(crate) fn answered(&mut self, unit: UnitAddress, now: Instant) {
-        self.0.insert(unit, Known { answered: Some(now), ..Known::default() });
+        *self.0.of(unit) = Known { answered: Some(now), ..Known::default() };
     }
 
     /// A call to `unit`, with all its attempts, brought silence, and ended at `now`.
     pub(crate) fn silent(&mut self, unit: UnitAddress, now: Instant) {
         let shared = self.is_shared(now);
-        let known = self.0.entry(unit).or_default();
+        let known = self.0.of(unit);
         known.silent = known.silent.saturating_add(1);
         known.since = now;
         // Only a wait that was waited makes the next one longer. After a power cut all units come back within a second.
@@ -70,7 +71,7 @@ impl DeadUnits {
 
     /// Whether `unit` may be asked at `now`.
     pub(crate) fn verdict(&self, unit: UnitAddress, now: Instant) -> Verdict {
-        match self.0.get(&unit) {
+        match self.0.get(unit) {
             Some(known) if known.is_dead() && self.is_shared(now) => {
                 let until = known.since + known.period;
                 if now < until { Verdict::Wait(until) } else { Verdict::AskOnce }
@@ -81,7 +82,7 @@ impl DeadUnits {
 
     /// Whether anybody who answers uses the line.
     fn is_shared(&self, now: Instant) -> bool {
-        self.0.values().any(|known| known.is_alive(now))
+        self.0.iter().any(|known| known.is_alive(now))
     }
 }
 

@@ -89,7 +89,7 @@ impl<'b, 'r> Call<'b, 'r> {
 
     /// Asks until it is answered, refused or given up.
     pub(crate) fn run(
-        self,
+        &mut self,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
@@ -99,7 +99,7 @@ impl<'b, 'r> Call<'b, 'r> {
 
     /// As [`run`](Self::run), for who has the turn.
     pub(crate) fn run_in(
-        mut self,
+        &mut self,
         mut turn: Turn<'b>,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
@@ -111,9 +111,9 @@ impl<'b, 'r> Call<'b, 'r> {
         }
         let mut course = Course::new(self.ask.timeout, self.retries);
         let result = match (self.ask.request, self.read_back) {
-            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, &mut course, self.retries, give_up, take),
+            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
             (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
-            _ => self.repeat(&mut turn, &mut course, 0, give_up, take),
+            _ => self.once(&mut turn, &mut course, give_up, take),
         };
         if let Some(unit) = self.unit {
             let mut owner = self.bus.lock();
@@ -207,17 +207,27 @@ impl<'b, 'r> Call<'b, 'r> {
         Ok(())
     }
 
-    /// Asks, and asks again up to `retries` times while nothing comes of it.
+    /// Asks what may be asked once only.
+    fn once(
+        &self,
+        turn: &mut Turn<'b>,
+        course: &mut Course,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        course.go_on_with(self.ask.timeout, 0);
+        self.repeat(turn, course, give_up, take)
+    }
+
+    /// Asks, and asks again as often as `course` says while nothing comes of it.
     fn repeat(
         &self,
         turn: &mut Turn<'b>,
         course: &mut Course,
-        retries: u32,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let mut lost = None;
-        course.go_on_with(self.ask.timeout, retries);
         loop {
             let asked = course.asked();
             let error = match self.attempt(turn, course, give_up, take) {
@@ -254,16 +264,16 @@ impl<'b, 'r> Call<'b, 'r> {
         let written = match *self.ask.request {
             Request::WriteSingle { value, .. } => vec![value],
             Request::WriteMultiple { words, .. } => words.iter().collect(),
-            _ => return self.repeat(turn, course, 0, give_up, take),
+            _ => return self.once(turn, course, give_up, take),
         };
         let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
         let Ok(read) = Request::read(address, count) else {
-            return self.repeat(turn, course, 0, give_up, take);
+            return self.once(turn, course, give_up, take);
         };
         let mut writing = Call { ..*self };
         let (mut times, mut before) = (0, None);
         loop {
-            let outcome = writing.repeat(turn, course, 0, give_up, take);
+            let outcome = writing.once(turn, course, give_up, take);
             let is_unproven = course.take_unproven();
             let mut error = match outcome {
                 Ok(done) if !is_unproven => return Ok(done),
@@ -285,7 +295,8 @@ impl<'b, 'r> Call<'b, 'r> {
             let ask = Ask { request: &read, in_doubt: false, ..self.ask };
             let reading = Call { ask, read_back: None, ..writing };
             let mut shows = Vec::new();
-            let outcome = reading.repeat(turn, course, self.retries, give_up, &mut |answer| {
+            course.go_on_with(self.ask.timeout, self.retries);
+            let outcome = reading.repeat(turn, course, give_up, &mut |answer| {
                 if let Answer::Read { words, .. } = answer {
                     shows = words.iter().collect();
                 }

@@ -204,31 +204,33 @@ impl Queue {
     ///
     /// Nobody counts on a thread that has had its turn and comes back: first it tells what came of it, and who is told may
     /// take long.
-    pub(crate) fn call_next(&self, mut state: MutexGuard<'_, State>) {
+    pub(crate) fn call_next(&self, state: MutexGuard<'_, State>) {
         if state.owner.is_some() {
             return;
         }
-        let mut refused = Vec::new();
         match state.order.next() {
             Some(Waiter::Thread(thread)) => thread.unpark(),
-            Some(Waiter::Work(_)) => {
-                let is_stop = state.order.next_ticket().is_some_and(|ticket| ticket.is_stop());
-                if state.crew.call(is_stop) {
-                    self.called.notify_one();
-                }
-                if state.crew.is_empty() {
-                    // The system gives no thread: who waits is told so, instead of waiting for ever.
-                    refused = state.order.dismiss(|waiter| matches!(waiter, Waiter::Work(_)));
-                    if let Some(Waiter::Thread(thread)) = state.order.next() {
-                        thread.unpark();
-                    }
-                }
-            }
+            Some(Waiter::Work(_)) => self.call_crew(state),
             None => {}
         }
-        // Who is told may want the queue, and may take long.
-        drop(state);
-        drop(refused);
+    }
+
+    /// Calls one of the crew to the work that is next.
+    fn call_crew(&self, mut state: MutexGuard<'_, State>) {
+        let is_stop = state.order.next_ticket().is_some_and(|ticket| ticket.is_stop());
+        if state.crew.call(is_stop) {
+            self.called.notify_one();
+        }
+        if state.crew.is_empty() {
+            // The system gives no thread: who waits is told so, instead of waiting for ever.
+            let refused = state.order.dismiss(|waiter| matches!(waiter, Waiter::Work(_)));
+            if let Some(Waiter::Thread(thread)) = state.order.next() {
+                thread.unpark();
+            }
+            // Who is told may want the queue, and may take long.
+            drop(state);
+            drop(refused);
+        }
     }
 }
 

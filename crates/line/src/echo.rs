@@ -71,11 +71,20 @@ impl Owner {
         result: Result<Done, Box<CallError>>,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<Done, Box<CallError>> {
-        let done = result?;
+        if self.echo == AdapterEcho::Auto { self.unless_it_echoes(ask, result?, give_up) } else { result }
+    }
+
+    #[cold]
+    fn unless_it_echoes(
+        &mut self,
+        ask: &Ask<'_>,
+        done: Done,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Done, Box<CallError>> {
         let Destination::Unit(unit) = ask.destination else {
             return Ok(done);
         };
-        if self.echo != AdapterEcho::Auto || !ask.request.expected().may_repeat_request() {
+        if !ask.request.expected().may_repeat_request() {
             return Ok(done);
         }
         // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.

@@ -107,7 +107,8 @@ fn follow(
 
     let mut pace = line.char_time().map(Pace::new);
     let mut buffer = [0; 256];
-    let mut quiet_since = None;
+    // The end of the request.
+    let mut out = None;
     // What is queued already is no answer, and the line was not silent while it came: read without waiting.
     let mut until = now;
     // The end of the time-out, when the request is out; whether nobody was looking since the last bytes came.
@@ -124,7 +125,6 @@ fn follow(
         };
         let came = rest.len();
         if came > 0 {
-            quiet_since = quiet_since.map(|_| now);
             arrivals.came(now, came, || !slept && master.lacks() > 0);
         }
         slept = false;
@@ -136,7 +136,7 @@ fn follow(
                     sent = Some(now);
                     match line.send(frame) {
                         Ok(end) => {
-                            quiet_since = Some(end);
+                            out = Some(end);
                             master.sent(end);
                             limit = end + ask.timeout;
                         }
@@ -159,7 +159,7 @@ fn follow(
                 master.abort(now);
                 return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
             }
-            let quiet = quiet_since.map_or(Duration::ZERO, |since| now.saturating_duration_since(since));
+            let quiet = out.map_or(Duration::ZERO, |out| now.saturating_duration_since(arrivals.last().max(out)));
             if quiet >= STOP_WAITS && ask.yields.is_some_and(Queue::has_stop) {
                 master.abort(now);
                 return Err(ask.failed(Failure::NoAnswer { timeout: quiet, attempts: 1 }, sent, now, &[]));

@@ -8,6 +8,7 @@
 mod attempt;
 mod backoff;
 mod bus;
+mod by_unit;
 mod call;
 pub mod clock;
 mod course;

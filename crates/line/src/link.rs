@@ -1,10 +1,9 @@
 //! How well each unit could be reached lately: whether a motor should be started over such a link.
 
-use std::collections::BTreeMap;
-
 use drivebus_rtu::UnitAddress;
 
 use crate::PortErrorKind;
+use crate::by_unit::ByUnit;
 use crate::error::{CallError, Failure};
 use crate::exchange::Done;
 
@@ -26,7 +25,7 @@ const REMEMBERED: u32 = 10;
 
 /// The links of a line.
 #[derive(Debug, Default)]
-pub(crate) struct Links(BTreeMap<UnitAddress, Ring>);
+pub(crate) struct Links(ByUnit<Ring>);
 
 /// The last outcomes; the latest is the lowest bit, and 1 is good.
 #[derive(Debug, Default)]
@@ -43,14 +42,14 @@ impl Links {
             Err(error) => good(&error.failure),
         };
         if let Some(good) = good {
-            self.0.entry(unit).or_default().push(good);
+            self.0.of(unit).push(good);
         }
         good
     }
 
     /// How well `unit` could be reached; nothing asked if it never was.
     pub(crate) fn of(&self, unit: UnitAddress) -> Link {
-        self.0.get(&unit).map(Ring::link).unwrap_or_default()
+        self.0.get(unit).map(Ring::link).unwrap_or_default()
     }
 }
 

@@ -211,6 +211,11 @@ impl Arrivals {
         Self { first: Instant::ZERO, last: Instant::ZERO, count: 0, longest: NEVER_MINDED }
     }
 
+    /// When something came last; the start of the clock where nothing did.
+    pub(crate) const fn last(&self) -> Instant {
+        self.last
+    }
+
     /// `count` bytes came at `now`. `has_begun`: whether an answer had before them, and they were waited for since.
     pub(crate) fn came(&mut self, now: Instant, count: usize, has_begun: impl FnOnce() -> bool) {
         if self.count == 0 {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
 use crate::backoff::DeadUnits;
 use crate::echo::AdapterEcho;
@@ -281,9 +281,8 @@ impl Owner {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
         };
-        let ask = &self.within_patience(ask);
         let is_silent = unit.is_some_and(|unit| !self.heard[usize::from(unit.get())]);
-        let ask = &Ask { yields: ask.yields.filter(|_| is_silent), ..*ask };
+        let ask = &Ask { timeout: self.patience(ask), yields: ask.yields.filter(|_| is_silent), ..*ask };
         let result = match self.line.as_deref_mut() {
             Some(line) => {
                 let usual = unit.and_then(|unit| self.delays.longest(unit));
@@ -325,9 +324,12 @@ impl Owner {
             Ok(_) => true,
             Err(error) => error.sent.is_some(),
         };
+        let has_seen_more = tally != Tally::default();
         self.stats().count(unit, |counters| {
             counters.requests += u64::from(sent);
-            counters.add(tally);
+            if has_seen_more {
+                counters.add(tally);
+            }
             match &result {
                 Ok(done) => {
                     counters.answered(done.ended.saturating_duration_since(done.sent), delay.unwrap_or_default());
@@ -349,14 +351,14 @@ impl Owner {
         result
     }
 
-    /// `ask`, with the time-out that its unit's answers have taught, if that is to hold for it and is shorter.
-    fn within_patience<'a>(&self, ask: &Ask<'a>) -> Ask<'a> {
+    /// The time-out that the unit's answers have taught, if that is to hold for `ask` and is shorter than its own.
+    fn patience(&self, ask: &Ask<'_>) -> Duration {
         match (ask.destination, ask.request) {
             (Destination::Unit(unit), Request::ReadHolding { .. }) if ask.learns => {
                 let learned = self.delays.patience(unit).map(|patience| patience + self.answer_time(ask));
-                Ask { timeout: learned.map_or(ask.timeout, |learned| learned.min(ask.timeout)), ..*ask }
+                learned.map_or(ask.timeout, |learned| learned.min(ask.timeout))
             }
-            _ => *ask,
+            _ => ask.timeout,
         }
     }
 

@@ -1,11 +1,11 @@
 //! The way back after a request was left open: which word to echo, and what to try with units that do not echo.
 
-use std::collections::BTreeMap;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::atomic::{AtomicU16, Ordering};
 
 use drivebus_rtu::{Instant, Master, Request, UnitAddress};
 
+use crate::by_unit::ByUnit;
 use crate::error::CallError;
 
 /// How often one attempt echoes a unit that is known to return echoes.
@@ -99,7 +99,7 @@ enum Echo {
 
 /// What is known of the units that were asked.
 #[derive(Debug, Default)]
-pub(crate) struct Resync(BTreeMap<UnitAddress, Known>);
+pub(crate) struct Resync(ByUnit<Known>);
 
 #[derive(Debug, Default)]
 struct Known {
@@ -129,7 +129,7 @@ impl Known {
 impl Resync {
     /// `unit` answered `request`, or refused it.
     pub(crate) fn answered(&mut self, unit: UnitAddress, request: &Request<'_>, refused: bool) {
-        let known = self.0.entry(unit).or_default();
+        let known = self.0.of(unit);
         known.alive = true;
         match request {
             Request::Echo { .. } => {
@@ -152,7 +152,7 @@ impl Resync {
         tried: &Tried,
         in_time: bool,
     ) -> Option<Probe> {
-        let known = self.0.entry(unit).or_default();
+        let known = self.0.of(unit);
         let again = match known.echo {
             Some(Echo::Returned) => in_time && tried.echoes < ECHOES,
             // What it says of one echo it says of each.
@@ -195,24 +195,22 @@ impl Resync {
 
     /// Whether `unit` refuses echoes, or is silent on them.
     pub(crate) fn knows_no_echo(&self, unit: UnitAddress) -> bool {
-        self.0.get(&unit).is_some_and(Known::knows_no_echo)
+        self.0.get(unit).is_some_and(Known::knows_no_echo)
     }
 
     /// Whether `unit` has refused the latest echo that it answered.
     pub(crate) fn refuses_echoes(&self, unit: UnitAddress) -> bool {
-        self.0.get(&unit).is_some_and(|known| known.echo == Some(Echo::Refused))
+        self.0.get(unit).is_some_and(|known| known.echo == Some(Echo::Refused))
     }
 
     /// `unit` owes nothing.
     pub(crate) fn is_sure(&mut self, unit: UnitAddress) {
-        if let Some(known) = self.0.get_mut(&unit) {
-            known.other_reads = 0;
-        }
+        self.0.of(unit).other_reads = 0;
     }
 
     /// `unit` was silent on an echo.
     pub(crate) fn silent_on_echo(&mut self, unit: UnitAddress) {
-        let known = self.0.entry(unit).or_default();
+        let known = self.0.of(unit);
         known.silent_echoes = known.silent_echoes.saturating_add(1);
         // Another unit may have its address now.
         if known.silent_echoes >= SILENT_FOR_GOOD {

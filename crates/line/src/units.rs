@@ -1,9 +1,10 @@
 //! What is set for single units, and what their answers have taught about how long to wait for them.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
+
+use crate::by_unit::ByUnit;
 
 /// What one unit needs otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -29,7 +30,7 @@ const FLOOR: Duration = Duration::from_millis(100);
 
 /// The delays of the units of a line: from the end of a request to the first character of its answer.
 #[derive(Debug, Default)]
-pub(crate) struct Delays(BTreeMap<UnitAddress, Delay>);
+pub(crate) struct Delays(ByUnit<Delay>);
 
 #[derive(Debug, Default)]
 struct Delay {
@@ -42,7 +43,7 @@ struct Delay {
 impl Delays {
     /// `unit` took `delay` before it answered.
     pub(crate) fn answered(&mut self, unit: UnitAddress, delay: Duration) {
-        let known = self.0.entry(unit).or_default();
+        let known = self.0.of(unit);
         if known.last.len() < REMEMBERED {
             known.last.push(delay);
         } else {
@@ -57,17 +58,17 @@ impl Delays {
 
     /// `unit` did not answer in the time that was learned: what was usual is not any more.
     pub(crate) fn silent(&mut self, unit: UnitAddress) {
-        self.0.remove(&unit);
+        *self.0.of(unit) = Delay::default();
     }
 
     /// The longest delay that is remembered of `unit`, if any is.
     pub(crate) fn longest(&self, unit: UnitAddress) -> Option<Duration> {
-        self.0.get(&unit).map(|known| known.longest)
+        self.0.get(unit).filter(|known| !known.last.is_empty()).map(|known| known.longest)
     }
 
     /// How long to wait for the first character of an answer of `unit`; `None` while too little is known.
     pub(crate) fn patience(&self, unit: UnitAddress) -> Option<Duration> {
-        let known = self.0.get(&unit).filter(|known| known.last.len() >= ENOUGH)?;
+        let known = self.0.get(unit).filter(|known| known.last.len() >= ENOUGH)?;
         Some(known.longest.saturating_mul(MARGIN).max(FLOOR))
     }
 }
