@@ -68,12 +68,13 @@ impl Known {
         }
     }
 
-    /// The master takes number `unit` for one that owes nothing: true only where all that it owed may have come. That is
-    /// open no more.
-    pub(crate) fn may_be_free(&mut self, unit: u8, stream: &[u8]) -> bool {
-        let all = self.open.iter().all(|open| open.is_echo() || open.may_have_come(unit, stream));
+    /// The master takes number `unit` at `now` for one that owes nothing: true only where all that it owed may have come, or
+    /// is waited for no longer. What may have come is open no more.
+    pub(crate) fn may_be_free(&mut self, now: Instant, unit: u8, stream: &[u8]) -> bool {
+        let is_past = |open: &Open| !self.echoed && now >= open.given_up + PATIENCE;
+        let all = self.open.iter().all(|open| open.is_echo() || is_past(open) || open.may_have_come(unit, stream));
         if all {
-            self.open.retain(Open::is_echo);
+            self.open.retain(|open| open.is_echo() || is_past(open));
         }
         all
     }

@@ -313,7 +313,7 @@ impl Run {
                     }
                     (false, true) => {
                         let is_sure = !known.is_doubtful(now) || !is_apart || self.is_crowded || job.in_doubt;
-                        assert!(is_sure || known.may_be_free(unit, &self.stream), "a refusal that may be late");
+                        assert!(is_sure || known.may_be_free(now, unit, &self.stream), "a refusal that may be late");
                     }
                     (false, false) if self.is_crowded || may_be_apart => {
                         if UnitAddress::new(unit).is_ok_and(|unit| !self.master.in_quarantine(now, unit)) {
@@ -372,7 +372,8 @@ impl Run {
             let unit = UnitAddress::new(number).unwrap_or(UnitAddress::MIN);
             let in_quarantine = self.master.in_quarantine(self.now, unit);
             let known = &mut self.units[usize::from(number)];
-            let is_free = in_quarantine || !known.is_doubtful(self.now) || known.may_be_free(number, &self.stream);
+            let is_free =
+                in_quarantine || !known.is_doubtful(self.now) || known.may_be_free(self.now, number, &self.stream);
             assert!(is_free, "unit {number} is free, {known:?}");
             let may_owe = !known.open.is_empty() || known.is_strange(self.now);
             assert!(!in_quarantine || may_owe || self.is_crowded, "unit {number} owes nothing");
