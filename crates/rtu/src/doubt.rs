@@ -90,7 +90,7 @@ struct Open {
     unit: UnitAddress,
     expected: Expected,
     count: u8,
-    /// When the latest of them was given up.
+    /// When the latest of them was given up, or the one that it displaced.
     given_up: Instant,
     /// The same, or when the latest answer was taken that one of them may have been.
     last: Instant,
@@ -146,25 +146,27 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.enter(now, unit, expected, window(timeout));
+        self.enter(now, unit, expected, window(timeout), now);
         self.open.insert(unit);
     }
 
     /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
-        self.enter(now, unit, expected, window);
+        self.enter(now, unit, expected, window, now);
     }
 
-    fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
+    /// `since`: when the answer was given up that started it.
+    fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration, since: Instant) {
+        let last = capped(now, since, window);
         let alike = |open: &Open| {
             open.unit == unit && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
         };
         if let Some(open) = self.ledger.iter_mut().flatten().find(|open| alike(open)) {
             let over = open.is_past(now) && !self.open.contains(unit) && !expected.is_echo();
             open.count = if over { 1 } else { open.count.saturating_add(1) };
-            open.given_up = now;
-            open.last = now;
+            open.given_up = open.given_up.max(since);
+            open.last = open.last.max(last);
             open.window = if over { window } else { open.window.max(window) };
             if expected.is_echo() && open.count >= MUTE {
                 self.echoers.remove(unit);
@@ -172,7 +174,7 @@ impl Doubts {
             return;
         }
         self.listed.insert(unit);
-        let open = Open { unit, expected, count: 1, given_up: now, last: now, window };
+        let open = Open { unit, expected, count: 1, given_up: since, last, window };
         let over = |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && open.is_past(now));
         if let Some(place) = self.ledger.iter().position(over) {
             self.ledger[place] = Some(open);
@@ -306,14 +308,14 @@ impl Doubts {
                 open.expected.could_pass_for(expected) || (refused && open.expected.function() == expected.function());
             if open.unit == unit && rival && !open.is_past(now) {
                 open.window = open.window.max(window(timeout));
-                open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));
+                open.last = capped(now, open.given_up, open.window);
                 if open.expected != expected {
-                    displaced = displaced.max(Some(open.window));
+                    displaced = displaced.max(Some((open.given_up, open.window)));
                 }
             }
         }
-        if let Some(window) = displaced {
-            self.enter(now, unit, expected, window);
+        if let Some((since, window)) = displaced {
+            self.enter(now, unit, expected, window, since);
         }
     }
 
@@ -390,6 +392,11 @@ impl Doubts {
             self.listed.remove(unit);
         }
     }
+}
+
+/// When, `now` or before, an answer counts as open that was given up at `given_up`, or displaced one that was.
+fn capped(now: Instant, given_up: Instant, window: Duration) -> Instant {
+    now.min(given_up + window.saturating_mul(LONGEST - 1))
 }
 
 /// How long an answer may be overtaken that was waited for for `timeout`.

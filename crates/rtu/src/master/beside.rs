@@ -51,6 +51,11 @@ impl Beside {
         rest
     }
 
+    /// Whether `len` bytes more can be kept.
+    pub(super) const fn has_room_for(&self, len: usize) -> bool {
+        len <= CAPACITY - self.len
+    }
+
     /// What is added next came in the place of the answer.
     pub(super) fn spoils(&mut self, why: Why) {
         self.spoilt.get_or_insert((self.len, why));

@@ -25,7 +25,7 @@ impl Master {
             match step {
                 Step::Skipped { range, error, expected: is_damaged } => {
                     if is_damaged {
-                        self.beside.spoils(Why::Damaged(error));
+                        self.spoils(&range, Why::Damaged(error));
                     }
                     self.add_beside(range);
                     if !is_damaged && self.framer.pending().is_empty() {
@@ -71,7 +71,7 @@ impl Master {
                             self.tally.add_late();
                         }
                         Err(error) if self.patience.is_some() => {
-                            self.beside.spoils(Why::Wrong(error));
+                            self.spoils(&range, Why::Wrong(error));
                             self.add_beside(range);
                         }
                         outcome => {
@@ -193,6 +193,15 @@ impl Master {
             self.torn.forget();
         }
         self.tally.add_own_remnant(self.beside.holds_remnant_of(self.request.as_bytes()));
+    }
+
+    /// What came at `range` came in the place of the answer: noise gives way to it.
+    fn spoils(&mut self, range: &Range<usize>, why: Why) {
+        if !self.beside.is_spoilt() && !self.beside.has_room_for(range.len()) {
+            self.give_account(false);
+            self.beside.clear();
+        }
+        self.beside.spoils(why);
     }
 
     fn add_beside(&mut self, range: Range<usize>) {

@@ -77,6 +77,24 @@ fn the_event_of_a_wrong_answer_holds_what_came_behind_it_too() {
     }
 }
 
+/// Noise gives way to it where there is no room for both.
+#[test]
+fn a_damaged_answer_is_told_behind_any_noise() {
+    let mut damaged = words(unit(1), 1, 0x5555).as_bytes().to_vec();
+    damaged[3] ^= 0x10;
+    for before in [0, 500, 505, 506, 511, 512, 513, 2_000] {
+        let mut asker = patient();
+        asker.sends(0, unit(1), &read(1), TIMEOUT);
+        vec![0x55; before].chunks(100).for_each(|bytes| comes(&mut asker, 1, bytes));
+        comes(&mut asker, 1, &damaged);
+        match asker.master.poll(ms(11)) {
+            Some(Event::Corrupt { error: FrameError::Crc { .. }, bytes }) => assert_eq!(bytes, damaged, "{before}"),
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(asker.master.take_tally(), noise(before));
+    }
+}
+
 /// An adapter that sends back what it is given may lose bytes of it. What came whole is no such thing.
 #[test]
 fn what_may_be_left_of_the_request_is_told() {

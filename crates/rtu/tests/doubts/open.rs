@@ -207,6 +207,19 @@ fn a_refusal_taken_where_another_could_come_leaves_both_open() {
     assert_eq!(asker.attribution(ms(6_000), &read(1)), Attribution::Certain);
 }
 
+/// However often one refusal is taken for another's: it is one answer that is late.
+#[test]
+fn refusals_taken_for_each_other_are_believed_three_times_over_at_most() {
+    let mut asker = Asker::new();
+    asker.leaves_open(1_000, unit(1), &read(2));
+    asker.echoes(1_000, unit(1));
+    for (taken, over, count) in [(3_000, 6_000, 1), (5_000, 8_000, 2), (7_000, 10_000, 1), (9_000, 10_000, 2)] {
+        assert_eq!(asker.asks(taken, unit(1), &read(count), &refuses(unit(1), &read(count))), Came::Refusal);
+        assert_ne!(asker.attribution(before(ms(over)), &read(2)), Attribution::Certain, "taken at {taken} ms");
+        assert_eq!(asker.attribution(ms(over), &read(2)), Attribution::Certain, "taken at {taken} ms");
+    }
+}
+
 /// 04H of a known length and of an unknown one: either may be the answer of the other.
 #[test]
 fn an_answer_that_displaced_another_kind_leaves_its_own_kind_open() {
