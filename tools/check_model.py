@@ -140,7 +140,7 @@ BREAKS = [
     Break(
         "the time counts from the latest",
         DOUBT,
-        "open.given_up = now;\n            open.last = now;",
+        "open.given_up = open.given_up.max(since);\n            open.last = open.last.max(last);",
         "",
         "in-order --lingers 0 --faults 0",
     ),
@@ -240,22 +240,29 @@ BREAKS = [
     Break(
         "what is taken may have been the open one",
         DOUBT,
-        "open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));",
+        "open.last = capped(now, open.given_up, open.window);",
         "",
         "in-order --requests 3 --lingers 1",
     ),
     Break(
         "but not for ever",
         DOUBT,
-        "open.last = now.min(open.given_up + open.window.saturating_mul(LONGEST - 1));",
+        "open.last = capped(now, open.given_up, open.window);",
         "open.last = now;",
         "in-order-commands --requests 4 --refusals 0",
     ),
     Break(
+        "nor where another kind displaces it",
+        DOUBT,
+        "self.enter(now, unit, expected, window, since);",
+        "self.enter(now, unit, expected, window, now.max(since));",
+        "damaged-again --requests 4 --refusals 1",
+    ),
+    Break(
         "a refusal may have been another's",
         DOUBT,
-        "self.enter(now, unit, expected, window);\n        }\n    }",
-        "let _ = window;\n        }\n    }",
+        "self.enter(now, unit, expected, window, since);\n        }\n    }",
+        "let _ = (window, since);\n        }\n    }",
         "overtaking --requests 5 --faults 0 --refusals 1",
     ),
     Break(
