@@ -336,8 +336,8 @@ impl Run {
                 let refused =
                     matches!(error, AnswerError::Refusal { .. }) && job.asked.pdu[0] == 3 && !known.open.is_empty();
                 assert_eq!(job.asked.judge(pdu), if refused { Verdict::Refusal } else { Verdict::Wrong });
-                // What is open for longer than it may come is late no more.
-                let owes = known.holds(now);
+                // What was seen, or is open for longer than it may come, is late no more.
+                let owes = !known.may_be_free(now, unit, &self.stream);
                 assert!(!(owes && is_echo && matches!(error, AnswerError::Echo { .. })), "a late echo is no answer");
                 assert!(heard.windows(frame.len()).any(|part| part == frame));
                 // An answer proves that the request has left, whatever was computed.
