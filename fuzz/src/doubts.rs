@@ -12,13 +12,18 @@ const MUTE: usize = 5;
 pub(crate) struct Open {
     pub(crate) asked: Asked,
     given_up: Instant,
-    /// How many bytes had come on the line by then.
+    /// How many bytes had come on the line when it was sent.
     place: usize,
 }
 
 impl Open {
     pub(crate) fn is_echo(&self) -> bool {
         self.asked.pdu[0] == 8
+    }
+
+    /// Whether nobody waits for its answer any more: a unit that is known to return echoes is waited for until it does.
+    fn is_past(&self, now: Instant, echoed: bool) -> bool {
+        !echoed && now >= self.given_up + PATIENCE
     }
 
     /// Whether its answer may have come from `unit` since, by what came on the line.
@@ -49,7 +54,7 @@ impl Known {
 
     /// Whether nobody who knows all this would ask it as if nothing were open.
     pub(crate) fn is_doubtful(&self, now: Instant) -> bool {
-        let owed = |open: &Open| !open.is_echo() && (self.echoed || now < open.given_up + PATIENCE);
+        let owed = |open: &Open| !open.is_echo() && !open.is_past(now, self.echoed);
         self.is_strange(now) || self.open.iter().any(owed)
     }
 
@@ -59,7 +64,7 @@ impl Known {
         !self.open.is_empty() && (self.echoed || self.open.iter().any(recent))
     }
 
-    /// It left `asked` open, which was given up at `now`, when so many bytes had come on the line.
+    /// It left `asked` open, which was sent when `place` bytes had come on the line, and given up at `now`.
     pub(crate) fn leave_open(&mut self, asked: Asked, now: Instant, place: usize) {
         self.open.push(Open { asked, given_up: now, place });
         let is_echo = self.open.last().is_some_and(Open::is_echo);
@@ -71,10 +76,13 @@ impl Known {
     /// The master takes number `unit` at `now` for one that owes nothing: true only where all that it owed may have come, or
     /// is waited for no longer. What may have come is open no more.
     pub(crate) fn may_be_free(&mut self, now: Instant, unit: u8, stream: &[u8]) -> bool {
-        let is_past = |open: &Open| !self.echoed && now >= open.given_up + PATIENCE;
-        let all = self.open.iter().all(|open| open.is_echo() || is_past(open) || open.may_have_come(unit, stream));
+        let echoed = self.echoed;
+        let all = self
+            .open
+            .iter()
+            .all(|open| open.is_echo() || open.is_past(now, echoed) || open.may_have_come(unit, stream));
         if all {
-            self.open.retain(|open| open.is_echo() || is_past(open));
+            self.open.retain(|open| open.is_echo() || open.is_past(now, echoed));
         }
         all
     }
@@ -89,9 +97,9 @@ impl Known {
         self.reads_like(pdu).next().is_some()
     }
 
-    /// Whether the answer to a read like `pdu` cannot have come from number `unit` yet.
-    pub(crate) fn owes_read_like(&self, pdu: &[u8], unit: u8, stream: &[u8]) -> bool {
-        self.reads_like(pdu).any(|open| !open.may_have_come(unit, stream))
+    /// Whether the answer to a read like `pdu` cannot have come from number `unit` by `now`, and is still waited for.
+    pub(crate) fn owes_read_like(&self, now: Instant, pdu: &[u8], unit: u8, stream: &[u8]) -> bool {
+        self.reads_like(pdu).any(|open| !open.is_past(now, self.echoed) && !open.may_have_come(unit, stream))
     }
 
     fn reads_like(&self, pdu: &[u8]) -> impl Iterator<Item = &Open> {

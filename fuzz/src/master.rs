@@ -63,6 +63,8 @@ struct Progress {
     limit: Instant,
     /// It went out.
     transmitted: bool,
+    /// How many bytes had come on the line by then.
+    place: usize,
     /// What came since.
     heard: Vec<u8>,
 }
@@ -171,7 +173,7 @@ impl Run {
         }
         let other_read = matches!(request, Request::ReadHolding { .. })
             && !known.is_strange(self.now)
-            && !known.owes_read_like(&pdu_of(&request), destination.to_wire(), &self.stream);
+            && !known.owes_read_like(self.now, &pdu_of(&request), destination.to_wire(), &self.stream);
         assert!(!doubtful || is_echo || in_doubt || other_read, "a unit in quarantine was asked {request:?}");
         let length = match kind & 7 {
             6 => Length::Any,
@@ -187,7 +189,7 @@ impl Run {
     /// Sees the request to its end: what comes before it goes out, while it does, and after it.
     fn follow(&mut self, job: &Job, input: &mut Input<'_>) {
         let mut progress =
-            Progress { limit: self.now + self.silence + job.timeout, transmitted: false, heard: Vec::new() };
+            Progress { limit: self.now + self.silence + job.timeout, transmitted: false, place: 0, heard: Vec::new() };
         let mut coming = match input.byte() {
             7 => self.lumps.next(input, &self.sent),
             0xFF => return self.give_up(job, &progress),
@@ -241,12 +243,12 @@ impl Run {
     fn give_up(&mut self, job: &Job, progress: &Progress) {
         let was_sent = self.master.abort(self.now);
         assert_eq!(was_sent, progress.transmitted);
-        self.leave_open(job, was_sent);
+        self.leave_open(job, was_sent, progress.place);
     }
 
     /// Judges what the master says; whether that ends the request.
     fn hear(&mut self, job: &Job, progress: &mut Progress, said: Said, input: &mut Input<'_>) -> bool {
-        let Progress { limit, transmitted, heard } = progress;
+        let Progress { limit, transmitted, place, heard } = progress;
         if let Said::Transmit(frame) = said {
             assert!(!*transmitted, "sent twice");
             assert_eq!(frame, job.frame);
@@ -254,6 +256,7 @@ impl Run {
             assert!(self.now >= quiet_from + self.silence, "the silence before a request was cut short");
             self.sent.push(frame);
             *transmitted = true;
+            *place = self.stream.len();
             assert_eq!(self.master.deadline(), None);
             let end = self.now + Duration::from_micros(573) * u32::try_from(job.frame.len()).unwrap_or(0);
             // What is whole before the request has left is no answer to it; what has only begun may become one.
@@ -277,12 +280,12 @@ impl Run {
                 return true;
             }
         };
-        let (now, place, is_echo) = (self.now, self.stream.len(), job.asked.pdu[0] == 8);
+        let (now, place, is_echo) = (self.now, *place, job.asked.pdu[0] == 8);
         let known = &mut self.units[usize::from(unit)];
         let is_apart = job.asked.pdu[0] == 3 && !known.is_strange(now) && !known.has_read_like(&job.asked.pdu);
         let may_be_apart = job.asked.pdu[0] == 3
             && !known.is_strange(now)
-            && !known.owes_read_like(&job.asked.pdu, unit, &self.stream);
+            && !known.owes_read_like(now, &job.asked.pdu, unit, &self.stream);
         match said {
             Said::Answer { pdu, exception } => {
                 let verdict = job.asked.judge(&pdu);
@@ -342,15 +345,15 @@ impl Run {
                 assert!(heard.windows(frame.len()).any(|part| part == frame));
                 // An answer proves that the request has left, whatever was computed.
                 self.request_left = self.request_left.min(self.now);
-                self.leave_open(job, true);
+                self.leave_open(job, true, place);
             }
             Said::Corrupt(bytes) => {
                 assert!(!bytes.is_empty() && heard.windows(bytes.len()).any(|part| part == bytes));
-                self.leave_open(job, true);
+                self.leave_open(job, true, place);
             }
             Said::NoAnswer(bytes) => {
                 assert!(self.now >= *limit && heard.ends_with(&bytes));
-                self.leave_open(job, true);
+                self.leave_open(job, true, place);
             }
             Said::Busy => assert!(self.now >= *limit),
             Said::BroadcastDone | Said::Transmit(_) => unreachable!("{said:?} to a request for one unit"),
@@ -358,9 +361,9 @@ impl Run {
         true
     }
 
-    fn leave_open(&mut self, job: &Job, sent: bool) {
+    fn leave_open(&mut self, job: &Job, sent: bool, place: usize) {
         if let (Destination::Unit(unit), true) = (job.destination, sent) {
-            self.units[usize::from(unit.get())].leave_open(job.asked.clone(), self.now, self.stream.len());
+            self.units[usize::from(unit.get())].leave_open(job.asked.clone(), self.now, place);
             self.is_crowded |= self.units.iter().map(|known| known.open.len()).sum::<usize>() > REMEMBERED;
         }
     }

@@ -100,6 +100,7 @@ mod tests {
             assert!(!looks_own(&READ, came) && !looks_own(&READ_OF_0, came), "{came:02X?}");
         }
     }
+
     #[test]
     fn of_a_long_request_the_first_bytes_are_looked_for() {
         let request: [u8; 2 * CAPACITY] = core::array::from_fn(|at| u8::try_from(at + 1).unwrap());

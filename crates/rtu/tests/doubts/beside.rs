@@ -107,6 +107,12 @@ fn what_may_be_left_of_the_request_is_told() {
     let other = confirms(unit(1), &Request::write(0x2001, 1001));
     assert_eq!(is_told(&[other.as_bytes()]), [0, 0], "a whole frame, and wrong");
     assert_eq!(is_told(&[&own[2..6], other.as_bytes()]), [1, 1], "before a whole frame");
+    let write = Request::write(0x2202, 0x1234);
+    let own = Adu::request(unit(1).into(), &write);
+    let mut damaged = own.as_bytes().to_vec();
+    damaged[5] ^= 0x10;
+    let tally = counted(&write, &[&own.as_bytes()[2..6], &damaged], false);
+    assert_eq!(tally, Tally { own_remnant: 1, ..noise(4) }, "before it and in its place: of one request");
 }
 
 /// Answers and refusals without their first byte, or the second.
