@@ -27,12 +27,38 @@ impl Open {
     }
 
     /// Whether its answer may have come from `unit` since, by what came on the line.
-    fn may_have_come(&self, unit: u8, stream: &[u8]) -> bool {
-        let frames = (self.place..stream.len()).filter(|&from| stream[from] == unit);
-        frames.into_iter().any(|from| {
-            let whole = (from + 4..=stream.len().min(from + 256)).filter_map(|to| oracle::frame(&stream[from..to]));
-            whole.into_iter().any(|(_, pdu)| self.asked.judge(pdu) == Verdict::Right)
-        })
+    fn may_have_come(&self, unit: u8, stream: &Stream) -> bool {
+        let mut frames = stream.frames.iter().filter(|(from, _)| *from >= self.place);
+        frames.any(|(_, frame)| frame[0] == unit && self.asked.judge(&frame[1..frame.len() - 2]) == Verdict::Right)
+    }
+}
+
+/// All that came on the line, and each frame of a unit that any part of it makes.
+#[derive(Default)]
+pub(crate) struct Stream {
+    pub(crate) len: usize,
+    frames: Vec<(usize, Vec<u8>)>,
+    /// What may become one: where it begins, what came of it, and the CRC of that.
+    begun: Vec<(usize, Vec<u8>, u16)>,
+}
+
+impl Stream {
+    /// `bytes` came, of units up to number `units`.
+    pub(crate) fn push(&mut self, bytes: &[u8], units: u8) {
+        for &byte in bytes {
+            if (1..=units).contains(&byte) {
+                self.begun.push((self.len, Vec::new(), oracle::EMPTY_CRC));
+            }
+            self.len += 1;
+            for (from, frame, crc) in &mut self.begun {
+                frame.push(byte);
+                *crc = oracle::crc_after(*crc, byte);
+                if *crc == 0 && frame.len() >= 4 {
+                    self.frames.push((*from, frame.clone()));
+                }
+            }
+            self.begun.retain(|(_, frame, _)| frame.len() < 256);
+        }
     }
 }
 
@@ -75,7 +101,7 @@ impl Known {
 
     /// The master takes number `unit` at `now` for one that owes nothing: true only where all that it owed may have come, or
     /// is waited for no longer. What may have come is open no more.
-    pub(crate) fn may_be_free(&mut self, now: Instant, unit: u8, stream: &[u8]) -> bool {
+    pub(crate) fn may_be_free(&mut self, now: Instant, unit: u8, stream: &Stream) -> bool {
         let echoed = self.echoed;
         let all = self
             .open
@@ -98,7 +124,7 @@ impl Known {
     }
 
     /// Whether the answer to a read like `pdu` cannot have come from number `unit` by `now`, and is still waited for.
-    pub(crate) fn owes_read_like(&self, now: Instant, pdu: &[u8], unit: u8, stream: &[u8]) -> bool {
+    pub(crate) fn owes_read_like(&self, now: Instant, pdu: &[u8], unit: u8, stream: &Stream) -> bool {
         self.reads_like(pdu).any(|open| !open.is_past(now, self.echoed) && !open.may_have_come(unit, stream))
     }
 

@@ -11,7 +11,7 @@ use drivebus_rtu::{
     Tally, UnitAddress,
 };
 
-use crate::doubts::Known;
+use crate::doubts::{Known, Stream};
 use crate::oracle::{self, Asked, Length, Verdict};
 use crate::stream::{Arrival, GAPS, Input, Lumps, SILENCE};
 use crate::told::{Said, pdu_of};
@@ -37,7 +37,7 @@ pub fn master(data: &[u8]) {
         is_crowded: false,
         sent: Vec::new(),
         fed: 0,
-        stream: Vec::new(),
+        stream: Stream::default(),
         lumps: Lumps::default(),
     };
     run.master.strip_echo(run.strips_echo);
@@ -85,7 +85,7 @@ struct Run {
     sent: Vec<Vec<u8>>,
     fed: usize,
     /// All that came.
-    stream: Vec<u8>,
+    stream: Stream,
     lumps: Lumps,
 }
 
@@ -123,7 +123,7 @@ impl Run {
             let count = self.master.receive(self.now, rest);
             assert!(count > 0 || rest.is_empty(), "no room after looking");
             self.fed += count;
-            self.stream.extend_from_slice(&rest[..count]);
+            self.stream.push(&rest[..count], UNITS);
             rest = &rest[count..];
             if count > 0 {
                 self.last_byte = self.last_byte.max(self.now);
@@ -256,7 +256,7 @@ impl Run {
             assert!(self.now >= quiet_from + self.silence, "the silence before a request was cut short");
             self.sent.push(frame);
             *transmitted = true;
-            *place = self.stream.len();
+            *place = self.stream.len;
             assert_eq!(self.master.deadline(), None);
             let end = self.now + Duration::from_micros(573) * u32::try_from(job.frame.len()).unwrap_or(0);
             // What is whole before the request has left is no answer to it; what has only begun may become one.
@@ -348,7 +348,9 @@ impl Run {
                 self.leave_open(job, true, place);
             }
             Said::Corrupt(bytes) => {
-                assert!(!bytes.is_empty() && heard.windows(bytes.len()).any(|part| part == bytes));
+                // In the order in which they came; whole frames of others may have come between them.
+                let mut rest = heard.iter();
+                assert!(!bytes.is_empty() && bytes.iter().all(|byte| rest.any(|came| came == byte)));
                 self.leave_open(job, true, place);
             }
             Said::NoAnswer(bytes) => {

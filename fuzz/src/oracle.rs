@@ -4,8 +4,15 @@
 
 /// CRC-16/MODBUS by the division that defines it: one bit at a time, as it leaves the wire.
 pub(crate) fn crc(bytes: &[u8]) -> u16 {
-    let bits = bytes.iter().flat_map(|byte| (0..8).map(move |place| u16::from(byte >> place & 1)));
-    bits.fold(0xFFFF, |register, bit| {
+    bytes.iter().fold(EMPTY_CRC, |register, &byte| crc_after(register, byte))
+}
+
+/// The CRC of nothing.
+pub(crate) const EMPTY_CRC: u16 = 0xFFFF;
+
+/// The CRC of what had `register`, and `byte` behind it. Zero behind a whole frame.
+pub(crate) fn crc_after(register: u16, byte: u8) -> u16 {
+    (0..8).map(|place| u16::from(byte >> place & 1)).fold(register, |register, bit| {
         let out = (register ^ bit) & 1;
         (register >> 1) ^ (out * 0xA001)
     })

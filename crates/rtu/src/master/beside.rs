@@ -29,14 +29,17 @@ pub(super) struct Beside {
     len: usize,
     /// Where the first thing begins that came in the place of the answer.
     spoilt: Option<(usize, Why)>,
+    /// From here on nothing else came in between.
+    in_a_row_from: usize,
 }
 
 impl Beside {
-    pub(super) const NOTHING: Self = Self { bytes: [0; CAPACITY], len: 0, spoilt: None };
+    pub(super) const NOTHING: Self = Self { bytes: [0; CAPACITY], len: 0, spoilt: None, in_a_row_from: 0 };
 
     pub(super) const fn clear(&mut self) {
         self.len = 0;
         self.spoilt = None;
+        self.in_a_row_from = 0;
     }
 
     pub(super) const fn is_empty(&self) -> bool {
@@ -56,6 +59,11 @@ impl Beside {
         len <= CAPACITY - self.len
     }
 
+    /// Something came that is not kept here: what is added next did not come right behind what is here.
+    pub(super) const fn cut(&mut self) {
+        self.in_a_row_from = self.len;
+    }
+
     /// What is added next came in the place of the answer.
     pub(super) fn spoils(&mut self, why: Why) {
         self.spoilt.get_or_insert((self.len, why));
@@ -68,7 +76,8 @@ impl Beside {
         let refusal = (expected.function() | EXCEPTION_BIT, EXCEPTION_ADU);
         let answer = expected.adu_len().map(|len| (expected.function(), len));
         for (function, len) in answer.into_iter().chain([refusal]) {
-            let tail = self.len.checked_sub(len - 1).map(|from| (from, &self.bytes[from..self.len]));
+            let from = self.len.checked_sub(len - 1).filter(|from| *from >= self.in_a_row_from);
+            let tail = from.map(|from| (from, &self.bytes[from..self.len]));
             if let Some((from, tail)) = tail.filter(|(_, tail)| lost_its_head(tail, unit, function, len)) {
                 let error = Frame::parse(tail).err().unwrap_or(FrameError::TooShort { len: tail.len() });
                 self.spoilt.get_or_insert((from, Why::Damaged(error)));
@@ -81,10 +90,10 @@ impl Beside {
         self.spoilt.is_some()
     }
 
-    /// What may be left of the answer: it broke off, or is damaged.
+    /// What may be left of the answer: it broke off, or is damaged, and nothing else came in between.
     pub(super) fn damaged(&self) -> Option<&[u8]> {
         match self.spoilt {
-            Some((from, Why::Damaged(_))) => Some(&self.bytes[from..self.len]),
+            Some((from, Why::Damaged(_))) if from >= self.in_a_row_from => Some(&self.bytes[from..self.len]),
             _ => None,
         }
     }

@@ -36,6 +36,7 @@ impl Master {
                     }
                 }
                 Step::Frame(range) if self.is_own_echo(&range, expected) => {
+                    self.beside.cut();
                     self.tally.add_own_echo();
                     self.echo_due = false;
                     self.framer.forget_own();
@@ -47,11 +48,13 @@ impl Master {
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
+                            self.beside.cut();
                             self.see(now, range.clone());
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
+                            self.beside.cut();
                             self.see(now, range);
                             self.tally.add_late();
                         }
@@ -68,6 +71,7 @@ impl Master {
                         Ok(Answer::Exception { .. })
                             if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
                         {
+                            self.beside.cut();
                             self.tally.add_late();
                         }
                         Err(error) if self.patience.is_some() => {

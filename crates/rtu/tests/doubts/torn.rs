@@ -154,3 +154,16 @@ fn one_that_comes_again_or_a_line_that_is_opened_anew_begins_the_count_again() {
     }
     assert_eq!(comes_damaged(&mut asker, 2_100, 4), 0);
 }
+
+/// What stands before a whole frame and behind it did not come in a row.
+#[test]
+fn what_a_frame_stands_between_is_no_answer_that_lost_a_byte() {
+    let answer = words(unit(1), 2, 7);
+    let other = confirms(unit(9), &Request::write(0x2001, 1000));
+    let owed = |left: &[u8]| owed(&mut patient(), 100, 1, left, Duration::from_millis(PAUSE));
+    for left in [&answer.as_bytes()[1..], &damaged(1)] {
+        assert_eq!(owed(left), 1_000, "{left:02X?}");
+        let (before, behind) = left.split_at(4);
+        assert_eq!(owed(&[before, other.as_bytes(), behind].concat()), 3_000, "{left:02X?}, split");
+    }
+}
