@@ -246,31 +246,37 @@ impl Run {
         self.leave_open(job, was_sent, progress.place);
     }
 
+    /// The request goes out.
+    fn transmit(&mut self, job: &Job, progress: &mut Progress, frame: Vec<u8>, input: &mut Input<'_>) {
+        let Progress { limit, transmitted, place, heard } = progress;
+        assert!(!*transmitted, "sent twice");
+        assert_eq!(frame, job.frame);
+        let quiet_from = self.last_byte.max(self.request_left);
+        assert!(self.now >= quiet_from + self.silence, "the silence before a request was cut short");
+        self.sent.push(frame);
+        *transmitted = true;
+        *place = self.stream.len;
+        assert_eq!(self.master.deadline(), None);
+        let end = self.now + Duration::from_micros(573) * u32::try_from(job.frame.len()).unwrap_or(0);
+        // What is whole before the request has left is no answer to it; what has only begun may become one.
+        if input.byte() & 7 == 7 {
+            for arrival in self.lumps.next(input, &self.sent) {
+                self.feed(&arrival.bytes, |_, event| assert!(event.is_none(), "{event:?} while sending"));
+                heard.extend_from_slice(&arrival.bytes);
+            }
+        }
+        self.master.sent(end);
+        self.request_left = self.request_left.max(end);
+        *limit = end + job.timeout;
+    }
+
     /// Judges what the master says; whether that ends the request.
     fn hear(&mut self, job: &Job, progress: &mut Progress, said: Said, input: &mut Input<'_>) -> bool {
-        let Progress { limit, transmitted, place, heard } = progress;
         if let Said::Transmit(frame) = said {
-            assert!(!*transmitted, "sent twice");
-            assert_eq!(frame, job.frame);
-            let quiet_from = self.last_byte.max(self.request_left);
-            assert!(self.now >= quiet_from + self.silence, "the silence before a request was cut short");
-            self.sent.push(frame);
-            *transmitted = true;
-            *place = self.stream.len;
-            assert_eq!(self.master.deadline(), None);
-            let end = self.now + Duration::from_micros(573) * u32::try_from(job.frame.len()).unwrap_or(0);
-            // What is whole before the request has left is no answer to it; what has only begun may become one.
-            if input.byte() & 7 == 7 {
-                for arrival in self.lumps.next(input, &self.sent) {
-                    self.feed(&arrival.bytes, |_, event| assert!(event.is_none(), "{event:?} while sending"));
-                    heard.extend_from_slice(&arrival.bytes);
-                }
-            }
-            self.master.sent(end);
-            self.request_left = self.request_left.max(end);
-            *limit = end + job.timeout;
+            self.transmit(job, progress, frame, input);
             return false;
         }
+        let Progress { limit, transmitted, place, heard } = progress;
         assert_eq!(*transmitted, !matches!(said, Said::Busy));
         let unit = match job.destination {
             Destination::Unit(unit) => unit.get(),
