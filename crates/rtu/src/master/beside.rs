@@ -39,7 +39,6 @@ impl Beside {
     pub(super) const fn clear(&mut self) {
         self.len = 0;
         self.spoilt = None;
-        self.in_a_row_from = 0;
     }
 
     pub(super) const fn is_empty(&self) -> bool {
@@ -48,6 +47,9 @@ impl Beside {
 
     /// Adds `bytes`, and returns what there is no room for.
     pub(super) fn add<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
+        if self.is_empty() {
+            self.in_a_row_from = 0;
+        }
         let (kept, rest) = bytes.split_at(bytes.len().min(CAPACITY - self.len));
         self.bytes[self.len..self.len + kept.len()].copy_from_slice(kept);
         self.len += kept.len();

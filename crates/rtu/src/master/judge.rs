@@ -49,13 +49,13 @@ impl Master {
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
                             self.beside.cut();
-                            self.see(now, range.clone());
+                            self.see(now, range.clone(), false);
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
                             self.beside.cut();
-                            self.see(now, range);
+                            self.see(now, range, true);
                             self.tally.add_late();
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
@@ -164,11 +164,11 @@ impl Master {
         Ok(answer)
     }
 
-    /// A frame came that answers nothing in flight.
-    fn see(&mut self, now: Instant, range: Range<usize>) {
+    /// A frame came that answers nothing in flight, although it has the unit and the function that are `awaited`, or has not.
+    fn see(&mut self, now: Instant, range: Range<usize>, awaited: bool) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
         self.torn.see(&frame);
-        self.doubts.seen(now, &frame, at_once);
+        self.doubts.seen(now, &frame, at_once, awaited);
     }
 
     /// A frame came that answers what is in flight.
@@ -236,7 +236,7 @@ impl Master {
                     self.tally.add_own_echo();
                 }
                 Step::Frame(range) => {
-                    self.see(now, range);
+                    self.see(now, range, false);
                     self.tally.add_late();
                 }
                 Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
