@@ -13,16 +13,16 @@ from typing import Any
 
 from drivebus import _native, checks, who
 from drivebus._native import SerialFormat
-from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
-from drivebus.figures import Link
 from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening, check_order, check_trust
+from drivebus.line.blocking import BlockingBus, at_once
+from drivebus.line.samples import Sample
+from drivebus.line.settings import BusFace, Opening, check_order, check_trust
+from drivebus.line.stats import Link
+from drivebus.operations.program_end import end_over
 from drivebus.poll import Poll
-from drivebus.polling import Sample
 from drivebus.profile import Profile
-from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 

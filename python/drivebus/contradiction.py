@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from drivebus.identify import code_registers, codes, no_such_address, one_of
+from drivebus.line.protocols import ProfileProtocol
 from drivebus.profile import Profile, profiles
-from drivebus.protocols import ProfileProtocol
 
 __all__ = ["Answer", "contradiction", "signature_of"]
 

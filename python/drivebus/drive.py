@@ -1,7 +1,7 @@
 """One drive on a line: commands, values, and what it says about itself, in the words of its family.
 
 Each call here carries out at once what stands, once, in `drivebus.operations`. What it needs of the line and of the
-profile stands in `drivebus.protocols`. Time is the line's clock, so everything here runs in virtual time as well.
+profile stands in `drivebus.line.protocols`. Time is the line's clock, so everything here runs in virtual time as well.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import overload
 
-from drivebus.at_once import BlockingBus, at_once, blocking, documented_by
-from drivebus.moving import Moving
-from drivebus.operations import Operations
-from drivebus.protocols import BusProtocol, ProfileProtocol
-from drivebus.setpoints import SETPOINTS
+from drivebus.line.blocking import BlockingBus, at_once, blocking, documented_by
+from drivebus.line.protocols import BusProtocol
+from drivebus.operations.motor_block import Moving
+from drivebus.operations.setpoints import SETPOINTS
+from drivebus.operations.waiting import Operations
+from drivebus.profile import Profile
 from drivebus.values import Description, Value
 from drivebus.watchdog import Watchdog
 
@@ -61,7 +62,7 @@ class Drive:
         self,
         bus: BusProtocol,
         unit: int,
-        profile: ProfileProtocol,
+        profile: Profile,
         identification: int | None = None,
         *,
         unverified: bool = False,

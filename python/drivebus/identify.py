@@ -13,8 +13,8 @@ from typing import Any
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.found import Identification
+from drivebus.line.protocols import ProfileProtocol
 from drivebus.profile import Profile, profiles
-from drivebus.protocols import ProfileProtocol
 
 __all__ = ["LOCKED", "UNREACHED", "code_registers", "codes", "identify", "no_such_address", "one_of", "usable"]
 

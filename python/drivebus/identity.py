@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
 from drivebus.identify import LOCKED, UNREACHED, code_registers, codes
-from drivebus.protocols import AwaitableBus, ProfileProtocol
+from drivebus.line.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
 

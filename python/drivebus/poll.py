@@ -15,7 +15,7 @@ from types import TracebackType
 
 from drivebus import _native
 from drivebus.errors import NotAllowed
-from drivebus.polling import MOST_SAMPLES, Batch, Polling, Sample, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, seconds
 
 __all__ = ["Poll"]
 

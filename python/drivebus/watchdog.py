@@ -14,12 +14,12 @@ from contextlib import suppress
 from types import TracebackType
 
 from drivebus import checks
-from drivebus.at_once import at_once
-from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
-from drivebus.evidence import not_verified
-from drivebus.falling import PATIENCE
-from drivebus.motion import Motion
+from drivebus.line.blocking import at_once
+from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.motion import Motion
+from drivebus.operations.ramp import PATIENCE
+from drivebus.profile.evidence import not_verified
 from drivebus.values import Value
 
 __all__ = ["Settings", "Watchdog"]

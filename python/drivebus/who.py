@@ -10,8 +10,8 @@ from drivebus import checks
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, SharedCodeWarning, level_of_the_program
 from drivebus.found import Found, Identification
 from drivebus.identify import identify, one_of, usable
+from drivebus.line.protocols import AwaitableBus
 from drivebus.profile import Profile, profiles
-from drivebus.protocols import AwaitableBus
 
 __all__ = ["identified", "look_for", "profile_of", "time_for", "units"]
 

@@ -11,7 +11,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator, State
-from drivebus.operations import Operations
+from drivebus.operations.waiting import Operations
 
 CONTROL, FORWARD, STOP, COAST = 0x2000, 1, 5, 6
 LOOK = 0.1  # seconds that two reads and the pause between them take at 19200, amply

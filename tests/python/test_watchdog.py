@@ -15,7 +15,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator
-from drivebus.operations import Operations
+from drivebus.operations.waiting import Operations
 
 RAM, ACTION, TIMEOUT = 0x8000, 0x0E05, 0x0E04
 CE = 18

@@ -15,13 +15,13 @@ from drivebus._native import SerialFormat
 from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
-from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
-from drivebus.figures import Link
 from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening, check_trust
+from drivebus.line.blocking import BlockingBus
+from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.line.stats import Link
+from drivebus.operations.program_end import end_over
 from drivebus.profile import Profile
-from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 

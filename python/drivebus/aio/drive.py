@@ -8,9 +8,9 @@ from contextlib import asynccontextmanager
 from typing import Any, overload
 
 from drivebus.aio.watchdog import Watchdog
-from drivebus.moving import Moving
-from drivebus.operations import Operations
-from drivebus.setpoints import SETPOINTS
+from drivebus.operations.motor_block import Moving
+from drivebus.operations.setpoints import SETPOINTS
+from drivebus.operations.waiting import Operations
 
 __all__ = ["Drive"]
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from types import TracebackType
 
 from drivebus.aio.mailbox import Mailbox
-from drivebus.polling import MOST_SAMPLES, Batch, Polling, Sample, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, seconds
 
 __all__ = ["Poll"]
 

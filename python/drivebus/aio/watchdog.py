@@ -7,7 +7,7 @@ from collections.abc import Generator
 from types import TracebackType
 from typing import Any
 
-from drivebus.motion import Motion
+from drivebus.operations.motion import Motion
 from drivebus.watchdog import Settings
 
 __all__ = ["Watchdog"]

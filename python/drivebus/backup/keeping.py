@@ -17,7 +17,7 @@ from drivebus.backup.restoring import Restore
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress
 from drivebus.errors import NotAllowed
-from drivebus.parameters import Parameters
+from drivebus.operations.parameters import Parameters
 
 __all__ = ["Keeping"]
 

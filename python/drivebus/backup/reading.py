@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivebus.errors import Refused
-from drivebus.registers import Registers
+from drivebus.operations.registers import Registers
 
 __all__ = ["Reader", "Words"]
 

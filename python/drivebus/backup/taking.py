@@ -14,7 +14,7 @@ from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed, Refused
-from drivebus.registers import Registers
+from drivebus.operations.registers import Registers
 
 if TYPE_CHECKING:
     from drivebus.backup.keeping import Keeping

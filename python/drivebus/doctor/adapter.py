@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from drivebus import ports
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.doctor.search import describe
 from drivebus.errors import PortError
+from drivebus.line import ports
 
 __all__ = ["adapter_findings", "port_finding"]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from drivebus import checks
 from drivebus.errors import NotAllowed, Unconfirmed
-from drivebus.evidence import not_verified
-from drivebus.parameters import Parameters
+from drivebus.operations.parameters import Parameters
+from drivebus.profile.evidence import not_verified
 from drivebus.values import Control, ControlItem
 
 __all__ = ["Controls"]

@@ -6,11 +6,11 @@ from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
 from typing import TypeAlias
 
-from drivebus.at_once import at_once
 from drivebus.errors import DrivebusError, Unconfirmed
-from drivebus.operations import Operations
-from drivebus.protocols import AwaitableBus
-from drivebus.safeguard import Guard
+from drivebus.line.blocking import at_once
+from drivebus.line.protocols import AwaitableBus
+from drivebus.operations.program_end import Guard
+from drivebus.operations.waiting import Operations
 
 __all__ = ["Moving"]
 

@@ -6,11 +6,12 @@ import os
 from collections.abc import Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
-from drivebus import checks, ports
+from drivebus import checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
-from drivebus.figures import Stats
-from drivebus.known import KnownUnits
+from drivebus.line import ports
+from drivebus.line.stats import Stats
+from drivebus.line.write_guard import KnownUnits
 from drivebus.sim import Simulator
 
 __all__ = ["BusFace", "Opening", "check_order", "check_trust"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile.profile import Profile
 
 __all__ = ["Evidence", "not_verified"]
 
@@ -35,7 +35,7 @@ class Evidence:
         unverified: Whether what is not verified may be used.
     """
 
-    def __init__(self, profile: ProfileProtocol, unit: int, unverified: bool) -> None:
+    def __init__(self, profile: Profile, unit: int, unverified: bool) -> None:
         self._profile = profile
         self._unit = unit
         self._unverified = unverified

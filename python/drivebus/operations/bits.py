@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from drivebus import checks
-from drivebus.commanding import A_WORD
 from drivebus.errors import NotAllowed
-from drivebus.motion import Motion
+from drivebus.operations.commands import A_WORD
+from drivebus.operations.motion import Motion
 from drivebus.values import Description
 
 __all__ = ["Terminals"]

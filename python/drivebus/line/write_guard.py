@@ -11,7 +11,6 @@ from collections.abc import Iterable, Sequence
 
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
-from drivebus.protocols import ProfileProtocol
 from drivebus.rtu import written
 
 __all__ = ["KnownUnits", "check_words"]
@@ -23,9 +22,9 @@ class KnownUnits:
     """The profiles under which the units of a line were asked for."""
 
     def __init__(self) -> None:
-        self._profiles: dict[int, dict[str, ProfileProtocol]] = {}
+        self._profiles: dict[int, dict[str, Profile]] = {}
 
-    def add(self, unit: int, profile: ProfileProtocol) -> None:
+    def add(self, unit: int, profile: Profile) -> None:
         """From now on *unit* is known as what *profile* describes."""
         self._profiles.setdefault(unit, {})[profile.name] = profile
         _command_registers()  # now, so that no stop has to wait for it
@@ -46,7 +45,7 @@ class KnownUnits:
             self.check(unit, address, words, force)
 
 
-def check_words(families: Iterable[ProfileProtocol], unit: int, address: int, words: int | Sequence[int]) -> None:
+def check_words(families: Iterable[Profile], unit: int, address: int, words: int | Sequence[int]) -> None:
     """Raises `NotAllowed` if the words at *address* are a command that none of *families*, which *unit* may be, has."""
     known = list(families)
     for offset, word in enumerate([words] if isinstance(words, int) else words):
@@ -58,7 +57,7 @@ def check_words(families: Iterable[ProfileProtocol], unit: int, address: int, wo
             _check_foreign(known, unit, address + offset)
 
 
-def _undefined(family: ProfileProtocol, unit: int, address: int, word: int) -> NotAllowed:
+def _undefined(family: Profile, unit: int, address: int, word: int) -> NotAllowed:
     codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(family.command_codes().items()))
     return NotAllowed(
         f"{word} at {address:04X}H is no command of unit {unit}, which is known as {family.title}: its codes are "
@@ -67,7 +66,7 @@ def _undefined(family: ProfileProtocol, unit: int, address: int, word: int) -> N
     )
 
 
-def _check_foreign(families: Sequence[ProfileProtocol], unit: int, address: int) -> None:
+def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None:
     """Nothing of its own stands there, but another family has its command register there."""
     foreign = _command_registers()
     plain = {_plain(family, address) for family in families}
@@ -83,7 +82,7 @@ def _check_foreign(families: Sequence[ProfileProtocol], unit: int, address: int)
     )
 
 
-def _plain(family: ProfileProtocol, address: int) -> int:
+def _plain(family: Profile, address: int) -> int:
     """*address* without what tells RAM from EEPROM."""
     memory = family.memory()
     return address & ~(1 << (15 if memory is None else memory["bit"]))

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from drivebus import checks
-from drivebus.commanding import Commanding
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
-from drivebus.falling import Fall
-from drivebus.looking import Seen
-from drivebus.safeguard import before_start
+from drivebus.operations.commands import Commanding
+from drivebus.operations.program_end import before_start
+from drivebus.operations.ramp import Fall
+from drivebus.operations.state import Seen
 from drivebus.values import ControlSource, State, Value
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 from drivebus import checks
 from drivebus.backup import Keeping
-from drivebus.commanding import POLL_INTERVAL
 from drivebus.errors import NotAllowed, Unconfirmed
-from drivebus.evidence import Evidence
-from drivebus.looking import Seen
-from drivebus.protocols import ProfileProtocol
-from drivebus.terminals import Terminals
+from drivebus.operations.bits import Terminals
+from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.state import Seen
+from drivebus.profile import Profile
+from drivebus.profile.evidence import Evidence
 from drivebus.values import Fault, Snapshot, State, Status
 
 __all__ = ["Operations"]
@@ -32,7 +32,7 @@ class Operations(Keeping, Terminals):
     which others may come.
     """
 
-    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+    def _know(self, profile: Profile, unverified: bool) -> None:
         super()._know(profile, unverified)
         self._monitored: list[str] | None = None
 

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, overload
 
 from drivebus import checks
 from drivebus.errors import NotAllowed, PortError, Refused
-from drivebus.evidence import Evidence, not_verified
 from drivebus.identity import Identity
-from drivebus.known import check_words
-from drivebus.protocols import AwaitableBus, ProfileProtocol
+from drivebus.line.protocols import AwaitableBus
+from drivebus.line.write_guard import check_words
+from drivebus.profile import Profile
+from drivebus.profile.evidence import Evidence, not_verified
 from drivebus.values import Choice, Description, Snapshot, State, Value
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class Registers:
         self,
         bus: AwaitableBus,
         unit: int,
-        profile: ProfileProtocol,
+        profile: Profile,
         identification: int | None = None,
         *,
         unverified: bool = False,
@@ -72,7 +73,7 @@ class Registers:
         self._halts = [0]
         self._know(profile, checks.flag("unverified", unverified))
 
-    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+    def _know(self, profile: Profile, unverified: bool) -> None:
         self.profile = profile
         self.unverified = unverified
         self._evidence = Evidence(profile, self.unit, unverified)
@@ -91,7 +92,7 @@ class Registers:
             return self
         return self._as(self.profile, True)
 
-    def _as(self, profile: ProfileProtocol, unverified: bool) -> Self:
+    def _as(self, profile: Profile, unverified: bool) -> Self:
         other = copy.copy(self)
         other._know(profile, unverified)
         return other

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
-from drivebus.evidence import Evidence
-from drivebus.falling import Fall
-from drivebus.looking import Seen
-from drivebus.setpoints import Setpoints
+from drivebus.operations.ramp import Fall
+from drivebus.operations.setpoints import Setpoints
+from drivebus.operations.state import Seen
+from drivebus.profile.evidence import Evidence
 from drivebus.values import ControlSource
 
 __all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Commanding"]

@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from drivebus.errors import NotAllowed
-from drivebus.evidence import Evidence
-from drivebus.protocols import PlanProtocol, ProfileProtocol
-from drivebus.registers import Registers
+from drivebus.operations.registers import Registers
+from drivebus.profile import Profile
+from drivebus.profile.evidence import Evidence
+from drivebus.profile.plan import ReadPlan
 from drivebus.values import ControlSource, Fault, State
 
 __all__ = ["Looks", "Seen"]
@@ -54,7 +55,7 @@ class Seen(NamedTuple):
 class _Look(NamedTuple):
     """What a look reads, worked out once for each profile."""
 
-    plan: PlanProtocol | None
+    plan: ReadPlan | None
     state: str | None
     words: Sequence[str]
     fault: str | None
@@ -64,7 +65,7 @@ class _Look(NamedTuple):
 class Looks(Registers):
     """Looks at the state of one drive."""
 
-    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+    def _know(self, profile: Profile, unverified: bool) -> None:
         super()._know(profile, unverified)
         self._look: _Look | None = None
 

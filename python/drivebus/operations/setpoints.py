@@ -11,8 +11,8 @@ from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any
 
 from drivebus import checks
-from drivebus.control import Controls
 from drivebus.errors import NotAllowed
+from drivebus.operations.control import Controls
 from drivebus.values import Value
 
 if TYPE_CHECKING:

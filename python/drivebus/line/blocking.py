@@ -11,8 +11,8 @@ from collections.abc import Callable, Coroutine, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
-from drivebus.figures import Link
-from drivebus.protocols import BusProtocol
+from drivebus.line.protocols import BusProtocol
+from drivebus.line.stats import Link
 
 __all__ = ["BlockingBus", "at_once", "blocking", "documented_by"]
 

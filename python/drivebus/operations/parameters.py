@@ -13,8 +13,8 @@ from typing import NamedTuple, overload
 
 from drivebus import checks
 from drivebus.errors import DrivebusError, NotAllowed, StoreWarning, level_of_the_program
-from drivebus.looking import Looks
-from drivebus.protocols import ProfileProtocol
+from drivebus.operations.state import Looks
+from drivebus.profile import Profile
 from drivebus.values import Description, Value
 
 __all__ = ["Parameters"]
@@ -40,7 +40,7 @@ class _Limit(NamedTuple):
 class Parameters(Looks):
     """Writes registers and parameters of one drive."""
 
-    def _know(self, profile: ProfileProtocol, unverified: bool) -> None:
+    def _know(self, profile: Profile, unverified: bool) -> None:
         super()._know(profile, unverified)
         self._limits_of_others: dict[str, list[_Limit]] | None = None
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus.errors import NotAllowed
-from drivebus.read_plan import ReadPlan
+from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
 __all__ = ["Profile", "profiles"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
 from drivebus import _native, checks
 from drivebus.errors import DrivebusError, NotAllowed, Refused
 from drivebus.profile import Profile
-from drivebus.read_plan import ReadPlan
+from drivebus.profile.plan import ReadPlan
 from drivebus.values import Value
 
 if TYPE_CHECKING:
