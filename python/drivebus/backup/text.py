@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
+from drivebus.profile.plan import labelled
 from drivebus.values import Choice, Value
 
 if TYPE_CHECKING:
@@ -111,9 +112,7 @@ def number(value: Value, scale: float) -> str:
 
 def worded(profile: Profile, code: str, raw: int) -> Value:
     """*raw* in engineering units, and with its label where the profile has one."""
-    value = profile.decode(code, raw)
-    label = profile.describe(code).choices.get(value) if isinstance(value, int) else None
-    return value if label is None else Choice(int(value), label)
+    return labelled(profile.describe(code), profile.decode(code, raw))
 
 
 def _toml(value: object) -> str:

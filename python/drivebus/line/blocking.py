@@ -6,21 +6,16 @@ its beginning to its end, in the caller's own thread.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Coroutine, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from drivebus.line.protocols import BusProtocol
 from drivebus.line.stats import Link
 
-__all__ = ["BlockingBus", "at_once", "blocking", "documented_by"]
+__all__ = ["BlockingBus", "at_once"]
 
-_P = ParamSpec("_P")
 _R = TypeVar("_R")
-_F = TypeVar("_F", bound=Callable[..., object])
-_O = TypeVar("_O")
-_O_co = TypeVar("_O_co", covariant=True)
 
 
 class BlockingBus:
@@ -93,13 +88,6 @@ class BlockingBus:
         return self
 
 
-class _Face(Protocol[_O_co]):
-    """What people call, with the operations behind it."""
-
-    @property
-    def _operations(self) -> _O_co: ...
-
-
 def at_once(work: Coroutine[Any, Any, _R]) -> _R:
     """Carries *work* out. It must not wait for anything but a `BlockingBus`."""
     try:
@@ -109,23 +97,3 @@ def at_once(work: Coroutine[Any, Any, _R]) -> _R:
         return result
     work.close()
     raise RuntimeError(f"{work!r} waits for an event loop, and there is none")
-
-
-def blocking(operation: Callable[Concatenate[_O, _P], Coroutine[Any, Any, _R]]) -> Callable[Concatenate[Any, _P], _R]:
-    """The method that carries *operation* out at once, with its name, its signature and its docstring."""
-
-    @functools.wraps(operation)
-    def method(face: _Face[_O], /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        return at_once(operation(face._operations, *args, **kwargs))
-
-    return method
-
-
-def documented_by(other: Callable[..., object]) -> Callable[[_F], _F]:
-    """Gives a method the docstring of the operation that it carries out."""
-
-    def document(method: _F) -> _F:
-        method.__doc__ = other.__doc__
-        return method
-
-    return document

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.operations import setpoints, state, words
 from drivebus.operations.ramp import Fall
-from drivebus.operations.setpoints import Setpoints
 from drivebus.operations.state import Seen
-from drivebus.profile.evidence import Evidence
+from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
-__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Commanding"]
+__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "confirm", "give", "send_once"]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
@@ -45,109 +45,92 @@ HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
 
-class Commanding(Setpoints):
-    """Sends commands to one drive. Times are seconds of the line's clock, real or simulated."""
+async def give(unit: Unit, name: str, setpoint: int | None = None) -> None:
+    """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
+    address, code = unit.profile.command(name)
+    payload: int | list[int] = code
+    if setpoint is not None:
+        together = _WRITE_MANY in unit.profile.functions
+        if together and unit.profile.address(setpoints.register_of(unit, "frequency")) == address + 1:
+            payload = [code, setpoint]
+        else:
+            await setpoints.write_word(unit, setpoint)
+    await send_once(unit, name, address, payload)
 
-    def _check_start(self, command: str) -> None:
-        """Raises `NotAllowed` where *command* may not be given, or what it starts could not be stopped again."""
-        self._evidence.commands(command)
-        self._check_it_can_be_stopped()
 
-    def _check_it_can_be_stopped(self) -> None:
-        reasons = {halt: self._evidence.unusable(halt) for halt in ("stop", "coast")}
-        if all(reasons.values()):
-            told = "; ".join(f"{halt}: {(reason or '').rstrip('.')}" for halt, reason in reasons.items())
-            what = f"a motor that unit {self.unit} starts could not be stopped over the bus"
-            raise self._evidence.missing(what, told, _both_unusable)
-
-    async def _command(self, name: str, setpoint: int | None = None) -> None:
-        """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
-        address, code = self.profile.command(name)
-        words: int | list[int] = code
-        if setpoint is not None:
-            together = _WRITE_MANY in self.profile.functions
-            if together and self.profile.address(self._setpoint_register("frequency")) == address + 1:
-                words = [code, setpoint]
-            else:
-                await self._write_setpoint(setpoint)
-        await self._send_once(name, address, words)
-
-    async def _send_once(self, name: str, address: int, words: int | Sequence[int]) -> None:
-        """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
-        urgent = name in HALTS
-        try:
-            if urgent:
-                await self._send(address, words, urgent=True)
-                self._halts[0] += 1
-            else:
-                await self._write(address, words, judged=name not in _WHATEVER_IT_IS)
-        except LINE_ERRORS as error:
-            if error.started is None:
-                if not urgent:
-                    raise
-                raise type(error)(
-                    f"{name} could not be sent to unit {self.unit} ({error}); {_MAY[name]}",
-                    unit=self.unit,
-                    request=error.request,
-                    ended=error.ended,
-                ) from error
-            self._halts[0] += urgent
-            raise Unconfirmed(
-                f"{name} was sent to unit {self.unit} and not confirmed ({error}); {_MAY[name]}. "
-                f"{await self._state_afterwards(urgent)}. It was not repeated",
-                unit=self.unit,
+async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
+    """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
+    urgent = name in HALTS
+    try:
+        if urgent:
+            await words.send(unit, address, payload, urgent=True)
+            unit.memory.halts += 1
+        else:
+            await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
+    except LINE_ERRORS as error:
+        if error.started is None:
+            if not urgent:
+                raise
+            raise type(error)(
+                f"{name} could not be sent to unit {unit.address} ({error}); {_MAY[name]}",
+                unit=unit.address,
                 request=error.request,
-                raw=error.raw,
-                started=error.started,
                 ended=error.ended,
             ) from error
-
-    async def _state_afterwards(self, urgent: bool) -> str:
-        try:
-            return f"State seen afterwards: {await self._glance(urgent=urgent)}"
-        except (*LINE_ERRORS, Refused) as error:
-            return f"Its state could not be read afterwards either ({type(error).__name__}); {self._seen_last()}"
-
-    async def _confirm(
-        self, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float, fall: Fall | None = None
-    ) -> None:
-        """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
-        if within == 0 or self._planned_look().plan is None:
-            return
-        deadline = self.bus.now() + within
-        while True:
-            try:
-                seen = await self._glance(urgent=command in HALTS and self.bus.now() <= deadline)
-                if await shows(seen):
-                    return
-                last = f"state seen last: {seen}"
-                if fall is not None and fall.frequency is not None:
-                    last += f", at {fall.frequency:g} Hz"
-                source = seen.source
-                if source not in (ControlSource.COMMUNICATION, None):
-                    last += f", with commands from the {source}"
-                # A motor that was told to stop is looked at: some drives run on in a fault.
-                if seen.fault is not None and command not in (*HALTS, "reset_fault"):
-                    break
-            except (NoAnswer, BadAnswer, Refused) as error:
-                # A refusal here is one of a read: it says nothing about the command.
-                last = f"its last answer: {error}; {self._seen_last()}"
-            except PortError as error:
-                raise Unconfirmed(
-                    f"{command} was sent to unit {self.unit}; the port was lost before its state showed it ({error}): "
-                    f"{_MAY[command]}; {self._seen_last()}. It was not repeated",
-                    unit=self.unit,
-                ) from error
-            if self.bus.now() >= (deadline if fall is None else fall.until):
-                break
-            await self.bus.sleep(POLL_INTERVAL)
+        unit.memory.halts += urgent
         raise Unconfirmed(
-            f"{command} was sent to unit {self.unit}, and its state does not show it: {_MAY[command]}; {last}. "
-            "It was not repeated",
-            unit=self.unit,
-        )
+            f"{name} was sent to unit {unit.address} and not confirmed ({error}); {_MAY[name]}. "
+            f"{await _state_afterwards(unit, urgent)}. It was not repeated",
+            unit=unit.address,
+            request=error.request,
+            raw=error.raw,
+            started=error.started,
+            ended=error.ended,
+        ) from error
 
 
-def _both_unusable(evidence: Evidence) -> str | None:
-    """Why a motor could not be stopped; None if it could."""
-    return evidence.unusable("stop") and evidence.unusable("coast")
+async def _state_afterwards(unit: Unit, urgent: bool) -> str:
+    try:
+        return f"State seen afterwards: {await state.glance(unit, urgent=urgent)}"
+    except (*LINE_ERRORS, Refused) as error:
+        return f"Its state could not be read afterwards either ({type(error).__name__}); {state.seen_last(unit)}"
+
+
+async def confirm(
+    unit: Unit, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float, fall: Fall | None = None
+) -> None:
+    """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
+    if within == 0 or state.planned(unit).plan is None:
+        return
+    deadline = unit.bus.now() + within
+    while True:
+        try:
+            seen = await state.glance(unit, urgent=command in HALTS and unit.bus.now() <= deadline)
+            if await shows(seen):
+                return
+            last = f"state seen last: {seen}"
+            if fall is not None and fall.frequency is not None:
+                last += f", at {fall.frequency:g} Hz"
+            source = seen.source
+            if source not in (ControlSource.COMMUNICATION, None):
+                last += f", with commands from the {source}"
+            # A motor that was told to stop is looked at: some drives run on in a fault.
+            if seen.fault is not None and command not in (*HALTS, "reset_fault"):
+                break
+        except (NoAnswer, BadAnswer, Refused) as error:
+            # A refusal here is one of a read: it says nothing about the command.
+            last = f"its last answer: {error}; {state.seen_last(unit)}"
+        except PortError as error:
+            raise Unconfirmed(
+                f"{command} was sent to unit {unit.address}; the port was lost before its state showed it ({error}): "
+                f"{_MAY[command]}; {state.seen_last(unit)}. It was not repeated",
+                unit=unit.address,
+            ) from error
+        if unit.bus.now() >= (deadline if fall is None else fall.until):
+            break
+        await unit.bus.sleep(POLL_INTERVAL)
+    raise Unconfirmed(
+        f"{command} was sent to unit {unit.address}, and its state does not show it: {_MAY[command]}; {last}. "
+        "It was not repeated",
+        unit=unit.address,
+    )

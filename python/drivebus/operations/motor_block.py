@@ -9,10 +9,11 @@ from typing import TypeAlias
 from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
+from drivebus.operations import motion
 from drivebus.operations.program_end import Guard
-from drivebus.operations.waiting import Operations
+from drivebus.operations.unit import Unit
 
-__all__ = ["Moving"]
+__all__ = ["MotorBlock"]
 
 _END_ATTEMPTS = 3
 """How often a stop is sent that is not confirmed, before the drive is told to coast."""
@@ -24,26 +25,28 @@ _Outcome: TypeAlias = tuple[DrivebusError | None, BaseException | None]
 """What is left to raise: why it could not be ended, and what interrupted that."""
 
 
-class Moving:
-    """One such block. Who makes it calls `begin`, and then, whatever comes of that, either `fail` or `finish`.
+class MotorBlock:
+    """Runs a motor for one block of the program, and ends it by all means.
+
+    Who makes it calls `begin`, and then, whatever comes of that, either `fail` or `finish`.
 
     Args:
-        drive: What turns.
+        unit: What turns.
         start: Starts it.
-        end: Ends it, on the operations that it is given: they may be those of another thread.
+        end: Ends it, over the view of the unit that it is given: it may be that of another thread.
     """
 
     def __init__(
-        self, drive: Operations, start: Callable[[], Awaitable[None]], end: Callable[[Operations], Awaitable[None]]
+        self, unit: Unit, start: Callable[[], Awaitable[None]], end: Callable[[Unit], Awaitable[None]]
     ) -> None:
-        self._drive = drive
+        self._unit = unit
         self._start = start
         self._end = end
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
-        self._elsewhere = drive.over(drive.bus.blocking())
-        self._guard = Guard(self._end_at_once, drive.bus.line)
+        self._elsewhere = unit.over(unit.bus.blocking())
+        self._guard = Guard(self._end_at_once, unit.bus.line)
         self._started = False
-        self._starts_before = drive._starts[0]
+        self._starts_before = unit.memory.starts
 
     async def begin(self) -> None:
         """Starts the motor.
@@ -63,15 +66,15 @@ class Moving:
             self._leave()
             return
         try:
-            with self._keeping_interruptions(), self._drive.bus.undisturbed() as bus:
+            with self._keeping_interruptions(), self._unit.bus.undisturbed() as bus:
                 # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
                 # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
                 may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
                 failure = interrupted = None
-                if self._started or (may_turn and self._drive._starts[0] > self._starts_before):
+                if self._started or (may_turn and self._unit.memory.starts > self._starts_before):
                     failure, interrupted = await self._stop(bus)
                     if failure is not None and hasattr(reason, "add_note"):
-                        reason.add_note(f"and unit {self._drive.unit} could not be stopped: {failure}")
+                        reason.add_note(f"and unit {self._unit.address} could not be stopped: {failure}")
                 self._guard.disarm()
                 if interrupted is not None:
                     raise interrupted
@@ -82,7 +85,7 @@ class Moving:
 
     async def finish(self) -> None:
         """The block went well. Raises what came of stopping the motor."""
-        with self._keeping_interruptions(), self._drive.bus.undisturbed() as bus:
+        with self._keeping_interruptions(), self._unit.bus.undisturbed() as bus:
             failure, interrupted = await self._stop(bus)
             self._guard.disarm()
             unwelcome = failure or interrupted
@@ -90,14 +93,14 @@ class Moving:
                 raise unwelcome
 
     def _keeping_interruptions(self) -> AbstractContextManager[object]:
-        before = self._drive._halts[0]
-        return self._guard.keeping_interruptions(lambda: self._drive._halts[0] > before)
+        before = self._unit.memory.halts
+        return self._guard.keeping_interruptions(lambda: self._unit.memory.halts > before)
 
     async def _stop(self, bus: AwaitableBus) -> _Outcome:
         if not self._guard.begin_to_end():
             return None, None
         try:
-            return await self._end_by_all_means(self._drive.over(bus))
+            return await self._end_by_all_means(self._unit.over(bus))
         except GeneratorExit:
             self._leave()
             raise
@@ -114,15 +117,15 @@ class Moving:
             failure, interrupted = at_once(self._end_by_all_means(self._elsewhere))
         return failure or interrupted
 
-    async def _end_by_all_means(self, drive: Operations) -> _Outcome:
+    async def _end_by_all_means(self, unit: Unit) -> _Outcome:
         """Ends it, or coasts where that fails. Returns what is left to raise: a failure, and what interrupted it."""
         interrupted: BaseException | None = None
         failure: DrivebusError | None = None
         attempts = interruptions = 0
         while attempts <= _END_ATTEMPTS:
-            sent_before = drive._halts[0]
+            sent_before = unit.memory.halts
             try:
-                await (self._end(drive) if attempts < _END_ATTEMPTS else drive.coast())
+                await (self._end(unit) if attempts < _END_ATTEMPTS else motion.coast(unit))
             except DrivebusError as error:
                 failure = error
                 attempts += 1
@@ -133,7 +136,7 @@ class Moving:
                 interrupted = interrupted or error
                 interruptions += 1
                 # What was interrupted before it was sent was no attempt.
-                attempts += drive._halts[0] > sent_before or interruptions > _INTERRUPTED_AT_MOST
+                attempts += unit.memory.halts > sent_before or interruptions > _INTERRUPTED_AT_MOST
             else:
                 return None, interrupted
         return failure, interrupted

@@ -7,16 +7,31 @@ reason is kept: half of a status is better than none.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from drivebus.errors import NotAllowed
-from drivebus.operations.registers import Registers
-from drivebus.profile import Profile
+from drivebus.operations import registers, words
+from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import ReadPlan
-from drivebus.values import ControlSource, Fault, State
+from drivebus.values import ControlSource, Fault, State, Status
 
-__all__ = ["Looks", "Seen"]
+__all__ = [
+    "Seen",
+    "fault",
+    "fault_history",
+    "glance",
+    "look",
+    "ping",
+    "planned",
+    "remember",
+    "seen_last",
+    "state",
+    "state_of",
+    "state_word",
+    "status",
+]
 
 
 class Seen(NamedTuple):
@@ -62,112 +77,211 @@ class _Look(NamedTuple):
     missing: Mapping[str, str]
 
 
-class Looks(Registers):
-    """Looks at the state of one drive."""
+async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Seen:
+    """The status words, in one read where they stand side by side.
 
-    def _know(self, profile: Profile, unverified: bool) -> None:
-        super()._know(profile, unverified)
-        self._look: _Look | None = None
+    Raises:
+        NotAllowed: Nothing of them may be read; the message has the reason.
+    """
+    unit = unit.trusting(unverified)
+    seen = await glance(unit, urgent=urgent)
+    if planned(unit).plan is None:
+        what = f"nothing of the state of unit {unit.address} may be read"
+        raise unit.evidence.missing(what, seen.missing["state"], Evidence.without_state)
+    return seen
 
-    async def look(self, *, urgent: bool = False, unverified: bool = False) -> Seen:
-        """The status words, in one read where they stand side by side.
 
-        Raises:
-            NotAllowed: Nothing of them may be read; the message has the reason.
-        """
-        drive = self.trusting(unverified)
-        seen = await drive._glance(urgent=urgent)
-        if drive._planned_look().plan is None:
-            what = f"nothing of the state of unit {self.unit} may be read"
-            raise drive._evidence.missing(what, seen.missing["state"], Evidence.without_state)
-        return seen
+async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
+    """As `look`; where nothing may be read, nothing is, and nothing is told."""
+    plan = planned(unit)
+    if plan.plan is None:
+        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False)
+    answers: list[list[int]] = []
+    first = 0.0
+    for address, count in plan.plan.reads:
+        with words.explained(unit):
+            came, time, _ = await unit.bus.read_stamped(unit.address, address, count, urgent=urgent)
+        first = first if answers else time
+        answers.append(came)
+    values = dict(zip(plan.plan.names, map(int, plan.plan.values(answers)), strict=True))
+    fields: dict[str, str] = {}
+    for word in plan.words:
+        fields.update(unit.profile.fields(word, values[word]))
+    number = values[plan.fault] if plan.fault is not None else 0
+    seen = Seen(
+        State.UNKNOWN if plan.state is None else state_of(unit, values[plan.state]),
+        fields,
+        unit.profile.fault(number) if number else None,
+        first,
+        plan.missing,
+        plan.state is not None and unit.profile.is_in_fault(values[plan.state]),
+    )
+    remember(unit, str(seen))
+    return seen
 
-    async def _glance(self, *, urgent: bool = False) -> Seen:
-        """As `look`; where nothing may be read, nothing is, and nothing is told."""
-        look = self._planned_look()
-        if look.plan is None:
-            return Seen(State.UNKNOWN, {}, None, 0.0, look.missing, False)
-        answers: list[list[int]] = []
-        first = 0.0
-        for address, count in look.plan.reads:
-            with self._explained():
-                words, time, _ = await self.bus.read_stamped(self.unit, address, count, urgent=urgent)
-            first = first if answers else time
-            answers.append(words)
-        values = dict(zip(look.plan.names, map(int, look.plan.values(answers)), strict=True))
-        fields: dict[str, str] = {}
-        for word in look.words:
-            fields.update(self.profile.fields(word, values[word]))
-        fault = values[look.fault] if look.fault is not None else 0
-        seen = Seen(
-            State.UNKNOWN if look.state is None else self._state_of(values[look.state]),
-            fields,
-            self.profile.fault(fault) if fault else None,
-            first,
-            look.missing,
-            look.state is not None and self.profile.is_in_fault(values[look.state]),
-        )
-        self._remember(str(seen))
-        return seen
 
-    async def state(self, *, unverified: bool = False) -> State:
-        """What the drive is doing: one read of its state word.
+async def state(unit: Unit, *, unverified: bool = False) -> State:
+    """What the drive is doing: one read of its state word.
 
-        Raises:
-            NotAllowed: The family has no state word that is known, or verified. Nothing was sent.
-        """
-        drive = self.trusting(unverified)
-        [word] = await drive.read_words(drive.profile.address(drive._state_word("telling the state")))
-        state = drive._state_of(word)
-        drive._remember(str(state))
-        return state
+    Raises:
+        NotAllowed: The family has no state word that is known, or verified. Nothing was sent.
+    """
+    unit = unit.trusting(unverified)
+    [word] = await words.read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
+    seen = state_of(unit, word)
+    remember(unit, str(seen))
+    return seen
 
-    async def ping(self) -> None:
-        """One read of what the family is known to answer: of its state word, if it has one.
 
-        Raises:
-            NotAllowed: Nothing of it is known. Nothing was sent.
-        """
-        if self._evidence.without_state() is None:
-            await self.state()
-            return
-        roles = [self.profile.role("state"), self.profile.role("fault")]
-        named = [*roles, *self.profile.monitor_names(), *self.profile.names()]
-        for name in self._evidence.readable(name for name in named if name is not None):
-            await self.read_words(self.profile.address(name))
-            return
-        raise NotAllowed(f"nothing is known that {self.profile.title} answers, so unit {self.unit} was not asked")
+async def ping(unit: Unit) -> None:
+    """One read of what the family is known to answer: of its state word, if it has one.
 
-    def _planned_look(self) -> _Look:
-        if self._look is None:
-            self._look = self._plan_look()
-        return self._look
+    Raises:
+        NotAllowed: Nothing of it is known. Nothing was sent.
+    """
+    if unit.evidence.without_state() is None:
+        await state(unit)
+        return
+    roles = [unit.profile.role("state"), unit.profile.role("fault")]
+    named = [*roles, *unit.profile.monitor_names(), *unit.profile.names()]
+    for name in unit.evidence.readable(name for name in named if name is not None):
+        await words.read_words(unit, unit.profile.address(name))
+        return
+    raise NotAllowed(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
-    def _plan_look(self) -> _Look:
-        missing: dict[str, str] = {}
-        state, fault = self.profile.role("state"), self.profile.role("fault")
-        no_state, no_fault = self._evidence.without_state(), self._evidence.without_fault()
-        words = self._evidence.readable(word for word in self.profile.status_words if word != state)
-        if no_state is not None:
-            state, missing["state"] = None, no_state
-        if no_fault is not None:
-            fault, missing["fault"] = None, no_fault
-        names = [*([state] if state else []), *words, *([fault] if fault else [])]
-        in_status = [state] if state is not None and state in self.profile.status_words else []
-        plan = self.profile.compile(names) if names else None
-        return _Look(plan, state, [*in_status, *words], fault, missing)
 
-    def _state_word(self, what: str) -> str:
-        """The name of the state word, for what cannot be done without."""
-        reason = self._evidence.without_state()
-        name = self.profile.role("state")
-        if reason is None and name is not None:
-            return name
-        needs = f"{what} needs a state word, and that of {self.profile.title} may not be used"
-        raise self._evidence.missing(needs, reason or "", Evidence.without_state)
+def planned(unit: Unit) -> _Look:
+    """What a look at the unit reads."""
+    return unit.evidence.once(_plan)
 
-    def _state_of(self, word: int) -> State:
-        try:
-            return State(self.profile.state(word))
-        except ValueError:
-            return State.UNKNOWN
+
+def _plan(evidence: Evidence) -> _Look:
+    missing: dict[str, str] = {}
+    profile = evidence.profile
+    state, fault = profile.role("state"), profile.role("fault")
+    no_state, no_fault = evidence.without_state(), evidence.without_fault()
+    others = evidence.readable(word for word in profile.status_words if word != state)
+    if no_state is not None:
+        state, missing["state"] = None, no_state
+    if no_fault is not None:
+        fault, missing["fault"] = None, no_fault
+    names = [*([state] if state else []), *others, *([fault] if fault else [])]
+    in_status = [state] if state is not None and state in profile.status_words else []
+    plan = profile.compile(names) if names else None
+    return _Look(plan, state, [*in_status, *others], fault, missing)
+
+
+async def status(unit: Unit, *, unverified: bool = False) -> Status:
+    """State, readiness, control source, frequency and fault, in two reads where the family has them together.
+
+    What the family does not tell, or what is not verified, is None (the state: `State.UNKNOWN`), and `missing` has
+    the reason.
+
+    Raises:
+        NoAnswer, BadAnswer, Refused: See each.
+    """
+    unit = unit.trusting(unverified)
+    return await _status(unit, await glance(unit))
+
+
+async def _status(unit: Unit, seen: Seen) -> Status:
+    missing = dict(seen.missing)
+    names = {}
+    for role in ("frequency", "setpoint"):
+        name = unit.profile.role(role)
+        reason = f"no such register of {unit.profile.title} is known"
+        if name is not None:
+            reason = unit.evidence.unreadable(name) or ""
+        if name is None or reason:
+            missing[role] = reason
+        else:
+            names[role] = name
+    frequencies = await registers.snapshot(unit, *names.values()) if names else {}
+    told = {role: float(frequencies[name]) for role, name in names.items()}
+    motor = seen.fields.get("motor", "")
+    ready = seen.fields.get("ready")
+    alarm = seen.fields.get("overload_alarm")
+    for what, field in (
+        ("ready", ready),
+        ("source", seen.source),
+        ("motor", motor or None),
+        ("overload_alarm", alarm),
+    ):
+        if field is None:
+            missing[what] = f"no status word of {unit.profile.title} that may be read tells it"
+    return Status(
+        state=seen.state,
+        ready=None if ready is None else ready == "ready",
+        source=seen.source,
+        motor=int(motor.removeprefix("motor ")) if motor.startswith("motor ") else None,
+        overload_alarm=None if alarm is None else alarm != "none",
+        frequency=told.get("frequency"),
+        setpoint=told.get("setpoint"),
+        fault=seen.fault,
+        fields=seen.fields,
+        time=seen.time or getattr(frequencies, "time", 0.0),
+        missing=missing,
+    )
+
+
+async def fault(unit: Unit, *, unverified: bool = False) -> Fault | None:
+    """The present fault, or None.
+
+    Raises:
+        NotAllowed: The family has no fault register that is known, or verified. Nothing was sent.
+    """
+    unit = unit.trusting(unverified)
+    reason = unit.evidence.without_fault()
+    if reason is not None:
+        raise unit.evidence.missing("the present fault may not be read", reason, Evidence.without_fault)
+    return (await glance(unit)).fault
+
+
+async def fault_history(unit: Unit, *, unverified: bool = False) -> list[Fault]:
+    """The last faults, the latest first; as many as the drive keeps.
+
+    The latest has its `values`: what the drive saw when it tripped, where it keeps that.
+    """
+    unit = unit.trusting(unverified)
+    names = unit.evidence.readable(unit.profile.fault_history)
+    if not names:
+        return []
+    codes = (await registers.snapshot(unit, *names)).values()
+    faults = [unit.profile.fault(int(code)) for code in codes if code]
+    kept = unit.evidence.readable(unit.profile.fault_values)
+    if faults and kept:
+        faults[0] = replace(faults[0], values=await registers.snapshot(unit, *kept))
+    return faults
+
+
+def state_word(unit: Unit, what: str) -> str:
+    """The name of the state word, for what cannot be done without."""
+    reason = unit.evidence.without_state()
+    name = unit.profile.role("state")
+    if reason is None and name is not None:
+        return name
+    needs = f"{what} needs a state word, and that of {unit.profile.title} may not be used"
+    raise unit.evidence.missing(needs, reason or "", Evidence.without_state)
+
+
+def state_of(unit: Unit, word: int) -> State:
+    """What the state *word* says; unknown where the family has no name for it."""
+    try:
+        return State(unit.profile.state(word))
+    except ValueError:
+        return State.UNKNOWN
+
+
+def remember(unit: Unit, seen: str) -> None:
+    """Keeps the last state that was seen, for errors after which none can be read."""
+    unit.memory.last_state = (seen, unit.bus.now())
+
+
+def seen_last(unit: Unit) -> str:
+    """The last state that was seen, and how long ago on the line's clock."""
+    if unit.memory.last_state is None:
+        return "no state was ever seen"
+    seen, at = unit.memory.last_state
+    # A line that is lost may have no clock.
+    age = max(unit.bus.now() - at, 0.0)
+    return f"state seen last, {age:.1f} s ago: {seen}"

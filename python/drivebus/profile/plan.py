@@ -7,7 +7,13 @@ from collections.abc import Mapping, Sequence
 from drivebus import _native
 from drivebus.values import Choice, Description, Value
 
-__all__ = ["ReadPlan"]
+__all__ = ["ReadPlan", "labelled"]
+
+
+def labelled(row: Description, value: float) -> Value:
+    """*value* with its label, where *row* has one for it. A float is no choice, although one may equal its number."""
+    label = row.choices.get(value) if row.choices and isinstance(value, int) else None
+    return value if label is None else Choice(int(value), label)
 
 
 class ReadPlan:
@@ -28,7 +34,7 @@ class ReadPlan:
         self.reads = tuple(native.reads)
         self.units: Mapping[str, str] = {name: row.unit for name, row in zip(self.names, known, strict=True)}
         self._labels = [
-            (index, {value: Choice(value, label) for value, label in row.choices.items()})
+            (index, {value: labelled(row, value) for value in row.choices})
             for index, row in enumerate(known)
             if row.choices
         ]
