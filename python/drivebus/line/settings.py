@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
 from drivebus import checks
 from drivebus._native import SerialFormat
@@ -14,7 +14,7 @@ from drivebus.line.stats import Stats
 from drivebus.line.write_guard import KnownUnits
 from drivebus.sim import Simulator
 
-__all__ = ["BusFace", "Opening", "check_order", "check_trust"]
+__all__ = ["BusFace", "Opening", "check_trust"]
 
 
 class Opening:
@@ -27,6 +27,7 @@ class Opening:
         simulator: The simulator behind it, if there is one.
         owned: What was made here, and ends with the bus.
         known: What is known of its units.
+        shown: What was given as its port, for people.
     """
 
     def __init__(
@@ -44,6 +45,7 @@ class Opening:
         low_latency: bool,
         queue: int,
     ) -> None:
+        self.shown = str(port)
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
             raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
@@ -75,13 +77,6 @@ def check_trust(profile: object, trust: object) -> None:
         raise NotAllowed("trust_profile is for a profile that is named, and none is: give profile=… (`--profile`)")
 
 
-def check_order(urgent: object, verify: object = False) -> None:
-    """Refuses what is neither True nor False, without a call for each of them where both are."""
-    if type(urgent) is not bool or type(verify) is not bool:
-        checks.flag("urgent", urgent)
-        checks.flag("verify", verify)
-
-
 def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
     """Refuses what cannot be meant of *port*, before it is resolved: that opens URLs of pyserial and simulators."""
     named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
@@ -108,46 +103,78 @@ class _Native(Protocol):
     def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None: ...
 
 
-_N = TypeVar("_N", bound=_Native)
-
-
-class BusFace(Generic[_N]):
-    """What a bus tells and is told without a word on the line.
+class BusFace:
+    """A bus, as far as it tells and is told without a word on the line; and its keywords, which both faces have.
 
     Attributes:
         simulator: The simulator behind a `sim://` port or the one that was given; None on a real line.
         format: The `SerialFormat` in force.
     """
 
-    simulator: Simulator | None
-    format: SerialFormat
-
-    def __init__(self, opening: Opening, native: _N) -> None:
+    def __init__(
+        self,
+        port: object,
+        *,
+        baudrate: int = 19200,
+        parity: str = "E",
+        stopbits: int = 1,
+        bytesize: int = 8,
+        silence: str | float = "spec",
+        timeout: float = 0.5,
+        retries: int = 2,
+        read_only: bool = False,
+        rs485: Mapping[str, object] | None = None,
+        echo: str = "auto",
+        turnaround: float = 0.1,
+        learn_timeout: bool = False,
+        low_latency: bool = True,
+        queue: int = 65_536,
+    ) -> None:
+        opening = Opening(
+            port,
+            SerialFormat(baudrate, parity, stopbits, bytesize, silence),
+            timeout=timeout,
+            retries=retries,
+            read_only=read_only,
+            rs485=rs485,
+            echo=echo,
+            turnaround=turnaround,
+            learn_timeout=learn_timeout,
+            low_latency=low_latency,
+            queue=queue,
+        )
         self.simulator = opening.simulator
         self.format = opening.format
-        self._owned = opening.owned
         self._timeout = opening.timeout
-        self._known = opening.known
-        self._native = native
+        self._begin(opening)
+
+    def _begin(self, opening: Opening) -> None:
+        """Opens it, where that is done at once."""
+        raise NotImplementedError
+
+    def _core(self) -> _Native:
+        """The bus of the core. Raises `PortError` where it is not open yet."""
+        raise NotImplementedError
 
     @property
     def port(self) -> str:
         """What was opened, for people."""
-        return self._native.port
+        return self._core().port
 
     @property
     def closed(self) -> bool:
         """Whether `close` was called; in a forked child True, for the line is its parent's."""
-        return self._native.closed
+        return self._core().closed
 
     @property
     def read_only(self) -> bool:
         """Whether every write is refused."""
-        return self._native.read_only
+        return self._core().read_only
 
     @property
     def timeout(self) -> float:
         """Seconds a unit is given to answer."""
+        self._core()
         return self._timeout
 
     def __repr__(self) -> str:
@@ -155,7 +182,7 @@ class BusFace(Generic[_N]):
 
     def now(self) -> float:
         """Seconds on the line's clock: real time, or the simulation's."""
-        return self._native.now()
+        return self._core().now()
 
     def configure(self, unit: int, *, timeout: float | None = None, gap: float | None = None) -> None:
         """Sets what *unit* needs otherwise than the bus, for every call from now on. None keeps what the bus has.
@@ -170,16 +197,16 @@ class BusFace(Generic[_N]):
             timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if gap is not None:
             gap = checks.number("gap", gap, 0.0, 3600.0)
-        self._native.configure(checks.unit(unit), timeout=timeout, gap=gap)
+        self._core().configure(checks.unit(unit), timeout=timeout, gap=gap)
 
     @property
     def reconnects(self) -> int:
         """How often the port was opened again after it was lost. Another drive may answer behind it."""
-        return self._native.reconnects
+        return self._core().reconnects
 
     def stats(self) -> Stats:
         """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
 
         `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
         """
-        return Stats(self._native.stats())
+        return Stats(self._core().stats())
