@@ -45,7 +45,7 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
 UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
 
 # Modules of ours that each Python module may import. `drivebus` is the public package itself; `__init__` makes it.
-# What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
+# What speaks to a drive (`identify` to `drive`) knows a bus by its protocol only.
 PYTHON: dict[str, set[str]] = {
     "errors": set(),
     "named": set(),
@@ -57,10 +57,9 @@ PYTHON: dict[str, set[str]] = {
     "read_plan": {"_native", "values"},
     "profile": {"_native", "checks", "errors", "read_plan", "values"},
     "evidence": {"errors", "protocols"},
-    "contradiction": {"identify", "profile", "protocols"},
-    "identity": {"contradiction", "errors", "identify", "protocols"},
+    "identify": {"checks", "errors", "profile", "protocols"},
     "known": {"errors", "profile", "protocols", "rtu"},
-    "registers": {"checks", "errors", "evidence", "identity", "known", "protocols", "values"},
+    "registers": {"checks", "errors", "evidence", "identify", "known", "protocols", "values"},
     "looking": {"errors", "evidence", "protocols", "registers", "values"},
     "parameters": {"checks", "errors", "looking", "protocols", "values"},
     "control": {"checks", "errors", "evidence", "parameters", "values"},
@@ -92,9 +91,6 @@ PYTHON: dict[str, set[str]] = {
     "polling": {"_native", "checks", "errors", "profile", "read_plan", "values"},
     "poll": {"_native", "errors", "polling"},
     "opening": {"_native", "checks", "errors", "figures", "known", "ports", "sim"},
-    "found": set(),
-    "identify": {"errors", "found", "profile", "protocols"},
-    "who": {"checks", "errors", "found", "identify", "profile", "protocols"},
     "bus": {
         "_native",
         "at_once",
@@ -102,13 +98,12 @@ PYTHON: dict[str, set[str]] = {
         "drive",
         "errors",
         "figures",
-        "found",
+        "identify",
         "opening",
         "poll",
         "polling",
         "profile",
         "safeguard",
-        "who",
     },
     "aio": {
         "_native",
@@ -117,7 +112,7 @@ PYTHON: dict[str, set[str]] = {
         "checks",
         "errors",
         "figures",
-        "found",
+        "identify",
         "motion",
         "moving",
         "opening",
@@ -127,9 +122,8 @@ PYTHON: dict[str, set[str]] = {
         "safeguard",
         "setpoints",
         "watchdog",
-        "who",
     },
-    "doctor": {"_native", "bus", "checks", "drive", "errors", "found", "ports", "profile", "rtu", "sim", "values"},
+    "doctor": {"_native", "bus", "checks", "drive", "errors", "identify", "ports", "profile", "rtu", "sim", "values"},
     "__main__": {"cli"},
     "__init__": {
         "_native",
@@ -139,7 +133,7 @@ PYTHON: dict[str, set[str]] = {
         "drive",
         "errors",
         "figures",
-        "found",
+        "identify",
         "poll",
         "polling",
         "profile",

@@ -31,7 +31,7 @@ from drivebus.errors import (
     Unconfirmed,
 )
 from drivebus.figures import Link, Stats
-from drivebus.found import Found, Identification
+from drivebus.identify.results import Found, Identification
 from drivebus.poll import Poll
 from drivebus.polling import Batch, Sample
 from drivebus.profile import Profile, profiles

@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native, checks, who
+from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
 from drivebus.figures import Link
-from drivebus.found import Found, Identification
+from drivebus.identify import choose
+from drivebus.identify.results import Found, Identification
 from drivebus.opening import BusFace, Opening, check_order, check_trust
 from drivebus.poll import Poll
 from drivebus.polling import Sample
@@ -271,14 +272,14 @@ class Bus(BusFace[_native.Bus]):
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
-        return self._scan(who.units(units), who.time_for(timeout, self._timeout))
+        return self._scan(choose.units(units), choose.time_for(timeout, self._timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
         async def read(unit: int, address: int) -> list[int]:
             return self._native.read(unit, address, 1, timeout=timeout, retries=0)
 
         for unit in units:
-            found = at_once(who.look_for(read, self.now, unit))
+            found = at_once(choose.look_for(read, self.now, unit))
             if found is not None:
                 yield found
 
@@ -290,7 +291,7 @@ class Bus(BusFace[_native.Bus]):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(who.identified(BlockingBus(self), checks.unit(unit)))
+        return at_once(choose.identified(BlockingBus(self), checks.unit(unit)))
 
     def drive(
         self,
@@ -321,7 +322,7 @@ class Bus(BusFace[_native.Bus]):
         """
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        known, code = at_once(choose.profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)
         return drive

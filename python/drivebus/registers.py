@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, overload
 from drivebus import checks
 from drivebus.errors import NotAllowed, PortError, Refused
 from drivebus.evidence import Evidence, not_verified
-from drivebus.identity import Identity
+from drivebus.identify.same_unit import Identity
 from drivebus.known import check_words
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value

@@ -21,7 +21,7 @@ from drivebus.doctor.search import Settings, candidates, found_elsewhere, look, 
 from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard_findings, overheard
 from drivebus.doctor.unit import unit_findings
 from drivebus.errors import BadAnswer, NoAnswer, PortError
-from drivebus.found import Found
+from drivebus.identify.results import Found
 from drivebus.profile import Profile
 from drivebus.sim import Simulator
 

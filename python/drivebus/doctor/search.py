@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.found import Found
+from drivebus.identify.results import Found
 
 __all__ = ["Settings", "candidates", "describe", "found_elsewhere", "look", "nobody", "units_to_ask"]
 

@@ -11,7 +11,7 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.doctor.traffic import frames_in, is_frame
 from drivebus.drive import Drive
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, NotAllowed, Refused
-from drivebus.found import Found
+from drivebus.identify.results import Found
 from drivebus.profile import Profile, profiles
 
 __all__ = ["unit_findings"]

@@ -9,14 +9,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
-from drivebus.found import Identification
+from drivebus.identify import codes
+from drivebus.identify.results import Identification
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import ProfileProtocol
 
-__all__ = ["LOCKED", "UNREACHED", "code_registers", "codes", "identify", "no_such_address", "one_of", "usable"]
+__all__ = ["LOCKED", "UNREACHED", "identify", "no_such_address", "one_of", "usable"]
 
 _ILLEGAL_ADDRESS = 0x02
 """In the Modbus specification, and under this name in the profiles that list their exceptions."""
@@ -41,7 +41,7 @@ async def identify(read: Read, unit: int) -> Identification:
     answered: dict[int, bool] = {}
     told: list[str] = []
     code: int | None = None
-    for address in code_registers():
+    for address in codes.registers():
         try:
             [code] = await read(unit, address)
         except Refused as error:
@@ -52,7 +52,7 @@ async def identify(read: Read, unit: int) -> Identification:
             told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")
             continue
         answered[address] = True
-        if code in codes():
+        if code in codes.listed():
             return await _as_it_behaves(read, _by_code(unit, code), address)
         told.append(f"it says {code:04X}H, which no list names")
     candidates = await _by_answers(read, unit, answered)
@@ -95,7 +95,7 @@ def _joined(names: Iterable[str], word: str) -> str:
 
 
 def _by_code(unit: int, code: int) -> Identification:
-    rows = codes()[code]
+    rows = codes.listed()[code]
     families = tuple(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
     titles = [name for row in rows for name in (row["title"], *(row.get("shared") or ()))]
     title = one_of(titles)
@@ -159,30 +159,6 @@ def _shows(answered: Mapping[int, bool], signature: Mapping[str, Sequence[int]])
     return all(answered.get(address) is True for address in signature["answers"]) and all(
         answered.get(address) is False for address in signature["refuses"]
     )
-
-
-@functools.cache
-def code_registers() -> tuple[int, ...]:
-    """Where the shipped families say what they are."""
-    registers: dict[int, None] = {}
-    for profile in map(Profile.builtin, profiles()):
-        name = profile.role("identification")
-        address = None if name is None else profile.describe(name).address
-        if address is not None:
-            registers[address] = None
-    return tuple(registers)
-
-
-@functools.cache
-def codes() -> dict[int, list[dict[str, Any]]]:
-    """What the shipped profiles say of each code; of profiles that say the same of a family, the first."""
-    codes: dict[int, dict[str, dict[str, Any]]] = {}
-    for name in profiles():
-        for row in Profile.builtin(name).identifications():
-            known = codes.setdefault(row["code"], {}).setdefault(row["family"], row)
-            if row["verified"] and not known["verified"]:
-                codes[row["code"]][row["family"]] = row
-    return {code: list(rows.values()) for code, rows in codes.items()}
 
 
 @functools.cache

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.identify import LOCKED, UNREACHED, code_registers, codes
+from drivebus.identify import codes
+from drivebus.identify.contradiction import Answer, contradiction, signature_of
+from drivebus.identify.identify import LOCKED, UNREACHED
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 
 __all__ = ["Identity"]
@@ -151,7 +152,7 @@ class Identity:
         if answer.word is None:
             return f"refused with exception {answer.exception:02X}H"
         # Elsewhere any word may change, but for a code that gives another drive away.
-        code = answer.address in code_registers() and answer.word in codes()
+        code = answer.address in codes.registers() and answer.word in codes.listed()
         return _named(answer.word) if code or answer.address in self._words else "answered"
 
 
@@ -168,7 +169,7 @@ def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
     known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
     asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
     # What the profile has there itself is no code.
-    others = [address for address in code_registers() if profile.name_at(address) is None]
+    others = [address for address in codes.registers() if profile.name_at(address) is None]
     return (), (*others, *asked)
 
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from drivebus.identify import code_registers, codes, no_such_address, one_of
+from drivebus.identify import codes
+from drivebus.identify.identify import no_such_address, one_of
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import ProfileProtocol
 
@@ -74,7 +75,7 @@ def _listed(profile: ProfileProtocol, answer: Answer) -> list[dict[str, Any]]:
         return []
     rows = [row for row in profile.identifications() if row["code"] == answer.word]
     rows = rows if answer.address == _place(profile) else []
-    return rows + (codes().get(answer.word, []) if answer.address in code_registers() else [])
+    return rows + (codes.listed().get(answer.word, []) if answer.address in codes.registers() else [])
 
 
 def _by_refusal(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
@@ -96,7 +97,7 @@ def _must_have(profile: ProfileProtocol) -> tuple[int, ...]:
     if place is None or register is None:
         return answered
     # A row that was only taken over from a sister proves nothing, unless a code is listed that would stand there.
-    rows = [*profile.identifications(), *(row for listed in codes().values() for row in listed)]
+    rows = [*profile.identifications(), *(row for listed in codes.listed().values() for row in listed)]
     listed = any(row["family"] == profile.family for row in rows)
     return (*answered, place) if listed or profile.describe(register).evidence == "verified" else answered
 

@@ -8,8 +8,8 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from drivebus import checks
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, SharedCodeWarning, level_of_the_program
-from drivebus.found import Found, Identification
-from drivebus.identify import identify, one_of, usable
+from drivebus.identify.identify import identify, one_of, usable
+from drivebus.identify.results import Found, Identification
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import AwaitableBus
 
