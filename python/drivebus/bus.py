@@ -17,7 +17,9 @@ from drivebus.at_once import BlockingBus, at_once
 from drivebus.drive import Drive
 from drivebus.errors import NotAllowed
 from drivebus.figures import Link
-from drivebus.identify import choose
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
 from drivebus.identify.results import Found, Identification
 from drivebus.opening import BusFace, Opening, check_order, check_trust
 from drivebus.poll import Poll
@@ -272,14 +274,14 @@ class Bus(BusFace[_native.Bus]):
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
-        return self._scan(choose.units(units), choose.time_for(timeout, self._timeout))
+        return self._scan(scan.units(units), scan.time_for(timeout, self._timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
         async def read(unit: int, address: int) -> list[int]:
             return self._native.read(unit, address, 1, timeout=timeout, retries=0)
 
         for unit in units:
-            found = at_once(choose.look_for(read, self.now, unit))
+            found = at_once(scan.look_for(read, self.now, unit))
             if found is not None:
                 yield found
 
@@ -291,7 +293,7 @@ class Bus(BusFace[_native.Bus]):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(choose.identified(BlockingBus(self), checks.unit(unit)))
+        return at_once(identify(BlockingBus(self).read, checks.unit(unit)))
 
     def drive(
         self,
@@ -322,7 +324,7 @@ class Bus(BusFace[_native.Bus]):
         """
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = at_once(choose.profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)
         return drive

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, overload
 from drivebus import checks
 from drivebus.errors import NotAllowed, PortError, Refused
 from drivebus.evidence import Evidence, not_verified
-from drivebus.identify.same_unit import Identity
+from drivebus.identify.same_unit import SameUnit
 from drivebus.known import check_words
 from drivebus.protocols import AwaitableBus, ProfileProtocol
 from drivebus.values import Choice, Description, Snapshot, State, Value
@@ -61,7 +61,7 @@ class Registers:
         self.bus = bus
         self.unit = unit
         trusted = checks.flag("trust_profile", trust_profile)
-        self._identity = Identity(bus, unit, profile, identification, trusted=trusted)
+        self._identity = SameUnit(bus, unit, profile, identification, trusted=trusted)
         self._seen: list[tuple[str, float]] = []
         self._in_ram: set[str] = set()
         self._stored: dict[str, int] = {}

@@ -18,7 +18,9 @@ from drivebus.aio.poll import Poll
 from drivebus.at_once import BlockingBus
 from drivebus.errors import PortError
 from drivebus.figures import Link
-from drivebus.identify import choose
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
 from drivebus.identify.results import Found, Identification
 from drivebus.opening import BusFace, Opening, check_trust
 from drivebus.profile import Profile
@@ -170,20 +172,20 @@ class Bus(BusFace[Line]):
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
         self._check_open()
-        return self._scan(choose.units(units), choose.time_for(timeout, self._timeout))
+        return self._scan(scan.units(units), scan.time_for(timeout, self._timeout))
 
     async def _scan(self, units: Iterable[int], timeout: float) -> AsyncIterator[Found]:
         async def read(unit: int, address: int) -> list[int]:
             return await self._native.read(unit, address, 1, timeout=timeout, retries=0)  # type: ignore[no-any-return]
 
         for unit in units:
-            found = await choose.look_for(read, self.now, unit)
+            found = await scan.look_for(read, self.now, unit)
             if found is not None:
                 yield found
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
-        return await choose.identified(self, checks.unit(unit))
+        return await identify(self.read, checks.unit(unit))
 
     async def drive(
         self,
@@ -197,7 +199,7 @@ class Bus(BusFace[Line]):
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = await choose.profile_of(self, unit, profile, variants, unverified)
+        known, code = await profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._known.add(unit, known)
         return drive

@@ -1,64 +1,20 @@
-"""Who answers on a line, and the profile of who does."""
+"""The profile of the drive at an address: the one that was named, or what the unit says surely enough that it is."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Mapping
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, SharedCodeWarning, level_of_the_program
-from drivebus.identify.identify import identify, one_of, usable
-from drivebus.identify.results import Found, Identification
+from drivebus.errors import NotAllowed, SharedCodeWarning, level_of_the_program
+from drivebus.identify.families import one_of, shipped
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Identification
 from drivebus.profile import Profile, profiles
 from drivebus.protocols import AwaitableBus
 
-__all__ = ["identified", "look_for", "profile_of", "time_for", "units"]
-
-_SCAN_TIMEOUT = 0.1
-"""Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
-
-
-def units(given: Iterable[int]) -> list[int]:
-    """The units of a scan."""
-    if not isinstance(given, Iterable):
-        raise NotAllowed(f"units {given!r} are no units; give several of 1..247, such as range(1, 248) or [5]")
-    return [checks.unit(unit) for unit in given]
-
-
-def time_for(timeout: float | None, of_bus: float) -> float:
-    """Seconds each unit is given in a scan."""
-    limit = min(_SCAN_TIMEOUT, of_bus) if timeout is None else timeout
-    return checks.number("timeout", limit, 0.0, 3600.0, above=True)
-
-
-async def look_for(
-    read: Callable[[int, int], Awaitable[list[int]]], now: Callable[[], float], unit: int
-) -> Found | None:
-    """Who answers at *unit*, if somebody does. *read* asks for one word, once."""
-    started = now()
-    first: list[float] = []
-
-    async def timed(unit: int, address: int) -> list[int]:
-        try:
-            return await read(unit, address)
-        finally:
-            first.append(now() - started)
-
-    try:
-        found = await identify(timed, unit)
-    except NoAnswer:
-        return None
-    except BadAnswer as error:
-        return Found(unit, None, None, first[0], str(error))
-    family = usable(found, unverified=True) or found.family
-    problem = found.reason if found.certainty == "unknown" and found.code is None else None
-    return Found(unit, family, found.code, first[0], problem, found.certainty, found.candidates)
-
-
-async def identified(bus: AwaitableBus, unit: int) -> Identification:
-    """What the unit is, as far as it tells."""
-    return await identify(bus.read, unit)
+__all__ = ["profile_of", "usable"]
 
 
 async def profile_of(
@@ -73,39 +29,50 @@ async def profile_of(
         raise NotAllowed(f'variants {variants!r} are none; give a mapping, such as {{"speed_unit": "Hz"}}')
     code: int | None = None
     if profile is None:
-        found = await identified(bus, unit)
-        name, code = usable(found, checks.flag("unverified", unverified)), found.code
-        if name is None:
-            raise _not_sure(found)
-        known = Profile.builtin(name)
-        if found.certainty == "shared":
-            warnings.warn(
-                f"unit {unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If it is "
-                f'one, say so: bus.drive({unit}, profile="{name}") (`--profile {name}`)',
-                SharedCodeWarning,
-                stacklevel=level_of_the_program(),
-            )
+        found = await identify(bus.read, unit)
+        known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code
     else:
         known = Profile.find(profile)
     return known if variants is None else known.with_variants(variants), code
 
 
+def usable(found: Identification, unverified: bool) -> str | None:
+    """The profile that *found* is sure enough of to command a motor by it; with *unverified*, the only candidate."""
+    known = shipped(found.candidates)
+    sure = found.certainty in ("certain", "shared") or (unverified and len(found.candidates) == 1)
+    return known[0] if sure and len(known) == 1 else None
+
+
+def _sure_enough(found: Identification, unverified: bool) -> Profile:
+    """The profile that is `usable` of *found*, with a warning where others share its code."""
+    name = usable(found, unverified)
+    if name is None:
+        raise _not_sure(found)
+    if found.certainty == "shared":
+        warnings.warn(
+            f"unit {found.unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If it is "
+            f'one, say so: bus.drive({found.unit}, profile="{name}") (`--profile {name}`)',
+            SharedCodeWarning,
+            stacklevel=level_of_the_program(),
+        )
+    return Profile.builtin(name)
+
+
 def _not_sure(found: Identification) -> NotAllowed:
-    shipped = [name for name in found.candidates if name in profiles()]
-    if found.candidates and not shipped:
-        known = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
+    """Why no profile is taken by *found*, and how to name one."""
+    known = shipped(found.candidates)
+    if found.candidates and not known:
+        what = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
     elif found.candidates:
-        known = f"it may be {one_of(found.candidates)}"
+        what = f"it may be {one_of(found.candidates)}"
     else:
-        known = "what it is, is not known"
+        what = "what it is, is not known"
     with_one = (
-        ", or unverified=True (`--unverified`) to take it for that"
-        if len(found.candidates) == len(shipped) == 1
-        else ""
+        ", or unverified=True (`--unverified`) to take it for that" if len(found.candidates) == len(known) == 1 else ""
     )
-    like = shipped[0] if len(shipped) == 1 else f"one of {', '.join(shipped or profiles())}"
+    like = known[0] if len(known) == 1 else f"one of {', '.join(known or profiles())}"
     return NotAllowed(
-        f"unit {found.unit} is not surely of one family: {known} ({found.certainty}: {found.reason}). The registers "
+        f"unit {found.unit} is not surely of one family: {what} ({found.certainty}: {found.reason}). The registers "
         f"and command codes of another family may differ; if you know that it behaves like {like}, "
         f"give profile=… (`--profile`){with_one}",
         unit=found.unit,
