@@ -30,7 +30,7 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
-from drivebus.found import Found, Identification
+from drivebus.identify.results import Found, Identification
 from drivebus.line.samples import Batch, Sample
 from drivebus.line.stats import Link, Stats
 from drivebus.poll import Poll

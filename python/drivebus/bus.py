@@ -11,9 +11,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native, checks, who
+from drivebus import _native, checks
 from drivebus.drive import Drive
-from drivebus.found import Found, Identification
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Found, Identification
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Sample
@@ -99,14 +102,14 @@ class Bus(BusFace, Requests):
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
-        return self._scan(who.units(units), who.time_for(timeout, self._opening.timeout))
+        return self._scan(scan.units(units), scan.time_for(timeout, self._opening.timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
         async def read(unit: int, address: int) -> list[int]:
             return self._native.read(unit, address, 1, timeout=timeout, retries=0)
 
         for unit in units:
-            found = at_once(who.look_for(read, self.now, unit))
+            found = at_once(scan.look_for(read, self.now, unit))
             if found is not None:
                 yield found
 
@@ -118,7 +121,7 @@ class Bus(BusFace, Requests):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(who.identified(BlockingBus(self), checks.unit(unit)))
+        return at_once(identify(BlockingBus(self).read, checks.unit(unit)))
 
     def drive(
         self,
@@ -149,7 +152,7 @@ class Bus(BusFace, Requests):
         """
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
         return drive

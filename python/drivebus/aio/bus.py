@@ -9,13 +9,16 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native, checks, who
+from drivebus import _native, checks
 from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.aio.requests import AwaitedRequests
 from drivebus.errors import PortError
-from drivebus.found import Found, Identification
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Found, Identification
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
@@ -178,17 +181,17 @@ class Bus(BusFace):
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
-        return self._scan(self._asked(), who.units(units), who.time_for(timeout, self.timeout))
+        return self._scan(self._asked(), scan.units(units), scan.time_for(timeout, self.timeout))
 
     async def _scan(self, line: AwaitedRequests, units: Iterable[int], timeout: float) -> AsyncIterator[Found]:
         for unit in units:
-            found = await who.look_for(functools.partial(line.look, timeout=timeout), self.now, unit)
+            found = await scan.look_for(functools.partial(line.look, timeout=timeout), self.now, unit)
             if found is not None:
                 yield found
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
-        return await who.identified(self, checks.unit(unit))
+        return await identify(self.read, checks.unit(unit))
 
     async def drive(
         self,
@@ -202,7 +205,7 @@ class Bus(BusFace):
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = await who.profile_of(self, unit, profile, variants, unverified)
+        known, code = await profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
         return drive

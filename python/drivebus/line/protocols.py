@@ -10,9 +10,8 @@ from contextlib import AbstractContextManager
 from typing import Protocol
 
 from drivebus.line.stats import Link
-from drivebus.profile import Profile as ProfileProtocol
 
-__all__ = ["AwaitableBus", "BusProtocol", "ProfileProtocol"]
+__all__ = ["AwaitableBus", "BusProtocol"]
 
 
 class BusProtocol(Protocol):

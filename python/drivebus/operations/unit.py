@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 
 from drivebus import checks
-from drivebus.identity import Identity
+from drivebus.identify.same_unit import SameUnit
 from drivebus.line.protocols import AwaitableBus
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
@@ -30,7 +30,7 @@ class Memory:
         started_unverified: Whether it was started by what is not verified, and so may be stopped by that.
     """
 
-    identity: Identity
+    identity: SameUnit
     last_state: tuple[str, float] | None = None
     in_ram: set[str] = field(default_factory=set)
     stores: Counter[str] = field(default_factory=Counter)
@@ -69,7 +69,7 @@ class Unit:
     ) -> Unit:
         """The unit at *address*, of which nothing is remembered but its *identification*, if it was asked for that."""
         trusted = checks.flag("trust_profile", trust_profile)
-        identity = Identity(bus, address, profile, identification, trusted=trusted)
+        identity = SameUnit(bus, address, profile, identification, trusted=trusted)
         evidence = Evidence(profile, address, checks.flag("unverified", unverified))
         return cls(bus, address, evidence, Memory(identity))
 

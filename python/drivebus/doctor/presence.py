@@ -1,52 +1,19 @@
-"""Who answers, and at which baud rate and parity: the settings given first, then those of drives from the factory."""
+"""Who is there: which units are asked, which of them answer, and what is said where none does at the given settings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
+from drivebus.doctor.settings import Settings
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.found import Found
+from drivebus.identify.results import Found
 
-__all__ = ["Settings", "candidates", "describe", "found_elsewhere", "look", "nobody", "units_to_ask"]
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How characters look on the wire."""
-
-    baudrate: int
-    bytesize: int = 8
-    parity: str = "E"
-    stopbits: int = 1
-
-    def __str__(self) -> str:
-        return f"{self.baudrate} {self.bytesize}{self.parity}{self.stopbits}"
-
-
-_FACTORY = (Settings(19200, 8, "E", 1), Settings(9600, 8, "N", 1))
-"""INVT Goodrive (P14.01 = 4, P14.02 = 1), VFD500 (P30.02 = 3, 8N1)."""
+__all__ = ["found_elsewhere", "look", "nobody", "units_to_ask", "whole"]
 
 _PATIENCE = 0.25
 """Seconds each is given: INVT's response delay (P14.03) can be set to 200 ms."""
-
-_SPEEDS = (19200, 9600, 38400, 115200, 57600, 4800)
-_ALL_SPEEDS = (*_SPEEDS, 2400, 1200)
-"""What the families can be set to: P14.01 of a Goodrive, P30.02 of a VFD500."""
-
-_FORMATS = (("E", 1), ("N", 1), ("O", 1))
-_ALL_FORMATS = (*_FORMATS, ("N", 2), ("E", 2), ("O", 2))
-
-
-def candidates(given: Settings, full: bool) -> Iterator[Settings]:
-    """Other settings than *given*, the likeliest first: those of factories, the same speed, the rest."""
-    speeds, formats = (_ALL_SPEEDS, _ALL_FORMATS) if full else (_SPEEDS, _FORMATS)
-    same_speed = [Settings(given.baudrate, 8, parity, stop) for parity, stop in formats]
-    rest = [Settings(speed, 8, parity, stop) for parity, stop in formats for speed in speeds]
-    # A dict keeps the order and each of them once.
-    yield from (other for other in dict.fromkeys((*_FACTORY, *same_speed, *rest)) if other != given)
 
 
 def units_to_ask(unit: int | None, full: bool, elsewhere: bool = False) -> Sequence[int]:
@@ -65,7 +32,7 @@ def look(bus: Bus, units: Sequence[int], tell: Callable[[str], None], times: int
     """
     found = []
     for unit in units:
-        tell(f"asking unit {unit} at {describe(bus)}")
+        tell(f"asking unit {unit} at {Settings.of(bus)}")
         answer: Found | None = None
         for _ in range(times):
             answer = next(bus.scan([unit], _PATIENCE), None) or answer
@@ -87,14 +54,13 @@ def _came_late(bus: Bus, unit: int) -> bool:
     return of_unit is not None and of_unit["late_replies"] > 0
 
 
-def describe(bus: Bus) -> str:
-    """The settings of *bus*, such as 19200 8E1."""
-    line = bus.format
-    return f"{line.baudrate} {line.bytesize}{line.parity}{line.stopbits}"
+def whole(found: Iterable[Found]) -> list[Found]:
+    """Those of *found* whose answer was whole."""
+    return [each for each in found if each.problem is None]
 
 
 def found_elsewhere(given: Settings, other: Settings, found: Sequence[Found]) -> Finding:
-    """Somebody answers at *other* settings than the ones given."""
+    """The finding that those in *found* answer at *other* settings than the ones given."""
     units = ", ".join(str(each.unit) for each in found)
     what = [name for name in ("baudrate", "parity", "stopbits") if getattr(given, name) != getattr(other, name)]
     names = {"baudrate": "baud rate", "stopbits": "stop bits"}
@@ -104,16 +70,16 @@ def found_elsewhere(given: Settings, other: Settings, found: Sequence[Found]) ->
         "wrong_baud" if "baudrate" in what else "wrong_parity",
         Severity.FAULT,
         f"unit {units} answers at {other}, not at {given}: the {wrong} {'are' if len(what) > 1 else 'is'} another",
-        f"use --baud {other.baudrate} --format {other.bytesize}{other.parity}{other.stopbits}, or set the unit to "
+        f"use --baud {other.baudrate} --format {other.format}, or set the unit to "
         f"{given} (INVT: P14.01, P14.02; VFD500: P30.02 and the format beside it)",
         unit=found[0].unit,
-        values={"baudrate": other.baudrate, "format": f"{other.bytesize}{other.parity}{other.stopbits}"},
+        values={"baudrate": other.baudrate, "format": other.format},
         error=NoAnswer,
     )
 
 
 def nobody(given: Settings, unit: int | None, asked: Sequence[int], tried: int, noise: int) -> Finding:
-    """Nobody gives a right answer, at whatever settings. *noise*: how many bytes came instead."""
+    """The finding that nobody gives a right answer, at whatever settings. *noise*: how many bytes came instead."""
     who = f"unit {unit}" if unit is not None else f"units {asked[0]} to {asked[-1]}"
     where = f"at {given}" + (f" nor at {tried} other settings" if tried else "")
     if noise:

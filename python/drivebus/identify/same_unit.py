@@ -14,28 +14,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus.contradiction import Answer, contradiction, signature_of
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
-from drivebus.identify import LOCKED, UNREACHED, code_registers, codes
-from drivebus.line.protocols import AwaitableBus, ProfileProtocol
+from drivebus.identify import codes
+from drivebus.identify.answers import Answer, tells_nothing
+from drivebus.identify.contradiction import contradiction
+from drivebus.identify.signatures import signature_of
+from drivebus.line.protocols import AwaitableBus
+from drivebus.profile import Profile
 
-__all__ = ["Identity"]
-
-_PASSING = (0x06, LOCKED, *UNREACHED)
-"""Exceptions that say nothing of a unit, for they pass: it is busy or got a damaged request, a password locks it, or a
-gateway does not reach it."""
-
-_DAMAGED = "frame_error"
-"""What profiles call an exception by which a unit says that the request came damaged, whatever its code."""
+__all__ = ["SameUnit"]
 
 
-class Identity:
-    """What one unit says it is, and since when that is known.
+class SameUnit:
+    """Makes sure that the unit at an address is what it was named as, and still the one it was.
 
     Args:
         bus: The line it hangs on; only for how often that was opened again.
         unit: Its address, 1..247.
-        profile: Where its family says what it is.
+        profile: What it was named as.
         code: What it said, if it was asked before.
         trusted: Whether the profile is believed, whatever the unit says.
     """
@@ -44,7 +40,7 @@ class Identity:
         self,
         bus: AwaitableBus,
         unit: int,
-        profile: ProfileProtocol,
+        profile: Profile,
         code: int | None = None,
         *,
         trusted: bool = False,
@@ -53,7 +49,7 @@ class Identity:
         self._profile = profile
         self._trusted = trusted
         self._words, self._probes = _questions(profile)
-        self._known = None if code is None else _named(code)
+        self._known = None if code is None else _hex(code)
         self._contradicts = False
         self._opened = bus.reconnects
 
@@ -91,10 +87,13 @@ class Identity:
         return opened
 
     def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool) -> None:
-        """Takes what a unit said that was not known; what came before a failure of the line was said all the same."""
+        """Takes what a unit said that was not known, and raises where it contradicts its profile and is to be *judged*.
+
+        What came before a failure of the line was said all the same, but is not *complete*: the unit stays unknown.
+        """
         against = None if self._trusted else contradiction(self._profile, self._unit, answers)
         self._contradicts = against is not None
-        self._known = self._told(answers) if complete and not any(map(self._passes, answers)) else None
+        self._known = self._told(answers) if complete and not self._put_off(answers) else None
         if against is not None and judged:
             raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
 
@@ -107,7 +106,7 @@ class Identity:
                 f"{unsaid} to it ({failure}); nothing was written", unit=self._unit, raw=failure.raw
             ) from failure
         told = self._told(answers)
-        if any(map(self._passes, answers)):
+        if self._put_off(answers):
             raise NotAllowed(f"{unsaid} to it ({told}); nothing was written", unit=self._unit)
         if told != known:
             raise NotAllowed(
@@ -124,7 +123,7 @@ class Identity:
         return contradiction(self._profile, self._unit, answers)
 
     async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:
-        """Adds to *answers* as they come: what came before a failure of the line was said all the same."""
+        """Adds the unit's answers to *answers* as they come, so that a failure of the line leaves the earlier ones."""
         for address in (*self._words, *self._probes):
             answers += [await self._answer(bus, address)]
 
@@ -135,30 +134,28 @@ class Identity:
             return Answer(address, None, error.code)
         return Answer(address, word, None)
 
-    def _passes(self, answer: Answer) -> bool:
-        """Whether it is a refusal that says nothing of the unit."""
-        code = answer.exception
-        return code is not None and (code in _PASSING or self._profile.exception(code)[0] == _DAMAGED)
+    def _put_off(self, answers: Sequence[Answer]) -> bool:
+        """Whether one of *answers* is a refusal that passes, so that it is not known yet what the unit is."""
+        return any(tells_nothing(self._profile, answer) for answer in answers)
 
     def _told(self, answers: Sequence[Answer]) -> str:
-        """What is compared with what it says later: of a probe that it answered, and not what."""
+        """The answers as they are compared with later ones: of a probe only that it was answered, and not with what."""
         told = {answer.address: self._shown(answer) for answer in answers}
         if len(told) == 1:
             return next(iter(told.values()))
-        return ", ".join(f"{_named(address)} {said}" for address, said in told.items())
+        return ", ".join(f"{_hex(address)} {said}" for address, said in told.items())
 
     def _shown(self, answer: Answer) -> str:
         if answer.word is None:
             return f"refused with exception {answer.exception:02X}H"
         # Elsewhere any word may change, but for a code that gives another drive away.
-        code = answer.address in code_registers() and answer.word in codes()
-        return _named(answer.word) if code or answer.address in self._words else "answered"
+        is_code = answer.address in self._words or codes.listed_at(answer.address, answer.word)
+        return _hex(answer.word) if is_code else "answered"
 
 
-def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
-    """Where a unit says what it is, and words of which it counts whether it answers: either may be none."""
-    register = profile.role("identification")
-    address = None if register is None else profile.describe(register).address
+def _questions(profile: Profile) -> tuple[Sequence[int], Sequence[int]]:
+    """The addresses where a unit says what it is, and those of which counts whether it answers; either may be none."""
+    address = codes.address_of(profile)
     if address is not None:
         return (address,), ()
     signature = signature_of(profile)
@@ -168,9 +165,9 @@ def _questions(profile: ProfileProtocol) -> tuple[Sequence[int], Sequence[int]]:
     known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
     asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
     # What the profile has there itself is no code.
-    others = [address for address in code_registers() if profile.name_at(address) is None]
+    others = [address for address in codes.registers() if profile.name_at(address) is None]
     return (), (*others, *asked)
 
 
-def _named(code: int) -> str:
+def _hex(code: int) -> str:
     return f"{code:04X}H"

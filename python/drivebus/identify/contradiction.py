@@ -9,26 +9,19 @@ drive, nor a silent one.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
 
-from drivebus.identify import code_registers, codes, no_such_address, one_of
-from drivebus.line.protocols import ProfileProtocol
+from drivebus.identify import codes
+from drivebus.identify.answers import Answer, no_such_address
+from drivebus.identify.families import one_of, shipped
+from drivebus.identify.signatures import signature_of
 from drivebus.profile import Profile, profiles
 
-__all__ = ["Answer", "contradiction", "signature_of"]
+__all__ = ["contradiction"]
 
 
-class Answer(NamedTuple):
-    """How a unit answered the question for the word at *address*: with a *word*, or with an *exception*."""
-
-    address: int
-    word: int | None
-    exception: int | None
-
-
-def contradiction(profile: ProfileProtocol, unit: int, answers: Iterable[Answer]) -> str | None:
+def contradiction(profile: Profile, unit: int, answers: Iterable[Answer]) -> str | None:
     """What among *answers* speaks against *profile*, and what to do about it; None if nothing does."""
-    known_by = profile.role("identification") or signature_of(profile) or _shipped(profile.reports_as())
+    known_by = profile.role("identification") or signature_of(profile) or shipped(profile.reports_as())
     if not known_by:
         # A profile of somebody's own that says nothing of how its units are known: they may be anything.
         return None
@@ -44,20 +37,15 @@ def contradiction(profile: ProfileProtocol, unit: int, answers: Iterable[Answer]
     )
 
 
-def signature_of(profile: ProfileProtocol) -> dict[str, list[int]] | None:
-    """How a unit of the family without a code is told; an overlay has that of the family below it."""
-    below = profile.family if profile.family in profiles() else None
-    return profile.signature() or (None if below is None else Profile.builtin(below).signature())
-
-
-def _by_code(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
-    rows = _listed(profile, answer)
-    families = list(dict.fromkeys(name for row in rows for name in (row["family"], *(row.get("shared") or ()))))
+def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
+    """What speaks against *profile* if the word that came is the code of another family."""
+    rows = [] if answer.word is None else codes.listed_for(profile, answer.address, answer.word)
+    families = codes.families_in(rows)
     if not families or set(families) & set(profile.reports_as()):
         return None
     titles = [f"{row['title']} ({row['family']})" for row in rows]
     also = [name for name in families if name not in [row["family"] for row in rows]]
-    known = _shipped(families)
+    known = shipped(families)
     if known:
         then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in known)
         then = f"ask for it as that: {then}"
@@ -68,16 +56,8 @@ def _by_code(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
     return f"it says {answer.word:04X}H, which is a {one_of([*titles, *also])}: {then}"
 
 
-def _listed(profile: ProfileProtocol, answer: Answer) -> list[dict[str, Any]]:
-    """What the profile itself and the shipped ones say of the word that came, if codes stand at its address."""
-    if answer.word is None:
-        return []
-    rows = [row for row in profile.identifications() if row["code"] == answer.word]
-    rows = rows if answer.address == _place(profile) else []
-    return rows + (codes().get(answer.word, []) if answer.address in code_registers() else [])
-
-
-def _by_refusal(profile: ProfileProtocol, unit: int, answer: Answer) -> str | None:
+def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
+    """What speaks against *profile* if the unit says that it lacks an address which each unit of it has."""
     if answer.exception is None or answer.address not in _must_have(profile):
         return None
     if not no_such_address(profile, answer.exception):
@@ -88,24 +68,13 @@ def _by_refusal(profile: ProfileProtocol, unit: int, answer: Answer) -> str | No
     )
 
 
-def _must_have(profile: ProfileProtocol) -> tuple[int, ...]:
-    """Addresses that every unit of the family answers."""
+def _must_have(profile: Profile) -> tuple[int, ...]:
+    """The addresses that every unit of *profile* answers."""
     signature = signature_of(profile)
     answered = () if signature is None else tuple(signature["answers"])
-    place, register = _place(profile), profile.role("identification")
+    place, register = codes.address_of(profile), profile.role("identification")
     if place is None or register is None:
         return answered
     # A row that was only taken over from a sister proves nothing, unless a code is listed that would stand there.
-    rows = [*profile.identifications(), *(row for listed in codes().values() for row in listed)]
-    listed = any(row["family"] == profile.family for row in rows)
-    return (*answered, place) if listed or profile.describe(register).evidence == "verified" else answered
-
-
-def _place(profile: ProfileProtocol) -> int | None:
-    """Where the family says what it is."""
-    register = profile.role("identification")
-    return None if register is None else profile.describe(register).address
-
-
-def _shipped(families: Iterable[str]) -> list[str]:
-    return [name for name in families if name in profiles()]
+    sure = codes.is_listed(profile) or profile.describe(register).evidence == "verified"
+    return (*answered, place) if sure else answered
