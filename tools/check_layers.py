@@ -70,6 +70,9 @@ PROGRAMS: dict[str, set[str]] = {
     "__main__": {"cli"},
 }
 
+# Through so many classes of ours a class may inherit, errors aside.
+MOST_ANCESTORS = 2
+
 # The files of `operations`, each of which may import those before it.
 OPERATIONS = [
     "interruptions",
@@ -199,9 +202,81 @@ def python_findings(root: Path) -> Iterator[str]:
                     yield f"{path.relative_to(root)}:{line}: {inside[0]} must not import {file[0]}"
 
 
+def own_names(tree: ast.AST) -> set[str]:
+    """The names with an underscore that a file defines: functions, classes, variables, attributes and slots."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names.add(node.value)  # in __slots__
+    return {name for name in names if is_private(name)}
+
+
+def is_private(name: str) -> bool:
+    """Whether *name* has an underscore for what is nobody else's."""
+    return name.startswith("_") and not name.startswith("__") and name != "_"
+
+
+def borrowed(path: Path) -> Iterator[tuple[int, str]]:
+    """Each name with an underscore that *path* uses and does not define: it belongs to another file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+    own = own_names(tree)
+    for node in ast.walk(tree):
+        is_python = isinstance(node, ast.Attribute) and ast.unparse(node) == "sys._getframe"
+        if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own and not is_python:
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                if is_private(alias.name) and alias.name != "_native":
+                    yield node.lineno, alias.name
+
+
+def ancestors(package: Path) -> Iterator[tuple[Path, str, int]]:
+    """Each class of ours, and through how many of ours it inherits; errors and warnings aside."""
+    bases: dict[str, list[str]] = {}
+    where: dict[str, tuple[Path, str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        module = ".".join(["drivebus", *path.relative_to(package).with_suffix("").parts])
+        tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+        imported = {
+            alias.asname or alias.name: f"{node.module}.{alias.name}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                named = [ast.unparse(base).partition("[")[0] for base in node.bases]
+                bases[f"{module}.{node.name}"] = [imported.get(base, f"{module}.{base}") for base in named]
+                where[f"{module}.{node.name}"] = (path, node.name)
+
+    def depth(name: str) -> int:
+        return max((1 + depth(base) for base in bases[name] if base in bases), default=0)
+
+    for name, (path, shown) in where.items():
+        if path != package / "errors.py":
+            yield path, shown, depth(name)
+
+
+def habit_findings(root: Path) -> Iterator[str]:
+    """Rules for every file of the Python package: what is private stays so, and nothing is a tower."""
+    package = root / "python/drivebus"
+    for path in sorted(package.rglob("*.py")):
+        for line, name in borrowed(path):
+            yield f"{path.relative_to(root)}:{line}: {name} belongs to another file"
+    for path, name, depth in ancestors(package):
+        if depth > MOST_ANCESTORS:
+            yield f"{path.relative_to(root)}: {name} inherits through {depth} classes of ours; {MOST_ANCESTORS} at most"
+
+
 def findings(root: Path) -> list[str]:
     """Everything that is wrong."""
-    return [*crate_findings(root), *python_findings(root)]
+    return [*crate_findings(root), *python_findings(root), *habit_findings(root)]
 
 
 # For manifests.
@@ -245,6 +320,9 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ("python/drivebus/operations/ramp.py", None, "\nfrom drivebus import Bus\n", "operations must not import drivebus"),
     ("python/drivebus/operations/ramp.py", None, "\nfrom . import motion\n", "ramp must not import motion"),
     ("python/drivebus/operations/new.py", None, "\nfrom . import motion\n", "where in operations is new"),
+    ("python/drivebus/drive.py", None, "\nprint(Drive.run._wrapped)\n", "_wrapped belongs to another file"),
+    ("python/drivebus/poll.py", None, "\nfrom drivebus.bus import _hidden\n", "_hidden belongs to another file"),
+    ("python/drivebus/aio/drive.py", None, "\nclass A(Drive): ...\nclass B(A): ...\n", "B inherits through 3 classes"),
     ("python/drivebus/bus.py", None, "\nimport drivebus.cli\n", "bus must not import cli"),
     ("python/drivebus/new.py", None, "\nimport drivebus\n", "new.py: where is its place"),
     ("python/drivebus/cli/__init__.py", None, "\nimport drivebus._native\n", "cli must not import _native"),

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import pytest
 
 import drivebus
 import drivebus.aio
@@ -141,6 +142,20 @@ def test_the_public_surface_is_as_it_was() -> None:
     now, then = list(surface()), FROZEN.read_text(encoding="utf-8").splitlines()
     assert [line for line in then if line not in now] == [], "gone"
     assert [line for line in now if line not in then] == [], "new"
+
+
+@pytest.mark.parametrize(
+    ("blocking", "awaited"), [(drivebus.Bus, drivebus.aio.Bus), (drivebus.Drive, drivebus.aio.Drive)]
+)
+def test_both_faces_are_asked_in_the_same_way(blocking: type, awaited: type) -> None:
+    # A poll of an event loop is read by it, and calls nobody back.
+    names = {name for name in dir(blocking) if not name.startswith("_") and hasattr(awaited, name)} - {"poll"}
+    asked = {name for name in names if callable(getattr(blocking, name))}
+    assert len(asked) > 10
+    for name in asked:
+        signatures = {_signature(getattr(face, name), bound=True).replace(", /", "") for face in (blocking, awaited)}
+        assert len(signatures) == 1, f"{name}: {signatures}"
+    assert _signature(blocking) == _signature(awaited)
 
 
 def test_a_change_of_the_surface_shows() -> None:

@@ -17,7 +17,7 @@ from drivebus.values import Value
 if TYPE_CHECKING:
     import numpy.typing
 
-__all__ = ["MOST_SAMPLES", "Batch", "Polling", "Sample", "seconds"]
+__all__ = ["MOST_SAMPLES", "Batch", "Polling", "Sample", "how_many", "poller_of", "seconds"]
 
 MOST_SAMPLES = 1_000_000
 """More are never kept."""
@@ -176,7 +176,6 @@ class Polling:
             interval = checks.number("interval", interval, 0.0, _LONGEST_INTERVAL, above=True)
         self.size = checks.whole("size", size, 1, MOST_SAMPLES)
         self.interval = interval
-        self._bus = native
         self._targets = _targets(bus, targets)
         asked = [(target.unit, target.asked) for target in self._targets]
         self._native = _native.Poller(native, asked, interval, self.size)
@@ -212,14 +211,20 @@ class Polling:
         limit = self.size if max is None else checks.whole("max", max, 0, MOST_SAMPLES)
         return Batch(self._native.take(limit), self._targets)
 
-    def _wanted(self, count: int | None) -> int:
-        """How many samples are waited for."""
-        return 1 if count is None else checks.whole("count", count, 1, self.size)
-
     def __repr__(self) -> str:
         how = "as fast as the wire" if self.interval is None else f"every {self.interval:g} s"
         units = ", ".join(str(target.unit) for target in self._targets)
         return f"<{type(self).__name__} of unit {units} {how}{', closed' if self.closed else ''}>"
+
+
+def poller_of(polling: Polling) -> _native.Poller:
+    """What asks, in the core."""
+    return polling._native
+
+
+def how_many(polling: Polling, count: int | None) -> int:
+    """How many samples are waited for: *count*, or one for None."""
+    return 1 if count is None else checks.whole("count", count, 1, polling.size)
 
 
 def seconds(timeout: float | None) -> float | None:

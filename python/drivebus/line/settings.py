@@ -12,7 +12,7 @@ from drivebus.errors import NotAllowed
 from drivebus.line import ports
 from drivebus.line.stats import Stats
 from drivebus.line.write_guard import KnownUnits
-from drivebus.sim import Simulator
+from drivebus.sim import Simulator, core_of
 
 __all__ = ["BusFace", "Opening", "check_trust"]
 
@@ -66,7 +66,7 @@ class Opening:
         self.simulator = target if isinstance(target, Simulator) else None
         self.owned = target if target is not port and not isinstance(target, str) else None
         if isinstance(target, Simulator):
-            target = target._native if target.transport == "process" else target.port
+            target = core_of(target) if target.transport == "process" else target.port
         self.target = target
         self.known = KnownUnits()
 

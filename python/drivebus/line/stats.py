@@ -54,5 +54,5 @@ class Stats(Named[Any]):
         return {key: Stats(value) if isinstance(value, Mapping) else value for key, value in values.items()}
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={value!r}" for name, value in self._values.items())
+        shown = ", ".join(f"{name}={value!r}" for name, value in self.items())
         return f"Stats({shown})"
