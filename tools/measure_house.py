@@ -1,6 +1,7 @@
 """Measures how the source is laid out: how flat, how deep, how far names reach, and where it goes round.
 
-`python -m tools.measure_house` prints the figures. What must hold is checked by `tools/check_layers.py`; these are the figures behind it.
+`python -m tools.measure_house` prints the figures. What must hold is checked by `tools/check_layers.py`; these are the
+figures behind it.
 """
 
 from __future__ import annotations
