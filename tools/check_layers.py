@@ -44,111 +44,58 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
 # The one file with `unsafe`, which says why: two ioctls that no crate offers.
 UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
 
-# Modules of ours that each Python module may import. `drivebus` is the public package itself; `__init__` makes it.
-# What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
-PYTHON: dict[str, set[str]] = {
-    "errors": set(),
-    "named": set(),
-    "values": {"named"},
-    "figures": {"named"},
-    "checks": {"errors"},
-    "protocols": {"figures", "values"},
-    "rtu": {"_native", "errors"},
-    "read_plan": {"_native", "values"},
-    "profile": {"_native", "checks", "errors", "read_plan", "values"},
-    "evidence": {"errors", "protocols"},
-    "contradiction": {"identify", "profile", "protocols"},
-    "identity": {"contradiction", "errors", "identify", "protocols"},
-    "known": {"errors", "profile", "protocols", "rtu"},
-    "registers": {"checks", "errors", "evidence", "identity", "known", "protocols", "values"},
-    "looking": {"errors", "evidence", "protocols", "registers", "values"},
-    "parameters": {"checks", "errors", "looking", "protocols", "values"},
-    "control": {"checks", "errors", "evidence", "parameters", "values"},
-    "setpoints": {"checks", "control", "errors", "values"},
-    "falling": set(),
-    "commanding": {"errors", "evidence", "falling", "looking", "setpoints", "values"},
-    "motion": {"checks", "commanding", "errors", "falling", "looking", "safeguard", "values"},
-    "terminals": {"checks", "commanding", "errors", "motion", "values"},
-    "watchdog": {"at_once", "checks", "commanding", "errors", "evidence", "falling", "motion", "values"},
-    "interruptions": set(),
-    "safeguard": {"_native", "errors", "interruptions"},
-    "at_once": {"figures", "protocols"},
-    "backup": {"_native", "checks", "errors", "parameters", "profile", "protocols", "registers", "values"},
-    "operations": {
-        "backup",
-        "checks",
-        "commanding",
-        "errors",
-        "evidence",
-        "looking",
-        "protocols",
-        "terminals",
-        "values",
-    },
-    "moving": {"at_once", "errors", "operations", "protocols", "safeguard"},
-    "drive": {"at_once", "moving", "operations", "protocols", "setpoints", "values", "watchdog"},
-    "sim": {"_native", "checks", "errors", "profile"},
-    "ports": {"_native", "checks", "errors", "profile", "sim"},
-    "polling": {"_native", "checks", "errors", "profile", "read_plan", "values"},
-    "poll": {"_native", "errors", "polling"},
-    "opening": {"_native", "checks", "errors", "figures", "known", "ports", "sim"},
-    "found": set(),
-    "identify": {"errors", "found", "profile", "protocols"},
-    "who": {"checks", "errors", "found", "identify", "profile", "protocols"},
-    "bus": {
-        "_native",
-        "at_once",
-        "checks",
-        "drive",
-        "errors",
-        "figures",
-        "found",
-        "opening",
-        "poll",
-        "polling",
-        "profile",
-        "safeguard",
-        "who",
-    },
-    "aio": {
-        "_native",
-        "at_once",
-        "bus",
-        "checks",
-        "errors",
-        "figures",
-        "found",
-        "motion",
-        "moving",
-        "opening",
-        "operations",
-        "polling",
-        "profile",
-        "safeguard",
-        "setpoints",
-        "watchdog",
-        "who",
-    },
-    "doctor": {"_native", "bus", "checks", "drive", "errors", "found", "ports", "profile", "rtu", "sim", "values"},
+# The rooms of the Python package, from the ground up: each may import those of the rows above its own.
+ROOMS: list[set[str]] = [
+    {"errors", "named"},
+    {"values", "checks", "rtu"},
+    {"profile"},
+    {"sim"},
+    {"line"},
+    {"identify"},
+    {"operations"},
+    {"backup"},
+    {"watchdog", "poll"},
+    {"drive"},
+    {"bus"},
+    {"aio", "doctor"},
+    {"__init__"},
+]
+
+# Rooms that may import the compiled core.
+ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", "bus", "aio", "doctor", "__init__"}
+
+# What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
+PROGRAMS: dict[str, set[str]] = {
+    "cli": {"drivebus", "line", "rtu", "sim"},
     "__main__": {"cli"},
-    "__init__": {
-        "_native",
-        "backup",
-        "bus",
-        "doctor",
-        "drive",
-        "errors",
-        "figures",
-        "found",
-        "poll",
-        "polling",
-        "profile",
-        "rtu",
-        "sim",
-        "values",
-    },
-    "cli": {"drivebus", "protocols", "rtu", "sim"},
 }
+
+# Through so many classes of ours a class may inherit, errors aside.
+MOST_ANCESTORS = 2
+
+# The files of `operations`, each of which may import those before it.
+OPERATIONS = [
+    "interruptions",
+    "program_end",
+    "ramp",
+    "unit",
+    "words",
+    "variants",
+    "registers",
+    "state",
+    "parameters",
+    "control",
+    "setpoints",
+    "speed",
+    "commands",
+    "start_checks",
+    "motion",
+    "bits",
+    "waiting",
+    "bus_timeout",
+    "motor_block",
+    "face",
+]
 
 
 def code_of(path: Path) -> str:
@@ -199,8 +146,8 @@ def crate_findings(root: Path) -> Iterator[str]:
                 yield f"{path.relative_to(root)}: takes `{wrong}` of drivebus_line; its trait is {sorted(LINE_TRAIT)}"
 
 
-def imports(path: Path, package: Path) -> Iterator[tuple[int, str]]:
-    """Each module of ours that *path* imports: its first name below the package, or `drivebus` for the package."""
+def imports(path: Path, package: Path) -> Iterator[tuple[int, list[str]]]:
+    """Each module of ours that *path* imports: its names below the package, or `drivebus` for the package."""
     here = list(path.relative_to(package).with_suffix("").parts)
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
         if not isinstance(node, (ast.Import, ast.ImportFrom)):
@@ -215,7 +162,7 @@ def imports(path: Path, package: Path) -> Iterator[tuple[int, str]]:
         for name in dotted:
             first, *rest = name.split(".")
             if first == "drivebus":
-                yield node.lineno, rest[0] if rest and is_module(package, rest[0]) else "drivebus"
+                yield node.lineno, rest if rest and is_module(package, rest[0]) else ["drivebus"]
 
 
 def is_module(package: Path, name: str) -> bool:
@@ -223,23 +170,113 @@ def is_module(package: Path, name: str) -> bool:
     return any((package / candidate).exists() for candidate in (f"{name}.py", f"{name}.pyi", name))
 
 
+def allowed(room: str) -> set[str] | None:
+    """What the files of *room* may import; None for a room that nobody has placed."""
+    if room in PROGRAMS:
+        return PROGRAMS[room]
+    below: set[str] = set()
+    for row in ROOMS:
+        if room in row:
+            return below | ({"_native"} if room in ON_THE_CORE else set())
+        below |= row
+    return None
+
+
 def python_findings(root: Path) -> Iterator[str]:
-    """Rules between the modules of the Python package."""
+    """Rules between the rooms of the Python package, and between the files of `operations`."""
     package = root / "python/drivebus"
     for path in sorted(package.rglob("*.py")):
-        module = path.relative_to(package).with_suffix("").parts[0]
-        if module not in PYTHON:
-            yield f"{path.relative_to(root)}: which modules may it import? Say so in tools/check_layers.py"
-        for line, used in imports(path, package):
-            if used == module:
-                continue
-            if used not in PYTHON.get(module, set()):
-                yield f"{path.relative_to(root)}:{line}: {module} must not import {used}"
+        room, *inside = path.relative_to(package).with_suffix("").parts
+        may = allowed(room)
+        if may is None:
+            yield f"{path.relative_to(root)}: where is its place? Say so in tools/check_layers.py"
+            may = set()
+        for line, [used, *file] in imports(path, package):
+            if used != room and used not in may:
+                yield f"{path.relative_to(root)}:{line}: {room} must not import {used}"
+            if room == used == "operations" and inside != ["__init__"] and file:
+                known = [name for name in (inside[0], file[0]) if name not in OPERATIONS]
+                if known:
+                    yield f"{path.relative_to(root)}: where in operations is {known[0]}? tools/check_layers.py says it"
+                elif OPERATIONS.index(file[0]) >= OPERATIONS.index(inside[0]):
+                    yield f"{path.relative_to(root)}:{line}: {inside[0]} must not import {file[0]}"
+
+
+def own_names(tree: ast.AST) -> set[str]:
+    """The names with an underscore that a file defines: functions, classes, variables, attributes and slots."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names.add(node.value)  # in __slots__
+    return {name for name in names if is_private(name)}
+
+
+def is_private(name: str) -> bool:
+    """Whether *name* has an underscore for what is nobody else's."""
+    return name.startswith("_") and not name.startswith("__") and name != "_"
+
+
+def borrowed(path: Path) -> Iterator[tuple[int, str]]:
+    """Each name with an underscore that *path* uses and does not define: it belongs to another file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+    own = own_names(tree)
+    for node in ast.walk(tree):
+        is_python = isinstance(node, ast.Attribute) and ast.unparse(node) == "sys._getframe"
+        if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own and not is_python:
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                if is_private(alias.name) and alias.name != "_native":
+                    yield node.lineno, alias.name
+
+
+def ancestors(package: Path) -> Iterator[tuple[Path, str, int]]:
+    """Each class of ours, and through how many of ours it inherits; errors and warnings aside."""
+    bases: dict[str, list[str]] = {}
+    where: dict[str, tuple[Path, str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        module = ".".join(["drivebus", *path.relative_to(package).with_suffix("").parts])
+        tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+        imported = {
+            alias.asname or alias.name: f"{node.module}.{alias.name}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                named = [ast.unparse(base).partition("[")[0] for base in node.bases]
+                bases[f"{module}.{node.name}"] = [imported.get(base, f"{module}.{base}") for base in named]
+                where[f"{module}.{node.name}"] = (path, node.name)
+
+    def depth(name: str) -> int:
+        return max((1 + depth(base) for base in bases[name] if base in bases), default=0)
+
+    for name, (path, shown) in where.items():
+        if path != package / "errors.py":
+            yield path, shown, depth(name)
+
+
+def habit_findings(root: Path) -> Iterator[str]:
+    """Rules for every file of the Python package: what is private stays so, and nothing is a tower."""
+    package = root / "python/drivebus"
+    for path in sorted(package.rglob("*.py")):
+        for line, name in borrowed(path):
+            yield f"{path.relative_to(root)}:{line}: {name} belongs to another file"
+    for path, name, depth in ancestors(package):
+        if depth > MOST_ANCESTORS:
+            yield f"{path.relative_to(root)}: {name} inherits through {depth} classes of ours; {MOST_ANCESTORS} at most"
 
 
 def findings(root: Path) -> list[str]:
     """Everything that is wrong."""
-    return [*crate_findings(root), *python_findings(root)]
+    return [*crate_findings(root), *python_findings(root), *habit_findings(root)]
 
 
 # For manifests.
@@ -277,12 +314,17 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line::{Line, Bus};\n//!", "takes `Bus` of drivebus_line"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line as line;\n//!", "takes `*` of drivebus_line"),
     ("python/drivebus/errors.py", None, "\nfrom drivebus import _native\n", "errors must not import _native"),
-    ("python/drivebus/profile.py", None, "\nfrom .bus import Bus\n", "profile must not import bus"),
+    ("python/drivebus/profile/plan.py", None, "\nfrom drivebus.bus import Bus\n", "profile must not import bus"),
     ("python/drivebus/drive.py", None, "\nfrom ._native import crc16\n", "drive must not import _native"),
     ("python/drivebus/drive.py", None, "\nfrom .bus import Bus\n", "drive must not import bus"),
-    ("python/drivebus/registers.py", None, "\nfrom drivebus import Bus\n", "registers must not import drivebus"),
+    ("python/drivebus/operations/ramp.py", None, "\nfrom drivebus import Bus\n", "operations must not import drivebus"),
+    ("python/drivebus/operations/ramp.py", None, "\nfrom . import motion\n", "ramp must not import motion"),
+    ("python/drivebus/operations/new.py", None, "\nfrom . import motion\n", "where in operations is new"),
+    ("python/drivebus/drive.py", None, "\nprint(Drive.run._wrapped)\n", "_wrapped belongs to another file"),
+    ("python/drivebus/poll.py", None, "\nfrom drivebus.bus import _hidden\n", "_hidden belongs to another file"),
+    ("python/drivebus/aio/drive.py", None, "\nclass A(Drive): ...\nclass B(A): ...\n", "B inherits through 3 classes"),
     ("python/drivebus/bus.py", None, "\nimport drivebus.cli\n", "bus must not import cli"),
-    ("python/drivebus/new.py", None, "\nimport drivebus\n", "new.py: which modules may it import"),
+    ("python/drivebus/new.py", None, "\nimport drivebus\n", "new.py: where is its place"),
     ("python/drivebus/cli/__init__.py", None, "\nimport drivebus._native\n", "cli must not import _native"),
 ]
 

@@ -30,10 +30,10 @@ from drivebus.errors import (
     StoreWarning,
     Unconfirmed,
 )
-from drivebus.figures import Link, Stats
-from drivebus.found import Found, Identification
+from drivebus.identify.results import Found, Identification
+from drivebus.line.samples import Batch, Sample
+from drivebus.line.stats import Link, Stats
 from drivebus.poll import Poll
-from drivebus.polling import Batch, Sample
 from drivebus.profile import Profile, profiles
 from drivebus.sim import Simulator
 from drivebus.values import (

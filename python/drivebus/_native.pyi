@@ -6,9 +6,11 @@ Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing wa
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final, final
+from typing import Any, Final, Generic, TypeVar, final
 
 from typing_extensions import Buffer
+
+_T_co = TypeVar("_T_co", covariant=True)
 
 __version__: Final[str]
 __all__ = [
@@ -232,8 +234,8 @@ class Mailbox:
         """All that was left since: a number, and the value or the exception that belongs to it."""
 
 @final
-class Asked:
-    """Something that was asked for an event loop."""
+class Asked(Generic[_T_co]):
+    """Something that was asked for an event loop, and of what kind the answer is."""
 
     @property
     def number(self) -> int:
@@ -260,10 +262,10 @@ class Requests:
         retries: int | None = None,
         urgent: bool = False,
         verify: bool = False,
-    ) -> Asked: ...
+    ) -> Asked[list[int]]: ...
     def read_stamped(
         self, unit: int, address: int, count: int, /, *, urgent: bool = False, verify: bool = False
-    ) -> Asked: ...
+    ) -> Asked[tuple[list[int], float, float]]: ...
     def write(
         self,
         unit: int,
@@ -274,14 +276,14 @@ class Requests:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
-    ) -> Asked: ...
-    def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked: ...
-    def echo(self, unit: int, word: int | None = None, /) -> Asked: ...
-    def transact(self, unit: int, pdu: bytes, reply_length: int | None = None, /) -> Asked: ...
-    def link(self, unit: int, /) -> Asked: ...
-    def sleep(self, seconds: float, /) -> Asked: ...
-    def listen(self, seconds: float, /) -> Asked: ...
-    def close(self) -> Asked: ...
+    ) -> Asked[None]: ...
+    def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked[None]: ...
+    def echo(self, unit: int, word: int | None = None, /) -> Asked[float]: ...
+    def transact(self, unit: int, pdu: bytes, reply_length: int | None = None, /) -> Asked[bytes]: ...
+    def link(self, unit: int, /) -> Asked[tuple[int, int]]: ...
+    def sleep(self, seconds: float, /) -> Asked[None]: ...
+    def listen(self, seconds: float, /) -> Asked[list[tuple[float, bytes]]]: ...
+    def close(self) -> Asked[None]: ...
 
 def open_bus(
     mailbox: Mailbox,
@@ -297,7 +299,7 @@ def open_bus(
     learn_timeout: bool = False,
     low_latency: bool = True,
     queue: int = 65_536,
-) -> Asked:
+) -> Asked[Bus]:
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 
 @final
@@ -494,7 +496,7 @@ class Poller:
 
         Returns how many are there. A signal ends it at once.
         """
-    def ask(self, mailbox: Mailbox, count: int, timeout: float | None, /) -> Asked:
+    def ask(self, mailbox: Mailbox, count: int, timeout: float | None, /) -> Asked[None]:
         """As `wait`, for an event loop. On a real line without the *timeout*, which the loop keeps itself."""
     def take(self, max: int, /) -> Batch:  # noqa: A002
         """The oldest samples, *max* at most, without waiting."""

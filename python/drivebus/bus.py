@@ -11,23 +11,24 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native, checks, who
-from drivebus._native import SerialFormat
-from drivebus.at_once import BlockingBus, at_once
+from drivebus import _native, checks
 from drivebus.drive import Drive
-from drivebus.errors import NotAllowed
-from drivebus.figures import Link
-from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening, check_order, check_trust
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Found, Identification
+from drivebus.line.blocking import BlockingBus, at_once
+from drivebus.line.requests import Requests
+from drivebus.line.samples import Sample
+from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.operations.program_end import end_over
 from drivebus.poll import Poll
-from drivebus.polling import Sample
 from drivebus.profile import Profile
-from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 
 
-class Bus(BusFace[_native.Bus]):
+class Bus(BusFace, Requests):
     """One line, opened at once. Safe from any thread; requests of several threads take turns.
 
     Args:
@@ -63,46 +64,13 @@ class Bus(BusFace[_native.Bus]):
         format: The `SerialFormat` in force.
     """
 
-    def __init__(
-        self,
-        port: object,
-        *,
-        baudrate: int = 19200,
-        parity: str = "E",
-        stopbits: int = 1,
-        bytesize: int = 8,
-        silence: str | float = "spec",
-        timeout: float = 0.5,
-        retries: int = 2,
-        read_only: bool = False,
-        rs485: Mapping[str, object] | None = None,
-        echo: str = "auto",
-        turnaround: float = 0.1,
-        learn_timeout: bool = False,
-        low_latency: bool = True,
-        queue: int = 65_536,
-    ) -> None:
-        opening = Opening(
-            port,
-            SerialFormat(baudrate, parity, stopbits, bytesize, silence),
-            timeout=timeout,
-            retries=retries,
-            read_only=read_only,
-            rs485=rs485,
-            echo=echo,
-            turnaround=turnaround,
-            learn_timeout=learn_timeout,
-            low_latency=low_latency,
-            queue=queue,
-        )
-        super().__init__(opening, _native.Bus(opening.target, opening.format, **opening.keywords))
+    def _begin(self, opening: Opening) -> None:
+        self._opening = opening
+        self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
+        Requests.__init__(self, self._native, opening.known)
 
-    @classmethod
-    def around(cls, opening: Opening, native: _native.Bus) -> Bus:
-        """Another face of a bus that is open."""
-        self = cls.__new__(cls)
-        BusFace.__init__(self, opening, native)
-        return self
+    def _core(self) -> _native.Bus:
+        return self._native
 
     def close(self) -> None:
         """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
@@ -112,13 +80,8 @@ class Bus(BusFace[_native.Bus]):
         """
         end_over(self.line)
         self._native.close()
-        if self._owned is not None:
-            self._owned.close()
-
-    @property
-    def line(self) -> object:
-        """What stands for the line: the same for each face of it."""
-        return self._native
+        if self._opening.owned is not None:
+            self._opening.owned.close()
 
     def __enter__(self) -> Bus:
         return self
@@ -127,138 +90,6 @@ class Bus(BusFace[_native.Bus]):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def sleep(self, seconds: float, /) -> None:
-        """Waits on the line's clock. Ctrl-C ends it at once."""
-        return self._native.sleep(checks.number("seconds", seconds, 0.0))
-
-    def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
-        """What comes within *seconds* while nothing is asked: pieces, each with its moment on the line's clock.
-
-        On a sound line of one's own that is nothing. Requests of other threads go before, within 50 ms; their answers
-        are theirs.
-        """
-        return self._native.listen(checks.number("seconds", seconds, 0.0))
-
-    def read(self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
-        """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.
-
-        Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
-
-        While a late answer to an earlier request could pass for the one to this read, a few words more may be asked
-        for, 16 at most, and cut off again. A call sends 8 requests at most for each time that it may ask (1 + *retries*
-        of the bus), whatever they are for.
-
-        An *urgent* read overtakes all who wait: for confirming a stop. With *verify* it is asked until the same words
-        came twice in a row: against noise that happens to match its CRC, as one damaged answer in 65 536 does.
-
-        Raises:
-            NoAnswer, BadAnswer: After the bus's retries; with *verify*, also where the words change all the time.
-            PortError: The port is lost, or the bus closed.
-            Refused: The unit says no. What its code means in this family, only a `Drive` knows.
-        """
-        unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
-        check_order(urgent, verify)
-        return self._native.read(unit, address, count, urgent=urgent, verify=verify)
-
-    def read_stamped(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
-    ) -> tuple[list[int], float, float]:
-        """As `read`, with the Unix times at which the request left and at which the answer was complete."""
-        unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
-        check_order(urgent, verify)
-        return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify)
-
-    def write(
-        self,
-        unit: int,
-        address: int,
-        value: int | Sequence[int],
-        *,
-        urgent: bool = False,
-        read_back: int | None = None,
-        connection: int | None = None,
-        force: bool = False,
-    ) -> None:
-        """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
-
-        A word in a command register moves the motor. Of units for which `drive` was asked, the family is known: a word
-        that would be a command which that family does not define, or the command register of another one, is refused
-        unless *force*. Of other units nothing is known here.
-
-        A unit that may still owe another answer is first asked for an echo, or for a read that cannot be mistaken; if
-        it answers neither, the write is not sent. An *urgent* write does without it and overtakes all who wait: that is
-        for a stop, which a drive may hear although nothing is heard of it. Its confirmation may belong to the very same
-        write, sent before.
-
-        With *read_back*, the address at which the same words can be read, a confirmation that is missing is looked for
-        there, and the write is repeated (the bus's retries) only while the unit shows other words. That is for absolute
-        values such as a setpoint; what a command did, nobody can read back.
-
-        With *connection*, the `reconnects` at which you saw who answers, nothing is sent where the port was opened
-        again since, for another unit may have the address now: `PortError`, whose `started` is None.
-
-        Raises:
-            NotAllowed: An argument is out of range, the bus is read-only, or it would be such a command. Nothing was
-                sent.
-            NoAnswer, BadAnswer, PortError: The unit may have taken it all the same, unless the error's `started` is
-                None: then it was not sent.
-            Refused: The unit did not take it.
-            Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
-        """
-        if read_back is not None:
-            read_back = checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
-        if connection is not None:
-            connection = checks.whole("connection", connection, 0, 2**63)
-        unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
-        check_order(urgent)
-        self._known.check(unit, address, words, checks.flag("force", force))
-        return self._native.write(unit, address, words, urgent=urgent, read_back=read_back, connection=connection)
-
-    def link(self, unit: int) -> Link:
-        """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
-        return Link(*self._native.link(checks.unit(unit)))
-
-    def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
-        """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once.
-
-        Refused as `write` refuses it if one of the units whose family is known would take it for something else.
-        """
-        address, words = checks.address(address), checks.payload(value)
-        self._known.check(0, address, words, checks.flag("force", force))
-        return self._native.broadcast(address, words)
-
-    def echo(self, unit: int, word: int | None = None) -> float:
-        """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
-        if word is not None:
-            word = checks.whole("word", word, 0, 0xFFFF, hexadecimal=True)
-        return self._native.echo(checks.unit(unit), word)
-
-    def transact(
-        self,
-        unit: int,
-        pdu: bytes | bytearray | memoryview,
-        reply_length: int | None = None,
-        *,
-        force: bool = False,
-    ) -> bytes:
-        """Sends any PDU (1..253 bytes) and returns the answer's PDU; unit and CRC are added and checked. Sent once.
-
-        *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence,
-        and what the specification says of that function's answers is checked.
-        What 06H and 10H would write is refused as `write` refuses it, unless *force*.
-        """
-        try:
-            body = bytes(memoryview(pdu))
-        except TypeError:
-            raise NotAllowed(f"PDU {pdu!r} is not bytes; give 1..253 bytes, function code first") from None
-        if not 1 <= len(body) <= 253:
-            raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1..253 bytes, function code first")
-        if reply_length is not None:
-            reply_length = checks.whole("reply_length", reply_length, 1, 253)
-        unit = checks.unit(unit)
-        self._known.check_pdu(unit, body, checks.flag("force", force))
-        return self._native.transact(unit, body, reply_length)
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
         """Asks each of *units* who it is, and yields those that answer as they do.
@@ -271,14 +102,14 @@ class Bus(BusFace[_native.Bus]):
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
         """
-        return self._scan(who.units(units), who.time_for(timeout, self._timeout))
+        return self._scan(scan.units(units), scan.time_for(timeout, self._opening.timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
         async def read(unit: int, address: int) -> list[int]:
             return self._native.read(unit, address, 1, timeout=timeout, retries=0)
 
         for unit in units:
-            found = at_once(who.look_for(read, self.now, unit))
+            found = at_once(scan.look_for(read, self.now, unit))
             if found is not None:
                 yield found
 
@@ -290,7 +121,7 @@ class Bus(BusFace[_native.Bus]):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(who.identified(BlockingBus(self), checks.unit(unit)))
+        return at_once(identify(BlockingBus(self).read, checks.unit(unit)))
 
     def drive(
         self,
@@ -321,9 +152,9 @@ class Bus(BusFace[_native.Bus]):
         """
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = at_once(who.profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
-        self._known.add(unit, known)
+        self._opening.known.add(unit, known)
         return drive
 
     def poll(

@@ -1,7 +1,7 @@
 """One drive on a line: commands, values, and what it says about itself, in the words of its family.
 
 Each call here carries out at once what stands, once, in `drivebus.operations`. What it needs of the line and of the
-profile stands in `drivebus.protocols`. Time is the line's clock, so everything here runs in virtual time as well.
+profile stands in `drivebus.line.protocols`. Time is the line's clock, so everything here runs in virtual time as well.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import overload
 
-from drivebus.at_once import BlockingBus, at_once, blocking, documented_by
-from drivebus.moving import Moving
-from drivebus.operations import Operations
-from drivebus.protocols import BusProtocol, ProfileProtocol
-from drivebus.setpoints import SETPOINTS
-from drivebus.values import Description, Value
+from drivebus.backup import keeping
+from drivebus.line.blocking import BlockingBus, at_once
+from drivebus.line.protocols import BusProtocol
+from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
+from drivebus.operations.motor_block import MotorBlock
+from drivebus.operations.setpoints import SETPOINTS
+from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
+from drivebus.values import Value
 from drivebus.watchdog import Watchdog
 
 __all__ = ["Drive"]
@@ -34,13 +38,13 @@ class _Setpoint:
     @overload
     def __get__(self, drive: Drive, owner: type[Drive]) -> float: ...
     def __get__(self, drive: Drive | None, owner: type[Drive]) -> float | _Setpoint:
-        return self if drive is None else at_once(drive._operations.ask(self._name))
+        return self if drive is None else at_once(setpoints.ask(unit_of(drive), self._name))
 
     def __set__(self, drive: Drive, value: float) -> None:
-        at_once(drive._operations.give(self._name, value))
+        at_once(setpoints.give(unit_of(drive), self._name, value))
 
 
-class Drive:
+class Drive(DriveFace):
     """A drive, as `drivebus.Bus.drive` gives it.
 
     Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,
@@ -61,59 +65,50 @@ class Drive:
         self,
         bus: BusProtocol,
         unit: int,
-        profile: ProfileProtocol,
+        profile: Profile,
         identification: int | None = None,
         *,
         unverified: bool = False,
         trust_profile: bool = False,
     ) -> None:
         self.bus = bus
-        self.unit = unit
-        self.profile = profile
-        self._operations = Operations(
-            BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile
+        super().__init__(
+            Unit.at(BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
         )
 
-    def __repr__(self) -> str:
-        return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
-
-    @property
-    def unverified(self) -> bool:
-        """Whether what no document of its family proves is done all the same, in every call."""
-        return self._operations.unverified
-
-    run = blocking(Operations.run)
-    jog = blocking(Operations.jog)
-    stop = blocking(Operations.stop)
-    coast = blocking(Operations.coast)
-    jog_stop = blocking(Operations.jog_stop)
-    reset_fault = blocking(Operations.reset_fault)
-    look = blocking(Operations.look)
-    state = blocking(Operations.state)
-    status = blocking(Operations.status)
-    fault = blocking(Operations.fault)
-    fault_history = blocking(Operations.fault_history)
-    monitor = blocking(Operations.monitor)
-    snapshot = blocking(Operations.snapshot)
-    read_words = blocking(Operations.read_words)
-    write_words = blocking(Operations.write_words)
-    bits = blocking(Operations.bits)
-    inputs = blocking(Operations.inputs)
-    outputs = blocking(Operations.outputs)
-    set_virtual_inputs = blocking(Operations.set_virtual_inputs)
-    set_virtual_outputs = blocking(Operations.set_virtual_outputs)
-    special_control = blocking(Operations.special_control)
-    ask = blocking(Operations.ask)
-    give = blocking(Operations.give)
-    ping = blocking(Operations.ping)
-    contradiction = blocking(Operations.contradiction)
-    wait_for_speed = blocking(Operations.wait_for_speed)
-    wait_until_stopped = blocking(Operations.wait_until_stopped)
-    check_control = blocking(Operations.check_control)
-    prepare_control = blocking(Operations.prepare_control)
-    backup = blocking(Operations.backup)
-    restore = blocking(Operations.restore)
-    diff = blocking(Operations.diff)
+    # Names that are also rooms come after what is taken from the room.
+    run = blocking(motion.run)
+    jog = blocking(motion.jog)
+    stop = blocking(motion.stop)
+    coast = blocking(motion.coast)
+    jog_stop = blocking(motion.jog_stop)
+    reset_fault = blocking(motion.reset_fault)
+    look = blocking(state.look)
+    status = blocking(state.status)
+    fault = blocking(state.fault)
+    fault_history = blocking(state.fault_history)
+    monitor = blocking(registers.monitor)
+    snapshot = blocking(registers.snapshot)
+    read_words = blocking(words.read_words)
+    write_words = blocking(words.write_words)
+    inputs = blocking(bits.inputs)
+    outputs = blocking(bits.outputs)
+    set_virtual_inputs = blocking(bits.set_virtual_inputs)
+    set_virtual_outputs = blocking(bits.set_virtual_outputs)
+    special_control = blocking(bits.special_control)
+    bits = blocking(bits.bits)
+    ask = blocking(setpoints.ask)
+    give = blocking(setpoints.give)
+    ping = blocking(state.ping)
+    state = blocking(state.state)
+    contradiction = blocking(registers.contradiction)
+    wait_for_speed = blocking(waiting.wait_for_speed)
+    wait_until_stopped = blocking(waiting.wait_until_stopped)
+    check_control = blocking(control.check_control)
+    prepare_control = blocking(control.prepare_control)
+    backup = blocking(keeping.backup)
+    restore = blocking(keeping.restore)
+    diff = blocking(keeping.diff)
 
     torque = _Setpoint("torque")
     pid = _Setpoint("pid")
@@ -125,23 +120,6 @@ class Drive:
     vf_voltage = _Setpoint("vf_voltage")
     analog_output_1 = _Setpoint("analog_output_1")
     analog_output_2 = _Setpoint("analog_output_2")
-
-    @documented_by(Operations.readable)
-    def readable(self, *names: str) -> list[str]:
-        """See `Operations.readable`."""
-        return self._operations.readable(*names)
-
-    def describe(self, name: str) -> Description:
-        """All that is known of a register or parameter. Nothing is sent.
-
-        Raises:
-            NotAllowed: Unknown name; the message has the closest.
-        """
-        return self._operations.describe(name)
-
-    def value(self, name: str, raw: int) -> Value:
-        """The word *raw* of *name* in engineering units."""
-        return self._operations.value(name, raw)
 
     @property
     def setpoint(self) -> float:
@@ -155,11 +133,11 @@ class Drive:
             Unconfirmed: The drive shows another setpoint, however often it was written.
             Refused: The drive kept the old one.
         """
-        return at_once(self._operations.ask_setpoint())
+        return at_once(setpoints.ask_setpoint(unit_of(self)))
 
     @setpoint.setter
     def setpoint(self, hz: float) -> None:
-        at_once(self._operations.set_setpoint(hz))
+        at_once(setpoints.set_setpoint(unit_of(self), hz))
 
     @overload
     def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
@@ -167,16 +145,16 @@ class Drive:
     def read(
         self, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
     ) -> dict[str, Value]: ...
-    @documented_by(Operations.read)
+    @documented_by(registers.read)
     def read(self, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
-        """See `Operations.read`."""
-        return at_once(self._operations.read(*names, verify=verify, unverified=unverified))
+        """See `registers.read`."""
+        return at_once(registers.read(unit_of(self), *names, verify=verify, unverified=unverified))
 
     @overload
     def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
     @overload
     def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
-    @documented_by(Operations.write)
+    @documented_by(parameters.write)
     def write(
         self,
         name: str | Mapping[str, object],
@@ -185,11 +163,11 @@ class Drive:
         *,
         unverified: bool = False,
     ) -> None:
-        """See `Operations.write`."""
+        """See `parameters.write`."""
         if isinstance(name, Mapping):
-            at_once(self._operations.write(name, store=store, unverified=unverified))
+            at_once(parameters.write(unit_of(self), name, store=store, unverified=unverified))
         else:
-            at_once(self._operations.write(name, value, store, unverified=unverified))
+            at_once(parameters.write(unit_of(self), name, value, store, unverified=unverified))
 
     @contextmanager
     def running(
@@ -231,7 +209,7 @@ class Drive:
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
 
         def end() -> None:
-            ends_alone = self._operations.trusting(unverified).has_jog_stop()
+            ends_alone = motion.has_jog_stop(unit_of(self).trusting(unverified))
             self._end(self.jog_stop if ends_alone else self.stop, unverified)
 
         with self._moving(jog, end, unverified):
@@ -266,7 +244,7 @@ class Drive:
                 *timeout* is over.
             Unconfirmed: The drive took the settings and shows others; it was given back those it had.
         """
-        return Watchdog(self._operations.trusting(unverified), timeout, action)
+        return Watchdog(unit_of(self).trusting(unverified), timeout, action)
 
     def _end(self, halt: Callable[..., None], unverified: bool) -> None:
         """Halts it; with the trust of its start, where that had any."""
@@ -279,14 +257,14 @@ class Drive:
         async def begin() -> None:
             start()
 
-        async def finish(_: Operations) -> None:
+        async def finish(_: Unit) -> None:
             end()
 
-        moving = Moving(self._operations.trusting(unverified), begin, finish)
+        block = MotorBlock(unit_of(self).trusting(unverified), begin, finish)
         try:
-            at_once(moving.begin())
+            at_once(block.begin())
             yield
         except BaseException as reason:
-            at_once(moving.fail(reason))
+            at_once(block.fail(reason))
             raise
-        at_once(moving.finish())
+        at_once(block.finish())

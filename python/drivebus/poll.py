@@ -15,7 +15,7 @@ from types import TracebackType
 
 from drivebus import _native
 from drivebus.errors import NotAllowed
-from drivebus.polling import MOST_SAMPLES, Batch, Polling, Sample, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
@@ -44,6 +44,8 @@ class Poll(Polling):
         if callback is not None and not callable(callback):
             raise NotAllowed(f"callback {callback!r} cannot be called; give a function that takes a sample")
         super().__init__(bus, native, targets, interval, size)
+        self._native = poller_of(self)
+        self._bus = native
         self._callback = callback
         self._error: BaseException | None = None
         self._closing = False
@@ -64,7 +66,7 @@ class Poll(Polling):
             PortError: The poll belongs to the parent of this process.
         """
         self._not_called_back()
-        self._native.wait(self._wanted(count), seconds(timeout))
+        self._native.wait(how_many(self, count), seconds(timeout))
         return self.take(count)
 
     def __iter__(self) -> Iterator[Sample]:

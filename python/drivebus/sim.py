@@ -295,6 +295,11 @@ def first_served(transports: Sequence[str], served: Callable[[str], _T]) -> tupl
     raise NotAllowed("no transport was given")
 
 
+def core_of(simulator: Simulator) -> _native.Simulator:
+    """What serves the line, in the core."""
+    return simulator._native
+
+
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:
     """*faults* as rates, if each is a kind of fault (or "all") with a share that this transport can have."""
     if not isinstance(faults, Mapping):

@@ -330,5 +330,5 @@ class Snapshot(Named[Value]):
         self.duration = duration
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={value} {self.units[name]}".rstrip() for name, value in self._values.items())
+        shown = ", ".join(f"{name}={value} {self.units[name]}".rstrip() for name, value in self.items())
         return f"Snapshot({shown})"

@@ -13,8 +13,8 @@ import os
 import pytest
 
 import drivebus
-from drivebus import ports
 from drivebus.doctor import examine
+from drivebus.line import ports
 
 pytestmark = [
     pytest.mark.hardware,

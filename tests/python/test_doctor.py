@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 import drivebus
-from drivebus import Bus, NotAllowed, PortError, Simulator, ports
+from drivebus import Bus, NotAllowed, PortError, Simulator
 from drivebus.doctor import Finding, Severity, examine
-from drivebus.doctor.search import Settings, candidates
-from drivebus.doctor.traffic import frames_in
+from drivebus.doctor.frames import frames_in
+from drivebus.doctor.settings import Settings, candidates
+from drivebus.line import ports
 
 READ = bytes.fromhex("01 03 00 04 00 02 85 CA")  # GD350 manual, chapter 9.4.1, request and answer
 ANSWER = bytes.fromhex("01 03 04 13 88 00 00 7E 9D")

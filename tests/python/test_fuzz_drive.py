@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from fuzz.drive import drive
 
-from drivebus import commanding, motion, parameters
+from drivebus.operations import commands, parameters
+from drivebus.operations.unit import Unit
 
 CORPUS = Path(__file__).parents[2] / "fuzz" / "corpus" / "drive"
 FILES = sorted(CORPUS.iterdir())
@@ -30,17 +31,17 @@ async def _proved_by_nothing(*_: object, **__: object) -> None:
 
 
 def _sent_twice(send: Callable[..., object]) -> Callable[..., object]:
-    async def twice(self: object, name: str, *rest: object) -> None:
-        await send(self, name, *rest)  # type: ignore[misc]
-        await send(self, name, *rest)  # type: ignore[misc]
+    async def twice(unit: object, name: str, *rest: object) -> None:
+        await send(unit, name, *rest)  # type: ignore[misc]
+        await send(unit, name, *rest)  # type: ignore[misc]
 
     return twice
 
 
 def _sent_by_nobody(send: Callable[..., object]) -> Callable[..., object]:
-    async def vanished(self: object, name: str, *rest: object) -> None:
+    async def vanished(unit: object, name: str, *rest: object) -> None:
         if name != "coast":
-            await send(self, name, *rest)  # type: ignore[misc]
+            await send(unit, name, *rest)  # type: ignore[misc]
 
     return vanished
 
@@ -55,22 +56,22 @@ def found() -> Iterator[str]:
 
 
 def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commanding.Commanding, "_command", _sent_twice(commanding.Commanding._command))
+    monkeypatch.setattr(commands, "give", _sent_twice(commands.give))
     assert any("a command went out twice" in said for said in found())
 
 
 def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commanding.Commanding, "_command", _sent_by_nobody(commanding.Commanding._command))
-    monkeypatch.setattr(motion.Motion, "_confirm", _proved_by_nothing)
+    monkeypatch.setattr(commands, "give", _sent_by_nobody(commands.give))
+    monkeypatch.setattr(commands, "confirm", _proved_by_nothing)
     assert any("it was not halted" in said for said in found())
 
 
 def test_a_write_that_is_reported_done_and_was_not_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = parameters.Parameters._write_one
+    write = parameters.write_one
 
-    async def loses(self: parameters.Parameters, item: Any, store: bool) -> None:
+    async def loses(unit: Unit, item: Any, store: bool) -> None:
         if item.raw <= MOST_AT_FIRST:
-            await write(self, item, store)
+            await write(unit, item, store)
 
-    monkeypatch.setattr(parameters.Parameters, "_write_one", loses)
+    monkeypatch.setattr(parameters, "write_one", loses)
     assert any("was there" in said and "is;" in said for said in found())

@@ -178,7 +178,7 @@ def test_a_code_of_several_families_with_profiles_is_not_enough(
         {"code": 0x010A, "family": name, "title": name.upper(), "shared": [], "verified": True, "source": "a manual"}
         for name in names
     ]
-    monkeypatch.setattr("drivebus.identify.codes", lambda: {0x010A: rows})
+    monkeypatch.setattr("drivebus.identify.codes.listed", lambda: {0x010A: rows})
     found = bus.identify(2)
     assert (found.certainty, found.candidates, found.family) == ("shared", names, None)
     all_but_last = ", ".join(names[:-1])

@@ -15,7 +15,8 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator
-from drivebus.operations import Operations
+from drivebus.operations import registers
+from drivebus.operations.unit import Unit
 
 RAM, ACTION, TIMEOUT = 0x8000, 0x0E05, 0x0E04
 CE = 18
@@ -143,7 +144,7 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
     async def snapshot(*_: object) -> object:
         return next(shown)
 
-    monkeypatch.setattr(Operations, "snapshot", snapshot)
+    monkeypatch.setattr(registers, "snapshot", snapshot)
     with pytest.raises(drivebus.Unconfirmed, match=r"unit 1 took .* and shows"):
         virtual_drive.watchdog(1.0, unverified=True)
     assert settings(virtual) == (0, 2)
@@ -152,16 +153,16 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
 def test_one_that_is_interrupted_gives_back_what_the_drive_had(
     virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    snapshot = Operations.snapshot
+    snapshot = registers.snapshot
     asked: list[str] = []
 
-    async def interrupted(operations: Operations, *names: str) -> drivebus.Snapshot:
+    async def interrupted(unit: Unit, *names: str) -> drivebus.Snapshot:
         asked.extend(names)
         if len(asked) > len(names):
             raise KeyboardInterrupt
-        return await snapshot(operations, *names)
+        return await snapshot(unit, *names)
 
-    monkeypatch.setattr(Operations, "snapshot", interrupted)
+    monkeypatch.setattr(registers, "snapshot", interrupted)
     with pytest.raises(KeyboardInterrupt):
         virtual_drive.watchdog(1.0, unverified=True)
     assert written(virtual)[:2] == [(ACTION, 0), (TIMEOUT, 10)]

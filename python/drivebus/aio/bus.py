@@ -2,47 +2,36 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import os
-from collections.abc import AsyncIterator, Callable, Coroutine, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Generator, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import Any
 
-from drivebus import bus, checks, who
-from drivebus._native import SerialFormat
+from drivebus import _native, checks
 from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
-from drivebus.at_once import BlockingBus
+from drivebus.aio.requests import AwaitedRequests
 from drivebus.errors import PortError
-from drivebus.figures import Link
-from drivebus.found import Found, Identification
-from drivebus.opening import BusFace, Opening, check_trust
+from drivebus.identify import scan
+from drivebus.identify.choose import profile_of
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Found, Identification
+from drivebus.line.blocking import BlockingBus
+from drivebus.line.protocols import AwaitableBus
+from drivebus.line.requests import Requests
+from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.line.stats import Link
+from drivebus.operations.face import documented_by
+from drivebus.operations.program_end import end_over
 from drivebus.profile import Profile
-from drivebus.safeguard import end_over
 
 __all__ = ["Bus"]
 
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
 
-
-def _awaited(method: Callable[Concatenate[bus.Bus, _P], _R]) -> Callable[Concatenate[Bus, _P], Coroutine[Any, Any, _R]]:
-    """The synchronous method over a line whose calls are awaited: it checks, asks, and returns what comes."""
-
-    @functools.wraps(method)
-    async def call(face: Bus, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        face._check_open()
-        work: Any = method(face, *args, **kwargs)  # type: ignore[arg-type]  # all that it uses is here
-        result: _R = await work
-        return result
-
-    return call
-
-
-class Bus(BusFace[Line]):
+class Bus(BusFace):
     """One line, as `drivebus.Bus`, for asyncio.
 
         async with drivebus.aio.Bus("/dev/ttyUSB0") as bus:
@@ -59,39 +48,11 @@ class Bus(BusFace[Line]):
     May be used from any task of any event loop, one loop after the other or several at once.
     """
 
-    def __init__(
-        self,
-        port: object,
-        *,
-        baudrate: int = 19200,
-        parity: str = "E",
-        stopbits: int = 1,
-        bytesize: int = 8,
-        silence: str | float = "spec",
-        timeout: float = 0.5,
-        retries: int = 2,
-        read_only: bool = False,
-        rs485: Mapping[str, object] | None = None,
-        echo: str = "auto",
-        turnaround: float = 0.1,
-        learn_timeout: bool = False,
-        low_latency: bool = True,
-        queue: int = 65_536,
-    ) -> None:
-        self._opening = Opening(
-            port,
-            SerialFormat(baudrate, parity, stopbits, bytesize, silence),
-            timeout=timeout,
-            retries=retries,
-            read_only=read_only,
-            rs485=rs485,
-            echo=echo,
-            turnaround=turnaround,
-            learn_timeout=learn_timeout,
-            low_latency=low_latency,
-            queue=queue,
-        )
-        self._shown = str(port)
+    def _begin(self, opening: Opening) -> None:
+        self._opening = opening
+        self._native: _native.Bus | None = None
+        self._line: Line | None = None
+        self._requests: AwaitedRequests | None = None
 
     @classmethod
     async def open(cls, port: object, **keywords: Any) -> Bus:
@@ -102,41 +63,39 @@ class Bus(BusFace[Line]):
         return self.__aenter__().__await__()
 
     async def _open(self) -> Bus:
+        opening = self._opening
         try:
-            line = await Line.open(self._opening.target, self._opening.format, self._opening.keywords)
+            line = await Line.open(opening.target, opening.format, opening.keywords)
         except BaseException:
-            if self._opening.owned is not None:
-                self._opening.owned.close()
+            if opening.owned is not None:
+                opening.owned.close()
             raise
-        super().__init__(self._opening, line)
+        self._native = line.native
+        self._line = line
+        self._requests = AwaitedRequests(line, opening.known)
         return self
 
+    def _core(self) -> _native.Bus:
+        if self._native is None:
+            shown = self._opening.shown
+            raise PortError(f"{shown} is not open yet; say `async with Bus(…) as bus:` or `await Bus.open(…)`")
+        return self._native
+
+    def _asked(self) -> AwaitedRequests:
+        self._core()
+        assert self._requests is not None
+        return self._requests
+
     async def __aenter__(self) -> Bus:
-        return self if self._is_open else await self._open()
+        return self if self._native is not None else await self._open()
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self.close()
 
-    @property
-    def _is_open(self) -> bool:
-        return "_native" in self.__dict__
-
-    if not TYPE_CHECKING:  # a type checker knows what there is
-
-        def __getattr__(self, name: str) -> Any:
-            # What is missing before the bus was opened is there afterwards.
-            if not self._is_open and not name.startswith("__"):
-                self._check_open()
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise PortError(f"{self._shown} is not open yet; say `async with Bus(…) as bus:` or `await Bus.open(…)`")
-
     def __repr__(self) -> str:
-        return super().__repr__() if self._is_open else f"<Bus on {self._shown}, not open yet>"
+        return super().__repr__() if self._native is not None else f"<Bus on {self._opening.shown}, not open yet>"
 
     async def close(self) -> None:
         """Closes the port, and ends a simulator that this bus made. Closing again does nothing.
@@ -144,45 +103,95 @@ class Bus(BusFace[Line]):
         A motor that a block of another task runs over it is stopped before. What still waits for the line ends with
         `PortError`.
         """
-        if not self._is_open:
+        if self._line is None:
             return
         end_over(self.line)
-        with self._native.undisturbed() as line:
+        with self._line.undisturbed() as line:
             await line.close()
-            if self._owned is not None:
-                self._owned.close()
+            if self._opening.owned is not None:
+                self._opening.owned.close()
 
-    read = _awaited(bus.Bus.read)
-    read_stamped = _awaited(bus.Bus.read_stamped)
-    write = _awaited(bus.Bus.write)
-    broadcast = _awaited(bus.Bus.broadcast)
-    echo = _awaited(bus.Bus.echo)
-    transact = _awaited(bus.Bus.transact)
-    sleep = _awaited(bus.Bus.sleep)
-    listen = _awaited(bus.Bus.listen)
+    @documented_by(Requests.read)
+    async def read(
+        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """See `Requests.read`."""
+        return await self._asked().read(unit, address, count, urgent=urgent, verify=verify)
 
+    @documented_by(Requests.read_stamped)
+    async def read_stamped(
+        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """See `Requests.read_stamped`."""
+        return await self._asked().read_stamped(unit, address, count, urgent=urgent, verify=verify)
+
+    @documented_by(Requests.write)
+    async def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+        force: bool = False,
+    ) -> None:
+        """See `Requests.write`."""
+        await self._asked().write(
+            unit, address, value, urgent=urgent, read_back=read_back, connection=connection, force=force
+        )
+
+    @documented_by(Requests.broadcast)
+    async def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
+        """See `Requests.broadcast`."""
+        await self._asked().broadcast(address, value, force=force)
+
+    @documented_by(Requests.echo)
+    async def echo(self, unit: int, word: int | None = None) -> float:
+        """See `Requests.echo`."""
+        return await self._asked().echo(unit, word)
+
+    @documented_by(Requests.transact)
+    async def transact(
+        self,
+        unit: int,
+        pdu: bytes | bytearray | memoryview,
+        reply_length: int | None = None,
+        *,
+        force: bool = False,
+    ) -> bytes:
+        """See `Requests.transact`."""
+        return await self._asked().transact(unit, pdu, reply_length, force=force)
+
+    @documented_by(Requests.sleep)
+    async def sleep(self, seconds: float, /) -> None:
+        """See `Requests.sleep`."""
+        await self._asked().sleep(seconds)
+
+    @documented_by(Requests.listen)
+    async def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
+        """See `Requests.listen`."""
+        return await self._asked().listen(seconds)
+
+    @documented_by(Requests.link)
     async def link(self, unit: int, /) -> Link:
-        """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
-        self._check_open()
-        return Link(*await self._native.link(checks.unit(unit)))
+        """See `Requests.link`."""
+        return await self._asked().link(unit)
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
-        self._check_open()
-        return self._scan(who.units(units), who.time_for(timeout, self._timeout))
+        return self._scan(self._asked(), scan.units(units), scan.time_for(timeout, self.timeout))
 
-    async def _scan(self, units: Iterable[int], timeout: float) -> AsyncIterator[Found]:
-        async def read(unit: int, address: int) -> list[int]:
-            return await self._native.read(unit, address, 1, timeout=timeout, retries=0)  # type: ignore[no-any-return]
-
+    async def _scan(self, line: AwaitedRequests, units: Iterable[int], timeout: float) -> AsyncIterator[Found]:
         for unit in units:
-            found = await who.look_for(read, self.now, unit)
+            found = await scan.look_for(functools.partial(line.look, timeout=timeout), self.now, unit)
             if found is not None:
                 yield found
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
-        return await who.identified(self, checks.unit(unit))
+        return await identify(self.read, checks.unit(unit))
 
     async def drive(
         self,
@@ -196,29 +205,24 @@ class Bus(BusFace[Line]):
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = await who.profile_of(self, unit, profile, variants, unverified)
+        known, code = await profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
-        self._known.add(unit, known)
+        self._opening.known.add(unit, known)
         return drive
 
     def poll(self, targets: Mapping[Any, Any], interval: float | None = None, *, size: int = 10_000) -> Poll:
         """As `drivebus.Bus.poll`, for `async with` and `async for`. It asks from now on, and keeps no event loop."""
-        self._check_open()
-        return Poll(self, self._native.native, targets, interval, size)
+        return Poll(self, self._core(), targets, interval, size)
 
     @property
     def line(self) -> object:
         """What stands for the line: the same for each face of it."""
-        return self._native.native
+        return self._core()
 
-    @contextmanager
-    def undisturbed(self) -> Iterator[Bus]:
+    def undisturbed(self) -> AbstractContextManager[AwaitableBus]:
         """The same line for a block in which nothing is given up: a cancellation is raised when the block has ended."""
-        with self._native.undisturbed() as line:
-            other = copy.copy(self)
-            other._native = line
-            yield other
+        return self._asked().undisturbed()
 
     def blocking(self) -> BlockingBus:
         """The same line for who has no event loop: it blocks."""
-        return BlockingBus(bus.Bus.around(self._opening, self._native.native))
+        return self._asked().blocking()

@@ -1,16 +1,22 @@
-"""One drive on a line, for asyncio: the operations themselves, to be awaited."""
+"""One drive on a line, for asyncio: the same operations, to be awaited."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, overload
 
 from drivebus.aio.watchdog import Watchdog
-from drivebus.moving import Moving
-from drivebus.operations import Operations
-from drivebus.setpoints import SETPOINTS
+from drivebus.backup import keeping
+from drivebus.line.protocols import AwaitableBus
+from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations.face import DriveFace, awaited, documented_by, unit_of
+from drivebus.operations.motor_block import MotorBlock
+from drivebus.operations.setpoints import SETPOINTS
+from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
+from drivebus.values import Value
 
 __all__ = ["Drive"]
 
@@ -37,23 +43,111 @@ class _Setpoint:
     @overload
     def __get__(self, drive: Drive, owner: type[Drive]) -> Awaitable[float]: ...
     def __get__(self, drive: Drive | None, owner: type[Drive]) -> Awaitable[float] | _Setpoint:
-        return self if drive is None else _Asked(lambda: drive.ask(self._name))
+        return self if drive is None else _Asked(lambda: setpoints.ask(unit_of(drive), self._name))
 
 
-class Drive(Operations):
+class Drive(DriveFace):
     """A drive, as `drivebus.aio.Bus.drive` gives it: what `drivebus.Drive` has, awaitable.
 
     Who cancels a command does not take it back: once its request has left, the drive does it. After that, ask for the
     state. A block of `running` or `jogging` stops the motor also where its task is cancelled, and again.
     """
 
-    def __repr__(self) -> str:
-        return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
+    def __init__(
+        self,
+        bus: AwaitableBus,
+        unit: int,
+        profile: Profile,
+        identification: int | None = None,
+        *,
+        unverified: bool = False,
+        trust_profile: bool = False,
+    ) -> None:
+        self.bus = bus
+        super().__init__(
+            Unit.at(bus, unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
+        )
+
+    # Names that are also rooms come after what is taken from the room.
+    run = awaited(motion.run)
+    jog = awaited(motion.jog)
+    stop = awaited(motion.stop)
+    coast = awaited(motion.coast)
+    jog_stop = awaited(motion.jog_stop)
+    reset_fault = awaited(motion.reset_fault)
+    look = awaited(state.look)
+    status = awaited(state.status)
+    fault = awaited(state.fault)
+    fault_history = awaited(state.fault_history)
+    monitor = awaited(registers.monitor)
+    snapshot = awaited(registers.snapshot)
+    read_words = awaited(words.read_words)
+    write_words = awaited(words.write_words)
+    inputs = awaited(bits.inputs)
+    outputs = awaited(bits.outputs)
+    set_virtual_inputs = awaited(bits.set_virtual_inputs)
+    set_virtual_outputs = awaited(bits.set_virtual_outputs)
+    special_control = awaited(bits.special_control)
+    bits = awaited(bits.bits)
+    ask = awaited(setpoints.ask)
+    give = awaited(setpoints.give)
+    ping = awaited(state.ping)
+    state = awaited(state.state)
+    contradiction = awaited(registers.contradiction)
+    wait_for_speed = awaited(waiting.wait_for_speed)
+    wait_until_stopped = awaited(waiting.wait_until_stopped)
+    check_control = awaited(control.check_control)
+    prepare_control = awaited(control.prepare_control)
+    backup = awaited(keeping.backup)
+    restore = awaited(keeping.restore)
+    diff = awaited(keeping.diff)
+
+    set_setpoint = awaited(setpoints.set_setpoint)
+    set_torque = awaited(setpoints.setter("torque"))
+    set_pid = awaited(setpoints.setter("pid"))
+    set_pid_feedback = awaited(setpoints.setter("pid_feedback"))
+    set_forward_limit = awaited(setpoints.setter("forward_limit"))
+    set_reverse_limit = awaited(setpoints.setter("reverse_limit"))
+    set_motoring_torque_limit = awaited(setpoints.setter("motoring_torque_limit"))
+    set_braking_torque_limit = awaited(setpoints.setter("braking_torque_limit"))
+    set_vf_voltage = awaited(setpoints.setter("vf_voltage"))
+    set_analog_output_1 = awaited(setpoints.setter("analog_output_1"))
+    set_analog_output_2 = awaited(setpoints.setter("analog_output_2"))
+
+    @overload
+    async def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
+    @overload
+    async def read(
+        self, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
+    ) -> dict[str, Value]: ...
+    @documented_by(registers.read)
+    async def read(self, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
+        """See `registers.read`."""
+        return await registers.read(unit_of(self), *names, verify=verify, unverified=unverified)
+
+    @overload
+    async def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+    @overload
+    async def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
+    @documented_by(parameters.write)
+    async def write(
+        self,
+        name: str | Mapping[str, object],
+        value: object = None,
+        store: bool = False,
+        *,
+        unverified: bool = False,
+    ) -> None:
+        """See `parameters.write`."""
+        if isinstance(name, Mapping):
+            await parameters.write(unit_of(self), name, store=store, unverified=unverified)
+        else:
+            await parameters.write(unit_of(self), name, value, store, unverified=unverified)
 
     @property
     def setpoint(self) -> Awaitable[float]:
         """The setpoint last given over the bus, in Hz: `await drive.setpoint`. `set_setpoint` gives another."""
-        return _Asked(self.ask_setpoint)
+        return _Asked(lambda: setpoints.ask_setpoint(unit_of(self)))
 
     torque = _Setpoint("torque")
     pid = _Setpoint("pid")
@@ -83,8 +177,8 @@ class Drive(Operations):
         `drivebus.Drive.running`.
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
-        moving = Moving(self.trusting(unverified), run, Operations.stop)
-        async with _block(moving):
+        block = MotorBlock(unit_of(self).trusting(unverified), run, motion.stop)
+        async with _block(block):
             yield self
 
     @asynccontextmanager
@@ -93,8 +187,8 @@ class Drive(Operations):
     ) -> AsyncIterator[Drive]:
         """Jogs the motor inside an `async with` block and ends the jog by all means. Otherwise as `running`."""
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-        moving = Moving(self.trusting(unverified), jog, Operations.end_jog)
-        async with _block(moving):
+        block = MotorBlock(unit_of(self).trusting(unverified), jog, motion.end_jog)
+        async with _block(block):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
@@ -107,16 +201,16 @@ class Drive(Operations):
         its state four times within *timeout*: where the event loop hangs, the drive acts. Otherwise as
         `drivebus.Drive.watchdog`.
         """
-        return Watchdog(self.trusting(unverified), timeout, action)
+        return Watchdog(unit_of(self).trusting(unverified), timeout, action)
 
 
 @asynccontextmanager
-async def _block(moving: Moving) -> AsyncIterator[None]:
+async def _block(block: MotorBlock) -> AsyncIterator[None]:
     """Starts, and ends by all means."""
     try:
-        await moving.begin()
+        await block.begin()
         yield
     except BaseException as reason:
-        await moving.fail(reason)
+        await block.fail(reason)
         raise
-    await moving.finish()
+    await block.finish()

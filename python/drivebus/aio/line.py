@@ -7,7 +7,7 @@ import functools
 import sys
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any, Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus import _native
 from drivebus.aio.mailbox import Mailbox
@@ -15,15 +15,16 @@ from drivebus.aio.mailbox import Mailbox
 __all__ = ["Line"]
 
 _P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
 def _awaited(
-    ask: Callable[Concatenate[_native.Requests, _P], _native.Asked],
-) -> Callable[Concatenate[Line, _P], Coroutine[Any, Any, Any]]:
+    ask: Callable[Concatenate[_native.Requests, _P], _native.Asked[_R]],
+) -> Callable[Concatenate[Line, _P], Coroutine[Any, Any, _R]]:
     """The call that asks with the first step of its coroutine, and waits for what comes."""
 
     @functools.wraps(ask)
-    async def call(line: Line, /, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+    async def call(line: Line, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         mailbox, requests = line._here()
         return await line._wait(mailbox, ask(requests, *args, **kwargs))
 
@@ -122,7 +123,7 @@ class Line:
             self._used_here = known = (loop, mailbox, _native.Requests(self.native, mailbox.native))
         return known[1:]
 
-    async def _wait(self, mailbox: Mailbox, asked: _native.Asked) -> Any:
+    async def _wait(self, mailbox: Mailbox, asked: _native.Asked[_R]) -> _R:
         if self._cancelled is None:
             return await mailbox.wait(asked)
         return await mailbox.wait_undisturbed(asked, self._cancelled)

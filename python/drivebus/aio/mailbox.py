@@ -9,11 +9,13 @@ import asyncio
 import socket
 import threading
 import weakref
-from typing import Any
+from typing import Any, TypeVar
 
 from drivebus import _native
 
 __all__ = ["Mailbox"]
+
+_T = TypeVar("_T")
 
 _mailboxes: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, Mailbox] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
@@ -45,7 +47,7 @@ class Mailbox:
                 mailbox = _mailboxes[loop] = cls(loop)
         return mailbox
 
-    async def wait(self, asked: _native.Asked) -> Any:
+    async def wait(self, asked: _native.Asked[_T]) -> _T:
         """What comes of *asked*. Who is cancelled here does not want it any more."""
         future = self._expect(asked)
         try:
@@ -57,7 +59,7 @@ class Mailbox:
         finally:
             self._rest()
 
-    async def wait_undisturbed(self, asked: _native.Asked, cancelled: list[BaseException]) -> Any:
+    async def wait_undisturbed(self, asked: _native.Asked[_T], cancelled: list[BaseException]) -> _T:
         """What comes of *asked*, whoever cancels it meanwhile: that is put into *cancelled*."""
         future = self._expect(asked)
         while not future.done():
@@ -68,9 +70,9 @@ class Mailbox:
         self._rest()
         return future.result()
 
-    def _expect(self, asked: _native.Asked) -> asyncio.Future[Any]:
+    def _expect(self, asked: _native.Asked[_T]) -> asyncio.Future[_T]:
         loop = asyncio.get_running_loop()
-        future: asyncio.Future[Any] = loop.create_future()
+        future: asyncio.Future[_T] = loop.create_future()
         self._waiting[asked.number] = future
         if not self._watched and (self._listener is None or self._listener.done()):
             self._listener = loop.create_task(self._listen(loop))

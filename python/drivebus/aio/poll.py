@@ -7,8 +7,9 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from types import TracebackType
 
+from drivebus import _native
 from drivebus.aio.mailbox import Mailbox
-from drivebus.polling import MOST_SAMPLES, Batch, Polling, Sample, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
@@ -21,6 +22,11 @@ class Poll(Polling):
     with it. Otherwise as `drivebus.Poll`.
     """
 
+    def __init__(self, bus: object, native: _native.Bus, targets: object, interval: float | None, size: int) -> None:
+        super().__init__(bus, native, targets, interval, size)
+        self._native = poller_of(self)
+        self._bus = native
+
     async def batch(self, count: int | None = None, timeout: float | None = None) -> Batch:
         """Waits until *count* samples are there, and takes as many. With None: until one is, and takes all.
 
@@ -29,7 +35,7 @@ class Poll(Polling):
         Raises:
             NotAllowed: More than are kept.
         """
-        await self._there(self._wanted(count), seconds(timeout))
+        await self._there(how_many(self, count), seconds(timeout))
         return self.take(count)
 
     async def __aiter__(self) -> AsyncIterator[Sample]:

@@ -7,20 +7,21 @@ from collections.abc import Generator
 from types import TracebackType
 from typing import Any
 
-from drivebus.motion import Motion
-from drivebus.watchdog import Settings
+from drivebus.operations.bus_timeout import BusTimeout
+from drivebus.operations.unit import Unit
 
 __all__ = ["Watchdog"]
 
 
-class Watchdog(Settings):
+class Watchdog(BusTimeout):
     """The drive's own time-out, set when this is awaited or entered, and kept from running out until `close`.
 
-    `Drive.watchdog` makes one. Attributes as in `drivebus.watchdog.Settings`.
+    `Drive.watchdog` makes one. Attributes as in `drivebus.watchdog.Watchdog`.
     """
 
-    def __init__(self, drive: Motion, timeout: float, action: str) -> None:
+    def __init__(self, drive: Unit, timeout: float, action: str) -> None:
         super().__init__(drive, timeout, action)
+        self._name = f"drivebus watchdog of unit {drive.address}"
         self._task: asyncio.Task[None] | None = None
 
     def __await__(self) -> Generator[Any, None, Watchdog]:
@@ -28,7 +29,7 @@ class Watchdog(Settings):
 
     async def _begin(self) -> Watchdog:
         await self.set()
-        self._task = asyncio.create_task(self._keep_busy(), name=f"drivebus watchdog of unit {self._drive.unit}")
+        self._task = asyncio.create_task(self._keep_busy(), name=self._name)
         return self
 
     async def close(self) -> None:

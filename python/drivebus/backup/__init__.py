@@ -5,8 +5,7 @@ was to be given back. `Drive.backup`, `Drive.diff` and `Drive.restore` make them
 """
 
 from drivebus.backup.compare import Diff, Difference
-from drivebus.backup.keeping import Keeping
 from drivebus.backup.model import Backup, Origin
 from drivebus.backup.report import Restoration, Restored
 
-__all__ = ["Backup", "Diff", "Difference", "Keeping", "Origin", "Restoration", "Restored"]
+__all__ = ["Backup", "Diff", "Difference", "Origin", "Restoration", "Restored"]

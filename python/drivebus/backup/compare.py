@@ -9,7 +9,7 @@ from typing import overload
 from drivebus.backup.rules import Rules
 from drivebus.backup.text import number, worded
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile import Profile
 from drivebus.values import Choice, Value
 
 __all__ = ["Diff", "Difference", "Side", "amount", "compare", "factory", "shown"]
@@ -101,7 +101,7 @@ class Side:
     partial: bool = False
 
 
-def compare(profile: ProfileProtocol, left: Side, right: Side, *, everything: bool = False) -> Diff:
+def compare(profile: Profile, left: Side, right: Side, *, everything: bool = False) -> Diff:
     """How *left* and *right*, in the words of one profile, differ.
 
     What tells nothing about how a drive is set (its fault history, what can only be read) is left out, unless
@@ -130,7 +130,7 @@ def compare(profile: ProfileProtocol, left: Side, right: Side, *, everything: bo
     return Diff(differences, left.name, right.name, compared, uncompared)
 
 
-def factory(profile: ProfileProtocol) -> Side:
+def factory(profile: Profile) -> Side:
     """What the factory set, as far as the profile knows."""
     raw = {}
     for code in Rules(profile).codes():
@@ -149,7 +149,7 @@ def shown(value: Value) -> str:
     return f"{int(value)} = {value.label}" if isinstance(value, Choice) else str(value)
 
 
-def amount(profile: ProfileProtocol, code: str, value: Value) -> str:
+def amount(profile: Profile, code: str, value: Value) -> str:
     """*value* of *code* with its unit."""
     known = profile.describe(code)
     text = shown(value) if isinstance(value, Choice) else number(value, known.scale)

@@ -17,168 +17,155 @@ from drivebus.backup.restoring import Restore
 from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress
 from drivebus.errors import NotAllowed
-from drivebus.parameters import Parameters
+from drivebus.operations.unit import Unit
 
-__all__ = ["Keeping"]
+__all__ = ["backup", "diff", "restore"]
 
 Kept = Backup | str | os.PathLike[str]
 """A backup, or the file of one."""
 
 
-class Keeping(Parameters):
-    """What a drive is set to, as a whole."""
+async def backup(
+    unit: Unit,
+    path: str | os.PathLike[str] | None = None,
+    resume: bool = True,
+    progress: Progress | None = None,
+    *,
+    unverified: bool = False,
+    force: bool = False,
+) -> Backup:
+    """Reads every parameter that can be read, in the fewest requests. Nothing is written to the drive.
 
-    async def backup(
-        self,
-        path: str | os.PathLike[str] | None = None,
-        resume: bool = True,
-        progress: Progress | None = None,
-        *,
-        unverified: bool = False,
-        force: bool = False,
-    ) -> Backup:
-        """Reads every parameter that can be read, in the fewest requests. Nothing is written to the drive.
+    With *path* the backup goes into that file, in one step when it is complete. Until then it grows in
+    `PATH.part`: after a break (a pulled cable, a killed process) the same call goes on where it was.
 
-        With *path* the backup goes into that file, in one step when it is complete. Until then it grows in
-        `PATH.part`: after a break (a pulled cable, a killed process) the same call goes on where it was.
+    Args:
+        path: Where to keep it; None keeps no file. `Backup.save` writes one later.
+        resume: Go on with what a break left behind; False begins anew.
+        progress: Is called with how many parameters are done, and how many there are.
+        unverified: Read also what this family is only assumed to have.
+        force: Replace a file that is another drive's, or no backup.
 
-        Args:
-            path: Where to keep it; None keeps no file. `Backup.save` writes one later.
-            resume: Go on with what a break left behind; False begins anew.
-            progress: Is called with how many parameters are done, and how many there are.
-            unverified: Read also what this family is only assumed to have.
-            force: Replace a file that is another drive's, or no backup.
+    Raises:
+        NotAllowed: The file is another drive's, or cannot be written; or the family has no known parameters.
+        Refused: The drive is locked by a password.
+        NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
+    """
+    resume, force = checks.flag("resume", resume), checks.flag("force", force)
+    place = None if path is None else _path(path)
+    return await taking.take(unit.trusting(unverified), place, resume=resume, force=force, progress=progress)
 
-        Raises:
-            NotAllowed: The file is another drive's, or cannot be written; or the family has no known parameters.
-            Refused: The drive is locked by a password.
-            NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
-        """
-        resume, force = checks.flag("resume", resume), checks.flag("force", force)
-        place = None if path is None else _path(path)
-        return await taking.take(self.trusting(unverified), place, resume=resume, force=force, progress=progress)
 
-    async def restore(
-        self,
-        backup: Kept,
-        dry_run: bool = False,
-        *,
-        groups: Sequence[str] | None = None,
-        serial: bool = False,
-        motor: bool = False,
-        force: bool = False,
-        twice: bool = False,
-        unverified: bool = False,
-        progress: Progress | None = None,
-    ) -> Restoration:
-        """Gives the drive back what *backup* has: only what differs, stored in EEPROM, and each read back.
+async def restore(
+    unit: Unit,
+    backup: Kept,
+    dry_run: bool = False,
+    *,
+    groups: Sequence[str] | None = None,
+    serial: bool = False,
+    motor: bool = False,
+    force: bool = False,
+    twice: bool = False,
+    unverified: bool = False,
+    progress: Progress | None = None,
+) -> Restoration:
+    """Gives the drive back what *backup* has: only what differs, stored in EEPROM, and each read back.
 
-        Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
-        settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
-        something when it is written; the report says so of each. Cut off at any moment, the same call goes on where it
-        was: the memory of no parameter is written twice, unless *twice*.
+    Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
+    settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
+    something when it is written; the report says so of each. Cut off at any moment, the same call goes on where it
+    was: the memory of no parameter is written twice, unless *twice*.
 
-        Args:
-            backup: A backup, or its file.
-            dry_run: Write nothing, and report what would be.
-            groups: Only these, such as `["P00", "P09"]`; single codes may be among them.
-            serial: Also the settings of the serial line. The drive may then not be heard any more.
-            motor: Also the data of the motor.
-            force: Also to a drive of another identification or firmware, or of another family: then what has the same
-                code there gets the same value.
-            twice: Where a drive stands beyond its own limits and only another value on the way leads to the wanted one,
-                write that to its memory too, if it cannot be written to RAM alone.
-            unverified: Also what this family is only assumed to have.
-            progress: Is called with how many parameters are done, and how many are to be written.
+    Args:
+        backup: A backup, or its file.
+        dry_run: Write nothing, and report what would be.
+        groups: Only these, such as `["P00", "P09"]`; single codes may be among them.
+        serial: Also the settings of the serial line. The drive may then not be heard any more.
+        motor: Also the data of the motor.
+        force: Also to a drive of another identification or firmware, or of another family: then what has the same
+            code there gets the same value.
+        twice: Where a drive stands beyond its own limits and only another value on the way leads to the wanted one,
+            write that to its memory too, if it cannot be written to RAM alone.
+        unverified: Also what this family is only assumed to have.
+        progress: Is called with how many parameters are done, and how many are to be written.
 
-        Raises:
-            NotAllowed: The file is wrong, or not of this drive; or the motor turns, or another drive answers at this
-                address since the port was opened again. Nothing was written.
-            NoAnswer, BadAnswer, PortError: The line failed; the error's note names what was restored before. Say it
-                again, and the rest follows.
+    Raises:
+        NotAllowed: The file is wrong, or not of this drive; or the motor turns, or another drive answers at this
+            address since the port was opened again. Nothing was written.
+        NoAnswer, BadAnswer, PortError: The line failed; the error's note names what was restored before. Say it
+            again, and the rest follows.
 
-        A refusal of one parameter ends nothing: it stands in the report.
-        """
-        dry_run, force = checks.flag("dry_run", dry_run), checks.flag("force", force)
-        serial, motor, twice = checks.flag("serial", serial), checks.flag("motor", motor), checks.flag("twice", twice)
-        kept = self._kept(backup, force)
-        work = Restore(self.trusting(unverified), kept, dry_run=dry_run, twice=twice, progress=progress)
-        return await work.run(groups=groups, serial=serial, motor=motor, force=force)
+    A refusal of one parameter ends nothing: it stands in the report.
+    """
+    dry_run, force = checks.flag("dry_run", dry_run), checks.flag("force", force)
+    serial, motor, twice = checks.flag("serial", serial), checks.flag("motor", motor), checks.flag("twice", twice)
+    kept = _kept(unit, backup, force)
+    work = Restore(unit.trusting(unverified), kept, dry_run=dry_run, twice=twice, progress=progress)
+    return await work.run(groups=groups, serial=serial, motor=motor, force=force)
 
-    async def diff(
-        self, backup: Kept | None = None, *, everything: bool = False, force: bool = False, unverified: bool = False
-    ) -> Diff:
-        """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.
 
-        Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
-        what can only be read) is left out, unless *everything*. The result is false where nothing differs.
+async def diff(
+    unit: Unit, backup: Kept | None = None, *, everything: bool = False, force: bool = False, unverified: bool = False
+) -> Diff:
+    """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.
 
-        Args:
-            backup: A backup, its file, or None.
-            everything: Compare also what changes by itself.
-            force: Compare also with a backup of another identification or firmware, or of another family: then what is
-                called the same there.
-            unverified: Also what this family is only assumed to have.
+    Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
+    what can only be read) is left out, unless *everything*. The result is false where nothing differs.
 
-        Raises:
-            NotAllowed: The file is wrong, or of another family; nothing was sent.
-            NoAnswer, BadAnswer, PortError, Refused: See each.
-        """
-        everything, force = checks.flag("everything", everything), checks.flag("force", force)
-        drive = self.trusting(unverified)
-        if backup is None:
-            left = factory(self.profile)
-        else:
-            kept = self._kept(backup, force)
-            others = [] if force else kept.origin.other(await taking.origin_of(drive))
-            if others:
-                raise NotAllowed(
-                    f"the backup is not of the drive at unit {self.unit}: {'; '.join(others)}. To compare them all the "
-                    "same, say force=True (`--force`)",
-                    unit=self.unit,
-                )
-            left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
-        rules = Rules(self.profile)
-        unasked = {code: reason for code in left.raw if (reason := rules.unread(code, drive.unverified)) is not None}
-        left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
-        codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
-        words = await Reader(drive, sorted(codes, key=rules.place)).rest()
-        right = Side(f"unit {self.unit}", words.raw, words.unread)
-        found = compare(self.profile, left, right, everything=everything)
-        found.uncompared.update(unasked)
-        return found
+    Args:
+        backup: A backup, its file, or None.
+        everything: Compare also what changes by itself.
+        force: Compare also with a backup of another identification or firmware, or of another family: then what is
+            called the same there.
+        unverified: Also what this family is only assumed to have.
 
-    def _kept(self, backup: Kept, force: bool = False) -> Backup:
-        """*backup* in the words of this drive's family."""
-        kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), self.profile)
-        if not kept.complete:
+    Raises:
+        NotAllowed: The file is wrong, or of another family; nothing was sent.
+        NoAnswer, BadAnswer, PortError, Refused: See each.
+    """
+    everything, force = checks.flag("everything", everything), checks.flag("force", force)
+    unit = unit.trusting(unverified)
+    if backup is None:
+        left = factory(unit.profile)
+    else:
+        kept = _kept(unit, backup, force)
+        others = [] if force else kept.origin.other(await taking.origin_of(unit))
+        if others:
             raise NotAllowed(
-                f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
-                "again with the same path to have the rest",
-                unit=self.unit,
+                f"the backup is not of the drive at unit {unit.address}: {'; '.join(others)}. To compare them all the "
+                "same, say force=True (`--force`)",
+                unit=unit.address,
             )
-        if kept.origin.family == self.profile.family:
-            return kept
-        if not force:
-            raise NotAllowed(
-                f"the backup is of a {kept.origin.family}, and unit {self.unit} is a {self.profile.family}: a code may "
-                "mean another thing there; nothing was sent. If that is right, say force=True (`--force`)",
-                unit=self.unit,
-            )
-        return kept.translated(self.profile)
+        left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
+    rules = Rules(unit.profile)
+    unasked = {code: reason for code in left.raw if (reason := rules.unread(code, unit.unverified)) is not None}
+    left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
+    codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
+    words = await Reader(unit, sorted(codes, key=rules.place)).rest()
+    right = Side(f"unit {unit.address}", words.raw, words.unread)
+    found = compare(unit.profile, left, right, everything=everything)
+    found.uncompared.update(unasked)
+    return found
 
-    def _is_in_ram(self, code: str) -> bool:
-        """Whether this object wrote *code* to RAM, and not to EEPROM since: what it reads as is then not stored."""
-        return not self._in_ram.isdisjoint({code, self.profile.describe(code).name})
 
-    async def _put(self, code: str, address: int, word: int, *, store: bool) -> None:
-        """Writes the word of a parameter, and remembers to which memory."""
-        if not store:
-            self._in_ram.add(code)
-        await self._write(address, word)
-        if store:
-            self._in_ram.difference_update({code, self.profile.describe(code).name})
-            self._count_store(code)
+def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
+    """*backup* in the words of this drive's family."""
+    kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), unit.profile)
+    if not kept.complete:
+        raise NotAllowed(
+            f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
+            "again with the same path to have the rest",
+            unit=unit.address,
+        )
+    if kept.origin.family == unit.profile.family:
+        return kept
+    if not force:
+        raise NotAllowed(
+            f"the backup is of a {kept.origin.family}, and unit {unit.address} is a {unit.profile.family}: a code may "
+            "mean another thing there; nothing was sent. If that is right, say force=True (`--force`)",
+            unit=unit.address,
+        )
+    return kept.translated(unit.profile)
 
 
 def _path(path: object) -> Path:

@@ -17,7 +17,6 @@ from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
-from drivebus.protocols import ProfileProtocol
 from drivebus.values import Value
 
 __all__ = ["Backup", "Origin"]
@@ -88,7 +87,7 @@ class Backup(Mapping[str, Value]):
         origin: Origin,
         raw: Mapping[str, int],
         unread: Mapping[str, str],
-        profile: ProfileProtocol,
+        profile: Profile,
         *,
         complete: bool = True,
         told: Mapping[str, int] | None = None,
@@ -106,7 +105,7 @@ class Backup(Mapping[str, Value]):
         self.translated_from = translated_from
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], profile: ProfileProtocol | None = None) -> Backup:
+    def load(cls, path: str | os.PathLike[str], profile: Profile | None = None) -> Backup:
         """A backup from its file. Nothing in it is executed, and each line is checked against the profile.
 
         Args:
@@ -141,7 +140,7 @@ class Backup(Mapping[str, Value]):
         theirs = Side(f"unit {other.origin.unit} of {other.origin.taken:%Y-%m-%d %H:%M:%S}", other.raw, other.unread)
         return compare(self.profile, ours, theirs, everything=everything)
 
-    def translated(self, profile: ProfileProtocol) -> Backup:
+    def translated(self, profile: Profile) -> Backup:
         """The same values in the words of another family, where a code is called the same there; else in `unread`."""
         raw: dict[str, int] = {}
         unread: dict[str, str] = {}
@@ -193,12 +192,12 @@ class Backup(Mapping[str, Value]):
         )
 
 
-def _meant_by(profile: ProfileProtocol) -> Callable[[str], ProfileProtocol]:
+def _meant_by(profile: Profile) -> Callable[[str], Profile]:
     """Finds what the words of a family mean: *profile* its own, a shipped profile all others."""
     return lambda family: profile if family == profile.family else _shipped(family)
 
 
-def _shipped(family: str) -> ProfileProtocol:
+def _shipped(family: str) -> Profile:
     try:
         return Profile.builtin(family)
     except NotAllowed as error:

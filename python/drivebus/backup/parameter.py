@@ -7,7 +7,7 @@ from typing import Any
 from drivebus import checks
 from drivebus.backup.text import number
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile import Profile
 from drivebus.values import Description
 
 __all__ = ["FIELDS", "Wrong", "word"]
@@ -20,7 +20,7 @@ class Wrong(Exception):
     """What is wrong with one line."""
 
 
-def word(profile: ProfileProtocol, code: str, fields: object) -> tuple[int, int | None]:
+def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
     """The word that the line of *code* stands for, and the word that the drive told, where the line has that.
 
     Raises:
@@ -49,7 +49,7 @@ def word(profile: ProfileProtocol, code: str, fields: object) -> tuple[int, int 
     return _meant(profile, known, value, raw, beyond is True), told
 
 
-def _meant(profile: ProfileProtocol, known: Description, value: float, raw: int | None, beyond: bool) -> int:
+def _meant(profile: Profile, known: Description, value: float, raw: int | None, beyond: bool) -> int:
     """The word for *value*, with which *raw* has to agree."""
     code = known.code or ""
     if raw is not None and (beyond or known.words > 1):
@@ -67,7 +67,7 @@ def _meant(profile: ProfileProtocol, known: Description, value: float, raw: int 
     return meant
 
 
-def _known(profile: ProfileProtocol, code: str) -> Description:
+def _known(profile: Profile, code: str) -> Description:
     try:
         known = profile.describe(code)
     except NotAllowed as error:
@@ -79,13 +79,13 @@ def _known(profile: ProfileProtocol, code: str) -> Description:
     return known
 
 
-def _example(profile: ProfileProtocol, known: Description) -> str:
+def _example(profile: Profile, known: Description) -> str:
     shown = number(profile.decode(known.code or "", 0), known.scale)
     unit = f', unit = "{known.unit}"' if known.unit else ""
     return f"{{ value = {shown}{unit}, raw = 0 }}"
 
 
-def _disagree(profile: ProfileProtocol, known: Description, value: float, raw: int) -> str:
+def _disagree(profile: Profile, known: Description, value: float, raw: int) -> str:
     code, unit = known.code or "", f" {known.unit}" if known.unit else ""
     means = number(profile.decode(code, raw), known.scale)
     return (

@@ -18,7 +18,7 @@ from drivebus import checks
 from drivebus.backup.parameter import FIELDS, Wrong, word
 from drivebus.backup.text import FORMAT, printable
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile import Profile
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -64,7 +64,7 @@ class Parsed:
         complete: Whether the backup was finished.
     """
 
-    profile: ProfileProtocol
+    profile: Profile
     origin: dict[str, Any]
     raw: dict[str, int]
     told: dict[str, int]
@@ -89,7 +89,7 @@ class _File:
         self.lacks.append(reason)
         self.wrong.append((1, reason))
 
-    def refuse(self, profile: ProfileProtocol | None = None) -> NotAllowed:
+    def refuse(self, profile: Profile | None = None) -> NotAllowed:
         """The error that names each wrong line; *profile* is what they were checked against."""
         self.wrong.sort()
         is_backup = "family" in self.drive or self.top.get("format") == FORMAT
@@ -111,7 +111,7 @@ class _File:
         return NotAllowed("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
 
 
-def parse(path: Path, data: bytes, profile: ProfileProtocol | Callable[[str], ProfileProtocol]) -> Parsed:
+def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) -> Parsed:
     """What *data*, the file at *path*, holds.
 
     Args:
@@ -221,7 +221,7 @@ def _check_head(file: _File) -> None:
         file.lack('the file does not say whose it is: [drive] lacks a line such as family = "gd350"')
 
 
-def _parameters(file: _File, profile: ProfileProtocol) -> tuple[dict[str, int], dict[str, int]]:
+def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str, int]]:
     """The word of each parameter, and what the drive told where a line has that; what is wrong is noted."""
     raw: dict[str, int] = {}
     told: dict[str, int] = {}

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivebus.errors import Refused
-from drivebus.registers import Registers
+from drivebus.operations import words as bus_words
+from drivebus.operations.unit import Unit
 
 __all__ = ["Reader", "Words"]
 
@@ -31,8 +32,8 @@ class Words:
 class Reader:
     """Reads *codes*, request by request. One that is refused is cut in two, down to the parameter that is meant."""
 
-    def __init__(self, drive: Registers, codes: Sequence[str]) -> None:
-        self._drive = drive
+    def __init__(self, unit: Unit, codes: Sequence[str]) -> None:
+        self._unit = unit
         self._waiting = [list(codes)] if codes else []
         self._planned: list[tuple[int, int, list[str]]] = []
 
@@ -49,12 +50,12 @@ class Reader:
                 return None
             self._plan(self._waiting.pop())
         address, count, inside = self._planned.pop(0)
-        drive = self._drive
+        unit = self._unit
         # Known before the first answer, so that a port that is opened again meanwhile brings no words of another drive.
-        await drive._identity.check(drive.bus, judged=False)
+        await unit.memory.identity.check(unit.bus, judged=False)
         try:
-            words = await drive.read_words(address, count)
-            await drive._identity.check(drive.bus, judged=False)
+            words = await bus_words.read_words(unit, address, count)
+            await unit.memory.identity.check(unit.bus, judged=False)
         except Refused as error:
             if error.name == _LOCKED:
                 raise
@@ -75,7 +76,7 @@ class Reader:
         return Words(raw, unread)
 
     def _plan(self, codes: Sequence[str]) -> None:
-        profile = self._drive.profile
+        profile = self._unit.profile
         places = {code: profile.address(code) for code in codes}
         self._planned = [
             (address, count, [code for code, place in places.items() if address <= place < address + count])
@@ -83,8 +84,8 @@ class Reader:
         ]
 
     def _word(self, code: str, words: Sequence[int], address: int) -> int:
-        place = self._drive.profile.address(code) - address
-        parts = words[place : place + self._drive.profile.describe(code).words]
+        place = self._unit.profile.address(code) - address
+        parts = words[place : place + self._unit.profile.describe(code).words]
         # The low word comes first.
         return sum(part << 16 * index for index, part in enumerate(parts))
 

@@ -7,7 +7,6 @@ again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from drivebus.backup.compare import amount
 from drivebus.backup.model import Backup
@@ -19,9 +18,8 @@ from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
-
-if TYPE_CHECKING:
-    from drivebus.backup.keeping import Keeping
+from drivebus.operations import parameters, state
+from drivebus.operations.unit import Unit
 
 __all__ = ["Restore"]
 
@@ -35,13 +33,11 @@ _MOVED = {
 class Restore:
     """One restore of one drive."""
 
-    def __init__(
-        self, drive: Keeping, backup: Backup, *, dry_run: bool, twice: bool, progress: Progress | None
-    ) -> None:
-        self._drive = drive
-        self._profile = drive.profile
+    def __init__(self, unit: Unit, backup: Backup, *, dry_run: bool, twice: bool, progress: Progress | None) -> None:
+        self._unit = unit
+        self._profile = unit.profile
         self._backup = backup
-        self._rules = Rules(drive.profile)
+        self._rules = Rules(unit.profile)
         self._dry_run = dry_run
         self._twice = twice
         self._progress = progress
@@ -87,36 +83,36 @@ class Restore:
         return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, self._dry_run)
 
     def _leave(self, code: str) -> bool:
-        reason = self._rules.unread(code, self._drive.unverified) or self._rules.uncompared(code)
+        reason = self._rules.unread(code, self._unit.unverified) or self._rules.uncompared(code)
         if reason is not None:
             self._results[code] = ("skipped", reason)
         return reason is not None
 
     async def _check_identity(self, force: bool) -> None:
-        others = self._backup.origin.other(await origin_of(self._drive))
+        others = self._backup.origin.other(await origin_of(self._unit))
         if others and not force:
             raise NotAllowed(
-                f"the backup is not of the drive at unit {self._drive.unit}: {'; '.join(others)}; nothing was written. "
-                "If that is right, say force=True (`--force`)",
-                unit=self._drive.unit,
+                f"the backup is not of the drive at unit {self._unit.address}: {'; '.join(others)}; nothing was "
+                "written. If that is right, say force=True (`--force`)",
+                unit=self._unit.address,
             )
 
     async def _read(self, wanted: Sequence[str], bounding: set[str]) -> None:
         """What the drive has of *wanted*, and of what bounds it."""
-        readable = [code for code in bounding if self._rules.unread(code, self._drive.unverified) is None]
-        words = await Reader(self._drive, sorted({*wanted, *readable}, key=self._rules.place)).rest()
+        readable = [code for code in bounding if self._rules.unread(code, self._unit.unverified) is None]
+        words = await Reader(self._unit, sorted({*wanted, *readable}, key=self._rules.place)).rest()
         self._had, self._has = words.raw, dict(words.raw)
         for code in wanted:
             if code in words.unread:
                 self._results[code] = ("missing", words.unread[code])
-            elif words.raw[code] == self._backup.raw[code] and not self._drive._is_in_ram(code):
+            elif words.raw[code] == self._backup.raw[code] and not parameters.is_in_ram(self._unit, code):
                 self._results[code] = ("same", "")
 
     def _may_be_sent(self, code: str) -> bool:
         """Whether it is known where *code* is stored, and what its value means; of all, before the first is written."""
-        unproved = None if self._drive.unverified else self._backup.unproved(code)
+        unproved = None if self._unit.unverified else self._backup.unproved(code)
         try:
-            place(self._drive, code, store=True)
+            place(self._unit, code, store=True)
         except NotAllowed as error:
             self._results[code] = ("blocked", str(error))
         else:
@@ -133,15 +129,15 @@ class Restore:
         if not stopped:
             return
         try:
-            state = await self._drive.state()
+            now = await state.state(self._unit)
         except NotAllowed:
             # Its family does not say where it tells its state; the drive itself refuses what it must.
             return
-        if state.running:
+        if now.running:
             raise NotAllowed(
                 f"{', '.join(stopped[:5])}{' and others' if len(stopped) > 5 else ''} can be restored only while the "
-                f"drive is stopped, and unit {self._drive.unit} runs ({state}); nothing was written",
-                unit=self._drive.unit,
+                f"drive is stopped, and unit {self._unit.address} runs ({now}); nothing was written",
+                unit=self._unit.address,
             )
 
     async def _carry_out(self, pending: Sequence[str], pairs: Sequence[tuple[str, str]]) -> None:
@@ -210,7 +206,7 @@ class Restore:
     def _keeps_in_ram(self, code: str) -> bool:
         """Whether a way is known to write *code* without wearing its memory."""
         try:
-            place(self._drive, code, store=False)
+            place(self._unit, code, store=False)
         except NotAllowed:
             return False
         return True
@@ -241,7 +237,7 @@ class Restore:
             shown = raw
         else:
             try:
-                shown = await write(self._drive, code, raw, self._has[code], store=store)
+                shown = await write(self._unit, code, raw, self._has[code], store=store)
             except Refused as error:
                 if final:
                     self._results[code] = ("refused", _meaning(error))
@@ -264,7 +260,7 @@ class Restore:
         if not self._order:
             return
         had = {code: result for code, (result, _) in self._results.items() if result in _MOVED}
-        words = await Reader(self._drive, sorted(had, key=self._rules.place)).rest()
+        words = await Reader(self._unit, sorted(had, key=self._rules.place)).rest()
         self._has.update(words.raw)
         for code, result in had.items():
             if words.raw.get(code) != self._backup.raw[code]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile import Profile
 from drivebus.values import group_of
 
 __all__ = ["Rules"]
@@ -15,7 +15,7 @@ __all__ = ["Rules"]
 class Rules:
     """What the profile says about keeping the parameters of its family."""
 
-    def __init__(self, profile: ProfileProtocol) -> None:
+    def __init__(self, profile: Profile) -> None:
         self.profile = profile
         self._serial = frozenset(profile.serial_parameters())
         self._motor = frozenset(profile.motor_parameters())

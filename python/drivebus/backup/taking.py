@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from drivebus._native import __version__
 from drivebus.backup import disk
@@ -14,10 +13,8 @@ from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed, Refused
-from drivebus.registers import Registers
-
-if TYPE_CHECKING:
-    from drivebus.backup.keeping import Keeping
+from drivebus.operations import parameters, registers, words
+from drivebus.operations.unit import Unit
 
 __all__ = ["Progress", "origin_of", "take"]
 
@@ -34,20 +31,20 @@ _FIRMWARE = "firmware_version"
 """The parameter or register of this name tells the firmware, where a profile has one."""
 
 
-async def origin_of(drive: Registers) -> Origin:
+async def origin_of(unit: Unit) -> Origin:
     """Whose parameters are read: what the drive says of itself now."""
-    profile = drive.profile
+    profile = unit.profile
     identification = firmware = None
     register = profile.role("identification")
-    if register is not None and _may_be_asked(drive, register):
+    if register is not None and unit.evidence.unreadable(register) is None:
         try:
-            [identification] = await drive.read_words(profile.address(register))
+            [identification] = await words.read_words(unit, profile.address(register))
         except Refused:
             identification = None
-    if _FIRMWARE in profile.names() and _may_be_asked(drive, _FIRMWARE):
+    if _FIRMWARE in profile.names() and unit.evidence.unreadable(_FIRMWARE) is None:
         try:
-            [word] = await drive.read_words(profile.address(_FIRMWARE))
-            firmware = str(drive.value(_FIRMWARE, word))
+            [word] = await words.read_words(unit, profile.address(_FIRMWARE))
+            firmware = str(registers.value(unit, _FIRMWARE, word))
         except Refused:
             firmware = None
     now = datetime.now(timezone.utc).replace(microsecond=0)
@@ -55,7 +52,7 @@ async def origin_of(drive: Registers) -> Origin:
         profile.family,
         profile.name,
         profile.title,
-        drive.unit,
+        unit.address,
         identification,
         firmware,
         profile.version,
@@ -64,12 +61,7 @@ async def origin_of(drive: Registers) -> Origin:
     )
 
 
-def _may_be_asked(drive: Registers, name: str) -> bool:
-    known = drive.profile.describe(name)
-    return known.address is not None and (known.evidence != "assumed" or drive.unverified)
-
-
-async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
+async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
     """Reads every parameter that can be read. What was read before a break is not read again.
 
     Raises:
@@ -77,17 +69,17 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
         Refused: The drive is locked by a password.
         NoAnswer, BadAnswer, PortError: The line failed; what was read is in the file's `.part`.
     """
-    rules = Rules(drive.profile)
+    rules = Rules(unit.profile)
     codes = rules.codes()
     if not codes:
-        raise NotAllowed(f"{drive.profile.name} has no parameters that are known: there is nothing to keep")
-    unread = {code: reason for code in codes if (reason := rules.unread(code, drive.unverified)) is not None}
+        raise NotAllowed(f"{unit.profile.name} has no parameters that are known: there is nothing to keep")
+    unread = {code: reason for code in codes if (reason := rules.unread(code, unit.unverified)) is not None}
     codes = [code for code in codes if code not in unread]
-    origin = await origin_of(drive)
+    origin = await origin_of(unit)
     raw: dict[str, int] = {}
     if path is not None:
-        _check_old(path, origin, drive, force)
-        before = _begun(disk.part_of(path), origin, drive) if resume else None
+        _check_old(path, origin, unit, force)
+        before = _begun(disk.part_of(path), origin, unit) if resume else None
         if before is not None:
             origin = replace(origin, taken=before.origin.taken)
             raw = {code: word for code, word in before.raw.items() if code in codes}
@@ -95,12 +87,12 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
                 # What was changed by hand meanwhile is read again.
                 if before.told[code] != raw[code]:
                     del raw[code]
-    reader = Reader(drive, [code for code in codes if code not in raw])
+    reader = Reader(unit, [code for code in codes if code not in raw])
     total, done, steps = len(codes), len(raw), 0
 
     def taken(complete: bool) -> Backup:
-        in_ram = filter(drive._is_in_ram, raw)
-        return Backup(origin, raw, unread, drive.profile, complete=complete, in_ram=in_ram)
+        in_ram = [code for code in raw if parameters.is_in_ram(unit, code)]
+        return Backup(origin, raw, unread, unit.profile, complete=complete, in_ram=in_ram)
 
     def keep() -> None:
         if path is not None:
@@ -111,14 +103,14 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
     try:
         if progress is not None:
             progress(done, total)
-        while (words := await reader.next()) is not None:
-            raw.update(words.raw)
-            unread.update(words.unread)
+        while (came := await reader.next()) is not None:
+            raw.update(came.raw)
+            unread.update(came.unread)
             steps += 1
             if steps % _REQUESTS_A_STEP == 0:
                 keep()
-            if progress is not None and (words.raw or words.unread):
-                done += len(words.raw) + len(words.unread)
+            if progress is not None and (came.raw or came.unread):
+                done += len(came.raw) + len(came.unread)
                 progress(done, total)
     except BaseException as error:
         keep()
@@ -132,14 +124,14 @@ async def take(drive: Keeping, path: Path | None, *, resume: bool, force: bool, 
     return backup
 
 
-def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> None:
+def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
     if disk.is_there(path) and not path.is_file():
         raise NotAllowed(f"{path} is no file, and a backup cannot take its place; nothing was read")
     if force or not disk.is_there(path):
         return
     try:
-        others = Backup.load(path, drive.profile).origin.other(origin, unit=True)
+        others = Backup.load(path, unit.profile).origin.other(origin, unit=True)
     except NotAllowed as error:
         told = str(error).splitlines()
         why = "\n".join(told[:_LINES] + ["…"] * (len(told) > _LINES))
@@ -150,20 +142,20 @@ def _check_old(path: Path, origin: Origin, drive: Registers, force: bool) -> Non
         raise NotAllowed(
             f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or "
             "force=True (`--force`)",
-            unit=drive.unit,
+            unit=unit.address,
         )
 
 
-def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
+def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
     """What was read before a break, if it was read of this drive."""
     if not disk.is_there(part):
         return None
     try:
-        before = Backup.load(part, drive.profile)
+        before = Backup.load(part, unit.profile)
     except NotAllowed as error:
         raise NotAllowed(
             f"{error}\nThat is what an interrupted backup left; with resume=False (`--fresh`) it is begun anew",
-            unit=drive.unit,
+            unit=unit.address,
         ) from None
     others = before.origin.other(origin, unit=True)
     if before.origin.profile_version != origin.profile_version:
@@ -172,6 +164,6 @@ def _begun(part: Path, origin: Origin, drive: Registers) -> Backup | None:
         raise NotAllowed(
             f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With "
             "resume=False (`--fresh`) it is begun anew",
-            unit=drive.unit,
+            unit=unit.address,
         )
     return before

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed
-from drivebus.protocols import ProfileProtocol
+from drivebus.profile import Profile
+from drivebus.profile.plan import labelled
 from drivebus.values import Choice, Value
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def _line(backup: Backup, code: str, is_set: bool) -> str:
     return printable(f"{code} = {{ {inside} }}  # {comment}")
 
 
-def _is_beyond(profile: ProfileProtocol, code: str, raw: int) -> bool:
+def _is_beyond(profile: Profile, code: str, raw: int) -> bool:
     """Whether the drive told a value that its family's documents do not allow."""
     if profile.describe(code).words > 1:
         return False
@@ -109,11 +110,9 @@ def number(value: Value, scale: float) -> str:
     return shown if float(shown) == value else repr(value)
 
 
-def worded(profile: ProfileProtocol, code: str, raw: int) -> Value:
+def worded(profile: Profile, code: str, raw: int) -> Value:
     """*raw* in engineering units, and with its label where the profile has one."""
-    value = profile.decode(code, raw)
-    label = profile.describe(code).choices.get(value) if isinstance(value, int) else None
-    return value if label is None else Choice(int(value), label)
+    return labelled(profile.describe(code), profile.decode(code, raw))
 
 
 def _toml(value: object) -> str:

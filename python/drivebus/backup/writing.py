@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from drivebus.errors import LINE_ERRORS, NotAllowed
-
-if TYPE_CHECKING:
-    from drivebus.backup.keeping import Keeping
+from drivebus.operations import parameters, words
+from drivebus.operations.unit import Unit
 
 __all__ = ["place", "write"]
 
@@ -15,7 +12,7 @@ _ATTEMPTS = 3
 """How often a write is sent that the drive shows not to have heard."""
 
 
-async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool) -> int:
+async def write(unit: Unit, code: str, raw: int, before: int, *, store: bool) -> int:
     """Writes *raw* in place of *before*, for good if *store*, and returns what the drive then shows.
 
     What has two words can only be read, so one word it is.
@@ -27,37 +24,47 @@ async def write(drive: Keeping, code: str, raw: int, before: int, *, store: bool
         NotAllowed: Another drive answers at this address.
         NoAnswer, BadAnswer, PortError: It could not be sent, or what became of it could not be read.
     """
-    address = place(drive, code, store=store)
+    address = place(unit, code, store=store)
     for attempt in range(1, _ATTEMPTS + 1):
         try:
-            await drive._put(code, address, raw, store=store)
+            await _put(unit, code, address, raw, store=store)
         except LINE_ERRORS as error:
             # Where the value was in force already, out of RAM, reading does not tell whether it is kept now.
             if error.started is None or raw == before:
                 raise
-            shown = await _look(drive, code)
+            shown = await _look(unit, code)
             if shown == before and attempt < _ATTEMPTS:
                 continue
             return shown
         break
-    return await _look(drive, code)
+    return await _look(unit, code)
 
 
-def place(drive: Keeping, code: str, *, store: bool) -> int:
+def place(unit: Unit, code: str, *, store: bool) -> int:
     """Where *code* is written for good, or to RAM alone.
 
     Raises:
         NotAllowed: How the family does that is not known, or not verified.
     """
-    profile = drive.profile
+    profile = unit.profile
     memory = profile.memory()
     address = profile.address(code, store=store)
     plain = store and address == profile.describe(code).address
-    if memory is None or memory["reason"] is None or drive.unverified or plain:
+    if memory is None or unit.evidence.allows(memory["reason"]) or plain:
         return address
     raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")
 
 
-async def _look(drive: Keeping, code: str) -> int:
-    [word] = await drive.read_words(drive.profile.address(code))
+async def _look(unit: Unit, code: str) -> int:
+    [word] = await words.read_words(unit, unit.profile.address(code))
     return word
+
+
+async def _put(unit: Unit, code: str, address: int, word: int, *, store: bool) -> None:
+    """Writes the word of a parameter, and remembers to which memory."""
+    known = unit.profile.describe(code)
+    if not store:
+        parameters.put_in_ram(unit, known)
+    await words.write(unit, address, word)
+    if store:
+        parameters.stored(unit, known)

@@ -9,7 +9,7 @@ import click
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.session import Session, pass_session, profile_of
+from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
 
@@ -85,7 +85,7 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     out = session.out
     with session.drive() as drive:
         history = drive.fault_history()
-        kept = bool(profile_of(drive).fault_history)
+        kept = bool(drive.profile.fault_history)
         try:
             present, reason = drive.fault(), None
         except drivebus.NotAllowed as error:

@@ -10,7 +10,7 @@ from rich.progress import Progress
 import drivebus
 from drivebus.cli import names, rules
 from drivebus.cli.output import Output, remark
-from drivebus.cli.session import Session, exit_code, pass_session, profile_of, tell
+from drivebus.cli.session import Session, exit_code, pass_session, tell
 from drivebus.cli.types import Seconds
 
 __all__ = ["COMMANDS"]
@@ -90,7 +90,7 @@ def info(session: Session) -> None:
             out.facts(facts)
             raise
         control = drive.check_control()
-        profile = profile_of(drive)
+        profile = drive.profile
         against = drive.contradiction()
         out.facts(
             {

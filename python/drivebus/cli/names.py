@@ -9,7 +9,6 @@ from click.shell_completion import CompletionItem
 
 import drivebus
 from drivebus.cli.types import with_a_point
-from drivebus.protocols import ProfileProtocol
 
 __all__ = [
     "complete_assignment",
@@ -30,7 +29,7 @@ __all__ = [
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 
 
-def resolve(profile: ProfileProtocol, text: str) -> str | int:
+def resolve(profile: drivebus.Profile, text: str) -> str | int:
     """The name that *text* stands for, or the address where the profile has no name for it.
 
     An unknown name stays what it is: the profile refuses it and names the closest.
@@ -46,7 +45,7 @@ def resolve(profile: ProfileProtocol, text: str) -> str | int:
     return text
 
 
-def named(profile: ProfileProtocol, text: str) -> str:
+def named(profile: drivebus.Profile, text: str) -> str:
     """As `resolve`, for what needs a name: an address without one is refused."""
     place = resolve(profile, text)
     if isinstance(place, int):

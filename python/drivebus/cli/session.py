@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 import click
 
@@ -25,7 +25,6 @@ __all__ = [
     "force_option",
     "parse_format",
     "pass_session",
-    "profile_of",
     "tell",
     "yes_option",
 ]
@@ -156,7 +155,7 @@ class Session:
         if self.port is None:
             raise click.UsageError("no drive to ask what it is: give --profile NAME (`drivebus profiles`), or --port")
         with self.drive() as drive:
-            return profile_of(drive)
+            return drive.profile
 
     def advise(self, *errors: drivebus.DrivebusError) -> None:
         """Names who finds out what else is wrong after *errors*: with a line that answers badly, with a profile."""
@@ -206,11 +205,6 @@ class Session:
             wanted = False
         if not wanted:
             raise _Declined("nothing was written")
-
-
-def profile_of(drive: drivebus.Drive) -> drivebus.Profile:
-    """What a drive of a `drivebus.Bus` was opened with; the drive itself asks for less."""
-    return cast(drivebus.Profile, drive.profile)
 
 
 pass_session = click.make_pass_decorator(Session)

@@ -1,0 +1,137 @@
+"""The drive behind a unit: what it says itself about the bus, about its fault, and about whom it obeys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from drivebus.doctor.findings import Finding, Severity
+from drivebus.drive import Drive
+from drivebus.errors import NoAnswer, NotAllowed
+from drivebus.profile import profiles
+from drivebus.values import Control
+
+__all__ = ["DriveExamination"]
+
+_SPARE = 0.5
+"""The share of a time-out that answers may take before one that is a little later is lost."""
+
+_COMMUNICATION_FAULT = "CE"
+"""What a Goodrive calls the fault of a bus that was silent for too long."""
+
+
+@dataclass(frozen=True)
+class DriveExamination:
+    """An examination of one drive: each step reads what it is set to, and writes nothing.
+
+    Attributes:
+        drive: The drive.
+        timeout: Seconds that its bus waits for an answer.
+        turnarounds: Seconds that it took to begin its answers.
+        is_named: Whether it was named what it is, and did not say it itself.
+    """
+
+    drive: Drive
+    timeout: float
+    turnarounds: Sequence[float]
+    is_named: bool
+
+    def findings(self) -> Iterator[Finding]:
+        """What is found: its delay, its time-out, its fault, and whom it obeys.
+
+        Raises:
+            DrivebusError: It could not be read.
+        """
+        known = set(self.drive.profile.names())
+        if "P14.03" in known:
+            yield self._response_delay()
+        if "P14.04" in known:
+            yield self._watchdog()
+        fault = self._fault()
+        if fault is not None:
+            yield fault
+        yield self._control()
+
+    def _response_delay(self) -> Finding:
+        delay = float(self.drive.read("P14.03")) / 1e3
+        took = f", and it took {median(self.turnarounds) * 1e3:.1f} ms" if self.turnarounds else ""
+        text = f"unit {self.drive.unit}: its response delay (P14.03) is {delay * 1e3:g} ms{took}"
+        values = {"response_delay": delay, "timeout": self.timeout}
+        if max([delay, *self.turnarounds]) <= _SPARE * self.timeout:
+            return Finding("unit", "response_delay", Severity.OK, text, unit=self.drive.unit, values=values)
+        return Finding(
+            "unit",
+            "timeout",
+            Severity.WARNING,
+            f"{text}: much of the time-out of {self.timeout:g} s",
+            "lower P14.03, or give a longer time-out",
+            unit=self.drive.unit,
+            values=values,
+            error=NoAnswer,
+        )
+
+    def _watchdog(self) -> Finding:
+        limit = float(self.drive.read("P14.04"))
+        text = f"unit {self.drive.unit} trips {_COMMUNICATION_FAULT} when the bus is silent for {limit:g} s (P14.04)"
+        if limit == 0:
+            text = f"unit {self.drive.unit} does not notice when the bus falls silent (P14.04 is 0)"
+        return Finding("unit", "watchdog", Severity.OK, text, unit=self.drive.unit, values={"silence": limit})
+
+    def _fault(self) -> Finding | None:
+        try:
+            fault = self.drive.fault()
+        except NotAllowed as error:
+            return Finding("unit", "fault", Severity.NOTE, str(error), unit=self.drive.unit)
+        if fault is None:
+            return None
+        is_ours = fault.mnemonic == _COMMUNICATION_FAULT
+        return Finding(
+            "unit",
+            "fault",
+            Severity.WARNING if is_ours else Severity.NOTE,
+            f"unit {self.drive.unit} stands in fault {fault}",
+            fault.remedy or ("the bus was silent for longer than P14.04" if is_ours else ""),
+            unit=self.drive.unit,
+            error=NoAnswer if is_ours else None,
+        )
+
+    def _control(self) -> Finding:
+        unit = self.drive.unit
+        control = self.drive.check_control()
+        if not len(control):
+            text = f"what makes unit {unit} obey the bus is not known of {self.drive.profile.title}"
+            return Finding("unit", "control", Severity.NOTE, text, unit=unit)
+        if control:
+            return Finding("unit", "control", Severity.OK, f"unit {unit} is set to obey the bus", unit=unit)
+        wrong = "; ".join(
+            f"{item.code} ({item.label}) is {'not known' if item.actual is None else int(item.actual)}, "
+            f"needs {int(item.wanted)}"
+            for item in control
+            if not item.ok
+        )
+        surely = any(item.actual is not None and not item.ok for item in control)
+        return Finding(
+            "unit",
+            "control",
+            Severity.NOTE,
+            f"unit {unit} answers, and {'does not obey the bus yet' if surely else 'may not obey the bus'}: {wrong}",
+            f"`{self._preparing(control)}` sets it, if that is wanted",
+            unit=unit,
+        )
+
+    def _preparing(self, control: Control) -> str:
+        """The command that sets what is wrong in *control*.
+
+        Only unit 1 needs no --unit, only one that says what it is no --profile; and prepare writes without a word only
+        what is verified.
+        """
+        profile = self.drive.profile
+        words = ["drivebus"]
+        if self.drive.unit != 1:
+            words += ["--unit", str(self.drive.unit)]
+        if self.is_named or profile.role("identification") is None:
+            words += ["--profile", profile.name if profile.name in profiles() else "FOLDER"]
+        if any(not item.ok and not item.verified for item in control):
+            words += ["--unverified"]
+        return " ".join([*words, "prepare"])

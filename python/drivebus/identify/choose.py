@@ -1,0 +1,79 @@
+"""The profile of the drive at an address: the one that was named, or what the unit says surely enough that it is."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+
+from drivebus import checks
+from drivebus.errors import NotAllowed, SharedCodeWarning, level_of_the_program
+from drivebus.identify.families import one_of, shipped
+from drivebus.identify.identify import identify
+from drivebus.identify.results import Identification
+from drivebus.line.protocols import AwaitableBus
+from drivebus.profile import Profile, profiles
+
+__all__ = ["profile_of", "usable"]
+
+
+async def profile_of(
+    bus: AwaitableBus,
+    unit: int,
+    profile: str | os.PathLike[str] | Profile | None,
+    variants: Mapping[str, str] | None,
+    unverified: bool,
+) -> tuple[Profile, int | None]:
+    """The profile that *profile* means, or else that of the drive at *unit*, and the code that it gave if asked."""
+    if variants is not None and not isinstance(variants, Mapping):
+        raise NotAllowed(f'variants {variants!r} are none; give a mapping, such as {{"speed_unit": "Hz"}}')
+    code: int | None = None
+    if profile is None:
+        found = await identify(bus.read, unit)
+        known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code
+    else:
+        known = Profile.find(profile)
+    return known if variants is None else known.with_variants(variants), code
+
+
+def usable(found: Identification, unverified: bool) -> str | None:
+    """The profile that *found* is sure enough of to command a motor by it; with *unverified*, the only candidate."""
+    known = shipped(found.candidates)
+    sure = found.certainty in ("certain", "shared") or (unverified and len(found.candidates) == 1)
+    return known[0] if sure and len(known) == 1 else None
+
+
+def _sure_enough(found: Identification, unverified: bool) -> Profile:
+    """The profile that is `usable` of *found*, with a warning where others share its code."""
+    name = usable(found, unverified)
+    if name is None:
+        raise _not_sure(found)
+    if found.certainty == "shared":
+        warnings.warn(
+            f"unit {found.unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If it is "
+            f'one, say so: bus.drive({found.unit}, profile="{name}") (`--profile {name}`)',
+            SharedCodeWarning,
+            stacklevel=level_of_the_program(),
+        )
+    return Profile.builtin(name)
+
+
+def _not_sure(found: Identification) -> NotAllowed:
+    """Why no profile is taken by *found*, and how to name one."""
+    known = shipped(found.candidates)
+    if found.candidates and not known:
+        what = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
+    elif found.candidates:
+        what = f"it may be {one_of(found.candidates)}"
+    else:
+        what = "what it is, is not known"
+    with_one = (
+        ", or unverified=True (`--unverified`) to take it for that" if len(found.candidates) == len(known) == 1 else ""
+    )
+    like = known[0] if len(known) == 1 else f"one of {', '.join(known or profiles())}"
+    return NotAllowed(
+        f"unit {found.unit} is not surely of one family: {what} ({found.certainty}: {found.reason}). The registers "
+        f"and command codes of another family may differ; if you know that it behaves like {like}, "
+        f"give profile=… (`--profile`){with_one}",
+        unit=found.unit,
+    )

@@ -1,0 +1,80 @@
+"""Whether what a unit says of itself speaks against the profile that it was named with.
+
+A profile is named by people, and people mistake one drive for another. What speaks against one is only what documents
+or other programs say of another family: a code that is listed for that, or a word that units of the named one always
+have, refused as an address that there is none. An unknown code tells nothing, for firmwares differ; nor does a locked
+drive, nor a silent one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from drivebus.identify import codes
+from drivebus.identify.answers import Answer, no_such_address
+from drivebus.identify.families import one_of, shipped
+from drivebus.identify.signatures import signature_of
+from drivebus.profile import Profile, profiles
+
+__all__ = ["contradiction"]
+
+
+def contradiction(profile: Profile, unit: int, answers: Iterable[Answer]) -> str | None:
+    """What among *answers* speaks against *profile*, and what to do about it; None if nothing does."""
+    known_by = profile.role("identification") or signature_of(profile) or shipped(profile.reports_as())
+    if not known_by:
+        # A profile of somebody's own that says nothing of how its units are known: they may be anything.
+        return None
+    told = list(answers)
+    # A code says most: what the unit is, and not only what it is not.
+    found = [judge(profile, unit, answer) for judge in (_by_code, _by_refusal) for answer in told]
+    against = next(filter(None, found), None)
+    if against is None:
+        return None
+    return (
+        f"unit {unit} was named {profile.name} ({profile.title}), and {against}; or say trust_profile=True "
+        "(`--trust-profile`) if it is meant"
+    )
+
+
+def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
+    """What speaks against *profile* if the word that came is the code of another family."""
+    rows = [] if answer.word is None else codes.listed_for(profile, answer.address, answer.word)
+    families = codes.families_in(rows)
+    if not families or set(families) & set(profile.reports_as()):
+        return None
+    titles = [f"{row['title']} ({row['family']})" for row in rows]
+    also = [name for name in families if name not in [row["family"] for row in rows]]
+    known = shipped(families)
+    if known:
+        then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in known)
+        then = f"ask for it as that: {then}"
+    else:
+        then = "there is no profile of it yet"
+    if profile.name not in profiles():
+        then += f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
+    return f"it says {answer.word:04X}H, which is a {one_of([*titles, *also])}: {then}"
+
+
+def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
+    """What speaks against *profile* if the unit says that it lacks an address which each unit of it has."""
+    if answer.exception is None or answer.address not in _must_have(profile):
+        return None
+    if not no_such_address(profile, answer.exception):
+        return None
+    return (
+        f"it refuses {answer.address:04X}H (exception {answer.exception:02X}H: there is no such address), which each "
+        f"of those answers: see what it is (bus.identify({unit}), `drivebus info`) and name that"
+    )
+
+
+def _must_have(profile: Profile) -> tuple[int, ...]:
+    """The addresses that every unit of *profile* answers."""
+    signature = signature_of(profile)
+    answered = () if signature is None else tuple(signature["answers"])
+    place, register = codes.address_of(profile), profile.role("identification")
+    if place is None or register is None:
+        return answered
+    # A row that was only taken over from a sister proves nothing, unless a code is listed that would stand there.
+    sure = codes.is_listed(profile) or profile.describe(register).evidence == "verified"
+    return (*answered, place) if sure else answered

@@ -1,0 +1,123 @@
+"""What a unit is, as far as it tells: by its identification code, or by which words it answers and which it refuses.
+
+Only reads are sent here. Whether what was found is enough to command a motor by it is decided in `choose`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.identify import codes, signatures
+from drivebus.identify.answers import LOCKED, UNREACHED, no_such_address
+from drivebus.identify.families import all_of, one_of, shipped
+from drivebus.identify.results import Identification
+from drivebus.profile import Profile
+
+__all__ = ["Read", "identify"]
+
+Read = Callable[[int, int], Awaitable[list[int]]]
+"""Asks a unit for the word at an address."""
+
+_PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
+
+
+async def identify(read: Read, unit: int) -> Identification:
+    """Finds out what *unit* is. *read* asks for one word.
+
+    Raises:
+        NoAnswer, BadAnswer, PortError: From its first answer.
+    """
+    answered: dict[int, bool] = {}
+    told: list[str] = []
+    code: int | None = None
+    for address in codes.registers():
+        try:
+            [code] = await read(unit, address)
+        except Refused as error:
+            if error.code in UNREACHED:
+                raise NoAnswer(f"no answer, says a gateway: {error}", unit=unit, raw=error.raw) from error
+            answered[address] = False
+            why = _PASSWORD if error.code == LOCKED else ""
+            told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")
+            continue
+        answered[address] = True
+        rows = codes.listed_at(address, code)
+        if rows:
+            return await _as_it_behaves(read, _by_code(unit, code, rows), address)
+        told.append(f"it says {code:04X}H, which no list names")
+    candidates = await _by_answers(read, unit, answered)
+    if not candidates:
+        reason = f"{'; '.join(told)}, and answers like no family that is known by its answers"
+        return Identification(unit, (), None, code, "", "unknown", reason)
+    seen = ", ".join(f"{address:04X}H {'answered' if yes else 'refused'}" for address, yes in sorted(answered.items()))
+    return Identification(
+        unit,
+        candidates,
+        candidates[0] if len(candidates) == 1 else None,
+        code,
+        one_of(Profile.builtin(name).title for name in candidates),
+        "by answers",
+        f"it gives no code that is known, and answers as such a unit does: {seen}",
+    )
+
+
+def _by_code(unit: int, code: int, rows: list[codes.Row]) -> Identification:
+    """What *unit* is by the *rows* that are listed for its *code*."""
+    families = tuple(codes.families_in(rows))
+    title = one_of(name for row in rows for name in (row["title"], *(row.get("shared") or ())))
+    printed = next((row for row in rows if row["verified"]), None)
+    says = f"it says {code:04X}H"
+    if printed is None:
+        certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0]['source']}"
+    elif len(families) > 1:
+        certainty, reason = "shared", f"{says}, which {all_of(families)} report alike"
+    else:
+        certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
+    return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
+
+
+async def _as_it_behaves(read: Read, found: Identification, place: int) -> Identification:
+    """Gives *found* back, as no more than likely if the unit is in no state of such a drive.
+
+    One word is no proof: another maker's drive may keep its speed at *place*, and turn at just that.
+    """
+    known = next(map(Profile.builtin, shipped(found.candidates)), None)
+    register = None if known is None else known.role("state")
+    about = None if known is None or register is None else known.describe(register)
+    if known is None or about is None or about.address is None or about.evidence == "assumed":
+        return found
+    try:
+        [word] = await read(found.unit, about.address)
+    except Refused as error:
+        if not no_such_address(known, error.code):
+            return found
+        against = "refuses"
+    except (NoAnswer, BadAnswer):
+        return found
+    else:
+        if known.state(word) != "unknown":
+            return found
+        against = f"says {word} at"
+    reason = (
+        f"{found.reason}; but it {against} {about.address:04X}H, where each of those tells its state: "
+        f"something else may stand at {place:04X}H"
+    )
+    return replace(found, certainty="unverified", reason=reason)
+
+
+async def _by_answers(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
+    """The families whose signature *unit* shows. What was asked stands in *answered*, and what is asked goes there."""
+    for signature in signatures.listed().values():
+        for address in (*signature["answers"], *signature["refuses"]):
+            if address not in answered:
+                try:
+                    await read(unit, address)
+                    answered[address] = True
+                except Refused:
+                    answered[address] = False
+                except (NoAnswer, BadAnswer):
+                    # Neither, then: no signature has it.
+                    continue
+    return tuple(name for name, signature in signatures.listed().items() if signatures.is_shown(signature, answered))

@@ -1,0 +1,173 @@
+"""Whether the unit at an address is what it was named as, and still the one it was.
+
+People name a profile, and mistake one drive for another. So what the unit says of itself is asked before anything goes
+out that moves a motor or changes a value, and where it speaks against the profile, nothing goes out.
+
+A port that was lost and opened again may be another one: an adapter plugged in elsewhere, a cable moved to another
+machine, where the same address is another drive. So it is asked again then. A stop does not wait for it.
+
+Families that have an identification code are known by it, and others by which words they answer and which they refuse:
+also by what they say where other families have such a code, for that is how one of those gives itself away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
+from drivebus.identify import codes
+from drivebus.identify.answers import Answer, tells_nothing
+from drivebus.identify.contradiction import contradiction
+from drivebus.identify.signatures import signature_of
+from drivebus.line.protocols import AwaitableBus
+from drivebus.profile import Profile
+
+__all__ = ["SameUnit"]
+
+
+class SameUnit:
+    """Makes sure that the unit at an address is what it was named as, and still the one it was.
+
+    Args:
+        bus: The line it hangs on; only for how often that was opened again.
+        unit: Its address, 1..247.
+        profile: What it was named as.
+        code: What it said, if it was asked before.
+        trusted: Whether the profile is believed, whatever the unit says.
+    """
+
+    def __init__(
+        self,
+        bus: AwaitableBus,
+        unit: int,
+        profile: Profile,
+        code: int | None = None,
+        *,
+        trusted: bool = False,
+    ) -> None:
+        self._unit = unit
+        self._profile = profile
+        self._trusted = trusted
+        self._words, self._probes = _questions(profile)
+        self._known = None if code is None else _hex(code)
+        self._contradicts = False
+        self._opened = bus.reconnects
+
+    async def check(self, bus: AwaitableBus, *, judged: bool = True) -> int:
+        """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
+
+        A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
+        is one that refuses for the moment only, as where a password locks it or a gateway does not reach it. Whether it
+        contradicts its profile is looked at only where it is to be *judged*; where it does, it is asked each time.
+
+        Returns:
+            The connection for which that holds: what is sent on it goes to the unit that was asked.
+
+        Raises:
+            NotAllowed: What it says speaks against the profile, or another unit answers at this address now, or it was
+                asked again and refused for the moment.
+            NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
+        """
+        opened = bus.reconnects
+        # What spoke against the profile may have been put right meanwhile.
+        anew = self._known is None or (judged and self._contradicts)
+        if not anew and opened == self._opened:
+            return opened
+        answers: list[Answer] = []
+        failure: NoAnswer | BadAnswer | PortError | None = None
+        try:
+            await self._ask(bus, answers)
+        except LINE_ERRORS as error:
+            failure = error
+        if anew or self._known is None:
+            self._judge(answers, failure is None, judged)
+        else:
+            self._compare(answers, failure, self._known)
+        self._opened = opened
+        return opened
+
+    def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool) -> None:
+        """Takes what a unit said that was not known, and raises where it contradicts its profile and is to be *judged*.
+
+        What came before a failure of the line was said all the same, but is not *complete*: the unit stays unknown.
+        """
+        against = None if self._trusted else contradiction(self._profile, self._unit, answers)
+        self._contradicts = against is not None
+        self._known = self._told(answers) if complete and not self._put_off(answers) else None
+        if against is not None and judged:
+            raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
+
+    def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
+        """Raises where the unit does not say what is *known* of it any more."""
+        unsaid = f"the port was opened again, and unit {self._unit} did not say what it is before anything is written"
+        if failure is not None:
+            # `started` stays None: of what was to follow, nothing left.
+            raise type(failure)(
+                f"{unsaid} to it ({failure}); nothing was written", unit=self._unit, raw=failure.raw
+            ) from failure
+        told = self._told(answers)
+        if self._put_off(answers):
+            raise NotAllowed(f"{unsaid} to it ({told}); nothing was written", unit=self._unit)
+        if told != known:
+            raise NotAllowed(
+                f"another drive answers as unit {self._unit} since the port was opened again: its identification was "
+                f"{known}, and is {told} now; nothing was sent. If that is right, ask for the drive anew: "
+                f"bus.drive({self._unit})",
+                unit=self._unit,
+            )
+
+    async def contradiction(self, bus: AwaitableBus) -> str | None:
+        """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
+        answers: list[Answer] = []
+        await self._ask(bus, answers)
+        return contradiction(self._profile, self._unit, answers)
+
+    async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:
+        """Adds the unit's answers to *answers* as they come, so that a failure of the line leaves the earlier ones."""
+        for address in (*self._words, *self._probes):
+            answers += [await self._answer(bus, address)]
+
+    async def _answer(self, bus: AwaitableBus, address: int) -> Answer:
+        try:
+            [word] = await bus.read(self._unit, address)
+        except Refused as error:
+            return Answer(address, None, error.code)
+        return Answer(address, word, None)
+
+    def _put_off(self, answers: Sequence[Answer]) -> bool:
+        """Whether one of *answers* is a refusal that passes, so that it is not known yet what the unit is."""
+        return any(tells_nothing(self._profile, answer) for answer in answers)
+
+    def _told(self, answers: Sequence[Answer]) -> str:
+        """The answers as they are compared with later ones: of a probe only that it was answered, and not with what."""
+        told = {answer.address: self._shown(answer) for answer in answers}
+        if len(told) == 1:
+            return next(iter(told.values()))
+        return ", ".join(f"{_hex(address)} {said}" for address, said in told.items())
+
+    def _shown(self, answer: Answer) -> str:
+        if answer.word is None:
+            return f"refused with exception {answer.exception:02X}H"
+        # Elsewhere any word may change, but for a code that gives another drive away.
+        is_code = answer.address in self._words or codes.listed_at(answer.address, answer.word)
+        return _hex(answer.word) if is_code else "answered"
+
+
+def _questions(profile: Profile) -> tuple[Sequence[int], Sequence[int]]:
+    """The addresses where a unit says what it is, and those of which counts whether it answers; either may be none."""
+    address = codes.address_of(profile)
+    if address is not None:
+        return (address,), ()
+    signature = signature_of(profile)
+    if signature is not None:
+        return (), (*signature["answers"], *signature["refuses"])
+    # Whether it has the words that are always asked of its family is better than nothing.
+    known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
+    asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
+    # What the profile has there itself is no code.
+    others = [address for address in codes.registers() if profile.name_at(address) is None]
+    return (), (*others, *asked)
+
+
+def _hex(code: int) -> str:
+    return f"{code:04X}H"

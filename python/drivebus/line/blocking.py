@@ -1,0 +1,99 @@
+"""Operations that are written to be awaited, carried out at once: for a line whose calls block by themselves.
+
+Each operation stands once, as a coroutine. Over a bus that blocks it waits for nothing else, so one step takes it from
+its beginning to its end, in the caller's own thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, TypeVar
+
+from drivebus.line.protocols import BusProtocol
+from drivebus.line.stats import Link
+
+__all__ = ["BlockingBus", "at_once"]
+
+_R = TypeVar("_R")
+
+
+class BlockingBus:
+    """A bus that blocks, for operations that await: whatever they await is there when they ask."""
+
+    def __init__(self, bus: BusProtocol) -> None:
+        self._bus = bus
+
+    @property
+    def reconnects(self) -> int:
+        """See `BusProtocol`, as of all else here."""
+        return self._bus.reconnects
+
+    @property
+    def closed(self) -> bool:
+        """See `BusProtocol`."""
+        return self._bus.closed
+
+    def now(self) -> float:
+        """See `BusProtocol`."""
+        return self._bus.now()
+
+    async def sleep(self, seconds: float, /) -> None:
+        """See `BusProtocol`."""
+        self._bus.sleep(seconds)
+
+    async def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """See `BusProtocol`."""
+        return self._bus.read(unit, address, count, urgent=urgent, verify=verify)
+
+    async def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """See `BusProtocol`."""
+        return self._bus.read_stamped(unit, address, count, urgent=urgent, verify=verify)
+
+    async def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+        force: bool = False,
+    ) -> None:
+        """See `BusProtocol`."""
+        forced = {"force": True} if force else {}
+        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **forced)
+
+    async def link(self, unit: int, /) -> Link:
+        """See `BusProtocol`."""
+        return self._bus.link(unit)
+
+    @property
+    def line(self) -> object:
+        """See `AwaitableBus`."""
+        return getattr(self._bus, "line", self._bus)
+
+    def undisturbed(self) -> AbstractContextManager[BlockingBus]:
+        """Itself: no caller can take back what blocks it."""
+        return nullcontext(self)
+
+    def blocking(self) -> BlockingBus:
+        """Itself."""
+        return self
+
+
+def at_once(work: Coroutine[Any, Any, _R]) -> _R:
+    """Carries *work* out. It must not wait for anything but a `BlockingBus`."""
+    try:
+        work.send(None)
+    except StopIteration as done:
+        result: _R = done.value
+        return result
+    work.close()
+    raise RuntimeError(f"{work!r} waits for an event loop, and there is none")

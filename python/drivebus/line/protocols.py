@@ -1,0 +1,122 @@
+"""What the operations need from the line that a drive hangs on.
+
+They are written against these protocols: they run on a bus, on a stand-in, on anything that behaves like one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Protocol
+
+from drivebus.line.stats import Link
+
+__all__ = ["AwaitableBus", "BusProtocol"]
+
+
+class BusProtocol(Protocol):
+    """A line with its own clock. All times are seconds."""
+
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+
+    def sleep(self, seconds: float, /) -> None:
+        """Waits on the line's clock."""
+
+    def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """Reads words; repeated by the bus's own policy. *urgent* before all who wait; *verify* asks twice."""
+
+    def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """Reads words, with the Unix times of request and answer."""
+
+    def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+        force: bool = False,
+    ) -> None:
+        """Writes one word or several; *urgent* before all who wait, whatever is in doubt.
+
+        Sent once. With *read_back*, the address where it can be read, a lost confirmation is cleared up by reading, and
+        only where the unit shows another value is the write repeated. With *connection*, nothing is sent where
+        `reconnects` is another number by then: PortError. With *force* also what the family does not define.
+        """
+
+    def link(self, unit: int, /) -> Link:
+        """How many of the last exchanges with *unit*, ten at most, brought an answer."""
+
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether the line was closed for good."""
+
+
+class AwaitableBus(Protocol):
+    """A bus as the operations know it: the same calls, to be awaited.
+
+    Whatever else an operation awaits is made of them, so that over a bus that blocks nothing is left to wait for.
+    """
+
+    def now(self) -> float:
+        """See `BusProtocol`, as of all else here."""
+
+    async def sleep(self, seconds: float, /) -> None:
+        """See `BusProtocol`."""
+
+    async def read(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> list[int]:
+        """See `BusProtocol`."""
+
+    async def read_stamped(
+        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+    ) -> tuple[list[int], float, float]:
+        """See `BusProtocol`."""
+
+    async def write(
+        self,
+        unit: int,
+        address: int,
+        value: int | Sequence[int],
+        /,
+        *,
+        urgent: bool = False,
+        read_back: int | None = None,
+        connection: int | None = None,
+        force: bool = False,
+    ) -> None:
+        """See `BusProtocol`."""
+
+    async def link(self, unit: int, /) -> Link:
+        """See `BusProtocol`."""
+
+    @property
+    def reconnects(self) -> int:
+        """See `BusProtocol`."""
+
+    @property
+    def closed(self) -> bool:
+        """See `BusProtocol`."""
+
+    @property
+    def line(self) -> object:
+        """What stands for the line: the same for each face of it."""
+
+    def undisturbed(self) -> AbstractContextManager[AwaitableBus]:
+        """The same line for a block in which nothing is given up: a cancellation is raised when the block has ended."""
+
+    def blocking(self) -> AwaitableBus:
+        """The same line for who has no event loop: it blocks."""

@@ -1,0 +1,286 @@
+"""What every face of a poll has: the checks of what is asked for, and samples, batches and arrays of what came.
+
+The asking is the compiled core's. How one waits for samples is the business of `drivebus.poll` and `drivebus.aio.poll`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
+
+from drivebus import _native, checks
+from drivebus.errors import DrivebusError, NotAllowed, Refused
+from drivebus.profile import Profile
+from drivebus.profile.plan import ReadPlan
+from drivebus.values import Value
+
+if TYPE_CHECKING:
+    import numpy.typing
+
+__all__ = ["MOST_SAMPLES", "Batch", "Polling", "Sample", "how_many", "poller_of", "seconds"]
+
+MOST_SAMPLES = 1_000_000
+"""More are never kept."""
+
+_LONGEST_INTERVAL = 86_400.0
+
+
+class PolledDrive(Protocol):
+    """What a poll needs to know of a drive, whether its calls block or are awaited."""
+
+    @property
+    def bus(self) -> object:
+        """The line it hangs on."""
+
+    @property
+    def unit(self) -> int:
+        """Its address, 1..247."""
+
+    @property
+    def profile(self) -> object:
+        """What its words mean."""
+
+    def readable(self, *names: str) -> list[str]:
+        """*names*, or those that it reads when it is asked for nothing else, if they may be read."""
+
+
+class Target(NamedTuple):
+    """What is asked in each cycle of one drive, or of one unit that no profile is known of."""
+
+    key: Any
+    unit: int
+    drive: PolledDrive | None
+    profile: Profile | None
+    plan: ReadPlan | None
+    names: tuple[str | int, ...]
+    asked: _native.Plan | list[tuple[int, int]]
+
+
+class Sample(Mapping[str | int, Value]):
+    """What one drive said in one cycle: a mapping of names (of a unit without a profile: of addresses) to values.
+
+    A missing sample is empty, and so it is false.
+
+    Attributes:
+        unit: Its address, 1..247.
+        drive: The drive as it was given, or None where a unit was polled by its address.
+        time: Unix time in seconds at which the first request left; of a missing sample, at which it was given up if it
+            was not sent.
+        answered: Unix time in seconds at which the last answer was complete, or was given up.
+        missing: The error that there was instead of an answer, or None. It is not raised.
+    """
+
+    __slots__ = ("_values", "answered", "drive", "missing", "time", "unit")
+
+    def __init__(
+        self, target: Target, time: float, answered: float, values: list[Value] | None, missing: DrivebusError | None
+    ) -> None:
+        self.unit = target.unit
+        self.drive: Any = target.drive
+        self.time = time
+        self.answered = answered
+        self.missing = missing
+        self._values = {} if values is None else dict(zip(target.names, values, strict=True))
+
+    def __getitem__(self, name: str | int) -> Value:
+        try:
+            return self._values[name]
+        except KeyError:
+            if self.missing is not None:
+                raise KeyError(f"{name!r}: this sample is missing: {self.missing}") from None
+            raise
+
+    def __iter__(self) -> Iterator[str | int]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name}={value}" for name, value in self.items())
+        return f"<Sample of unit {self.unit} at {self.time:.3f}: {self.missing or shown}>"
+
+
+class Batch(Sequence[Sample]):
+    """Samples in the order in which they were taken by the bus. They are decoded when they are first looked at."""
+
+    def __init__(self, native: _native.Batch, targets: Sequence[Target]) -> None:
+        self._native = native
+        self._targets = targets
+        self._samples: list[Sample] | None = None
+
+    def __len__(self) -> int:
+        return len(self._native)
+
+    @overload
+    def __getitem__(self, index: int) -> Sample: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Sample]: ...
+    def __getitem__(self, index: int | slice) -> Sample | list[Sample]:
+        return self._decoded()[index]
+
+    def __iter__(self) -> Iterator[Sample]:
+        return iter(self._decoded())
+
+    def __repr__(self) -> str:
+        return f"<Batch of {len(self)} samples>"
+
+    def to_numpy(self) -> dict[Any, numpy.typing.NDArray[Any]]:
+        """One structured array for each drive (or unit) that was polled, with a row for each of its samples.
+
+        Its fields are `time` and `answered`, as in `Sample`, and one for each name (of a unit without a profile, each
+        address such as `"0x3000"`): all float64, NaN where the sample is missing.
+
+        Raises:
+            ImportError: numpy is not installed.
+        """
+        try:
+            import numpy
+        except ImportError:
+            raise ImportError("to_numpy() needs numpy: pip install 'drivebus[numpy]'") from None
+        arrays: dict[Any, numpy.typing.NDArray[Any]] = {}
+        for index, target in enumerate(self._targets):
+            names = [name if isinstance(name, str) else f"{name:#06x}" for name in target.names]
+            fields = [(name, "f8") for name in ("time", "answered", *names)]
+            arrays[target.key] = numpy.frombuffer(self._native.rows(index), dtype=fields)
+        return arrays
+
+    def _decoded(self) -> list[Sample]:
+        if self._samples is None:
+            self._samples = [self._sample(*row) for row in self._native.samples()]
+        return self._samples
+
+    def _sample(
+        self, index: int, time: float, answered: float, values: list[Value] | None, missing: Exception | None
+    ) -> Sample:
+        target = self._targets[index]
+        if values is not None and target.plan is not None:
+            values = target.plan.named(values)
+        error = missing if isinstance(missing, DrivebusError) else None
+        if isinstance(error, Refused) and target.profile is not None:
+            error.name, error.meaning = target.profile.exception(error.code)
+        return Sample(target, time, answered, values, error)
+
+
+class Polling:
+    """What every face of a poll has, whether its calls block or are awaited.
+
+    Attributes:
+        interval: Seconds from one cycle's beginning to the next one's; None: one right after the other.
+        size: How many samples are kept.
+        shortest: Seconds that one cycle takes at least on this line; 0.0 where the line sets no such limit.
+    """
+
+    def __init__(self, bus: object, native: _native.Bus, targets: object, interval: float | None, size: int) -> None:
+        if interval is not None:
+            interval = checks.number("interval", interval, 0.0, _LONGEST_INTERVAL, above=True)
+        self.size = checks.whole("size", size, 1, MOST_SAMPLES)
+        self.interval = interval
+        self._targets = _targets(bus, targets)
+        asked = [(target.unit, target.asked) for target in self._targets]
+        self._native = _native.Poller(native, asked, interval, self.size)
+        self.shortest = self._native.shortest
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing is asked any more. Samples may still be there to be taken."""
+        return self._native.over
+
+    @property
+    def cycles(self) -> int:
+        """Cycles that are over: in each, every drive was asked once."""
+        return self._native.counts()["cycles"]
+
+    @property
+    def missing(self) -> int:
+        """Samples that have no values, taken or not."""
+        return self._native.counts()["missing"]
+
+    @property
+    def late(self) -> int:
+        """Beats of `interval` that passed before the line was free. They are not made up for."""
+        return self._native.counts()["late"]
+
+    @property
+    def dropped(self) -> int:
+        """Samples that gave way to newer ones before somebody took them."""
+        return self._native.counts()["dropped"]
+
+    def take(self, max: int | None = None) -> Batch:  # noqa: A002
+        """The oldest samples that are there, *max* at most, without waiting. Empty where there are none."""
+        limit = self.size if max is None else checks.whole("max", max, 0, MOST_SAMPLES)
+        return Batch(self._native.take(limit), self._targets)
+
+    def __repr__(self) -> str:
+        how = "as fast as the wire" if self.interval is None else f"every {self.interval:g} s"
+        units = ", ".join(str(target.unit) for target in self._targets)
+        return f"<{type(self).__name__} of unit {units} {how}{', closed' if self.closed else ''}>"
+
+
+def poller_of(polling: Polling) -> _native.Poller:
+    """What asks, in the core."""
+    return polling._native
+
+
+def how_many(polling: Polling, count: int | None) -> int:
+    """How many samples are waited for: *count*, or one for None."""
+    return 1 if count is None else checks.whole("count", count, 1, polling.size)
+
+
+def seconds(timeout: float | None) -> float | None:
+    """How long is waited; None: for as long as it takes."""
+    return None if timeout is None else checks.number("timeout", timeout, 0.0)
+
+
+def _targets(bus: object, wanted: object) -> tuple[Target, ...]:
+    if not isinstance(wanted, Mapping):
+        raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}; {wanted!r} is none")
+    if not wanted:
+        raise NotAllowed("there is nobody to poll: give {drive: names, …}, such as {drive: None}")
+    targets = tuple(_target(bus, key, names) for key, names in wanted.items())
+    units = [target.unit for target in targets]
+    twice = next((unit for unit in units if units.count(unit) > 1), None)
+    if twice is not None:
+        raise NotAllowed(f"unit {twice} is there twice; name all that is wanted of it in one place", unit=twice)
+    return targets
+
+
+def _target(bus: object, key: Any, names: object) -> Target:
+    if not all(hasattr(key, name) for name in ("bus", "unit", "profile")):
+        return _raw_target(checks.unit(key), names)
+    drive: PolledDrive = key
+    unit, profile = drive.unit, drive.profile
+    if drive.bus is not bus:
+        raise NotAllowed(f"unit {unit} is a drive of another bus; poll it there", unit=unit)
+    if not isinstance(profile, Profile):
+        raise NotAllowed(f"the profile of unit {unit} is none of this package's; poll it by addresses", unit=unit)
+    if names is None:
+        names = drive.readable()
+    elif isinstance(names, str):
+        names = [names]
+    elif not isinstance(names, Iterable):
+        raise NotAllowed(f"{names!r} are no names; give several, or None for the monitor registers", unit=unit)
+    wanted = list(names)
+    unfit = next((name for name in wanted if not isinstance(name, str)), None)
+    if unfit is not None:
+        raise NotAllowed(f"name {unfit!r} of unit {unit} is no text", unit=unit)
+    asked = list(dict.fromkeys(wanted))
+    plan = profile.compile(drive.readable(*asked) if asked else asked)
+    if not plan.names:
+        raise NotAllowed(f"nothing is asked of unit {unit}; give names, or None for its monitor registers", unit=unit)
+    return Target(key, unit, drive, profile, plan, plan.names, plan.native)
+
+
+def _raw_target(unit: int, reads: object) -> Target:
+    usage = f"unit {unit} has no profile here: give [(address, count), …] for it, or use bus.drive({unit})"
+    if isinstance(reads, (str, bytes)) or not isinstance(reads, Iterable):
+        raise NotAllowed(usage)
+    asked = []
+    for read in reads:
+        if not isinstance(read, Sequence) or isinstance(read, (str, bytes)) or len(read) != 2:
+            raise NotAllowed(usage)
+        asked.append((checks.address(read[0]), checks.whole("count", read[1], 1, 125)))
+    names = tuple(address + offset for address, count in asked for offset in range(count))
+    if len(set(names)) < len(names):
+        raise NotAllowed(f"of unit {unit} one address is asked for twice")
+    return Target(unit, unit, None, None, None, names, asked)

@@ -1,0 +1,212 @@
+"""What is opened as a bus, and what every bus tells of itself without asking the line, however it is waited for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from drivebus import checks
+from drivebus._native import SerialFormat
+from drivebus.errors import NotAllowed
+from drivebus.line import ports
+from drivebus.line.stats import Stats
+from drivebus.line.write_guard import KnownUnits
+from drivebus.sim import Simulator, core_of
+
+__all__ = ["BusFace", "Opening", "check_trust"]
+
+
+class Opening:
+    """The arguments of a bus, checked, and its port as the core takes it. Nothing is opened yet but a simulator.
+
+    Attributes:
+        target: What the core opens.
+        format: How its characters look.
+        keywords: What else the core is told.
+        simulator: The simulator behind it, if there is one.
+        owned: What was made here, and ends with the bus.
+        known: What is known of its units.
+        shown: What was given as its port, for people.
+    """
+
+    def __init__(
+        self,
+        port: object,
+        line: SerialFormat,
+        *,
+        timeout: float,
+        retries: int,
+        read_only: bool,
+        rs485: Mapping[str, object] | None,
+        echo: str,
+        turnaround: float,
+        learn_timeout: bool,
+        low_latency: bool,
+        queue: int,
+    ) -> None:
+        self.shown = str(port)
+        self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        if rs485 is not None and not isinstance(rs485, Mapping):
+            raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
+        self.keywords: dict[str, Any] = {
+            "timeout": self.timeout,
+            "retries": checks.whole("retries", retries, 0, 100),
+            "read_only": checks.flag("read_only", read_only),
+            "rs485": None if rs485 is None else dict(rs485),
+            "echo": checks.one_of("echo", echo, ("auto", "yes", "no")),
+            "turnaround": checks.number("turnaround", turnaround, 0.0, 3600.0),
+            "learn_timeout": checks.flag("learn_timeout", learn_timeout),
+            "low_latency": checks.flag("low_latency", low_latency),
+            "queue": checks.whole("queue", queue, 1, 1_000_000),
+        }
+        _check_together(port, self.keywords)
+        target = ports.resolve(port, line)
+        self.format = ports.format_of(target, line)
+        self.simulator = target if isinstance(target, Simulator) else None
+        self.owned = target if target is not port and not isinstance(target, str) else None
+        if isinstance(target, Simulator):
+            target = core_of(target) if target.transport == "process" else target.port
+        self.target = target
+        self.known = KnownUnits()
+
+
+def check_trust(profile: object, trust: object) -> None:
+    """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
+    if checks.flag("trust_profile", trust) and profile is None:
+        raise NotAllowed("trust_profile is for a profile that is named, and none is: give profile=… (`--profile`)")
+
+
+def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
+    """Refuses what cannot be meant of *port*, before it is resolved: that opens URLs of pyserial and simulators."""
+    named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
+    scheme = named.partition("://")[0] if isinstance(named, str) and "://" in named else ""
+    if keywords["rs485"] is not None and (not isinstance(named, str) or scheme):
+        raise NotAllowed("rs485 is for a serial port given by its path: nobody would move an RTS here")
+    if keywords["echo"] == "yes" and scheme == "tcp":
+        raise NotAllowed('echo "yes" is for an adapter that hands back what it sends, and tcp:// has none: Modbus TCP')
+
+
+class _Native(Protocol):
+    """What the core tells at once."""
+
+    @property
+    def port(self) -> str: ...
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def read_only(self) -> bool: ...
+    @property
+    def reconnects(self) -> int: ...
+    def now(self) -> float: ...
+    def stats(self) -> dict[str, Any]: ...
+    def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None: ...
+
+
+class BusFace:
+    """A bus, as far as it tells and is told without a word on the line; and its keywords, which both faces have.
+
+    Attributes:
+        simulator: The simulator behind a `sim://` port or the one that was given; None on a real line.
+        format: The `SerialFormat` in force.
+    """
+
+    def __init__(
+        self,
+        port: object,
+        *,
+        baudrate: int = 19200,
+        parity: str = "E",
+        stopbits: int = 1,
+        bytesize: int = 8,
+        silence: str | float = "spec",
+        timeout: float = 0.5,
+        retries: int = 2,
+        read_only: bool = False,
+        rs485: Mapping[str, object] | None = None,
+        echo: str = "auto",
+        turnaround: float = 0.1,
+        learn_timeout: bool = False,
+        low_latency: bool = True,
+        queue: int = 65_536,
+    ) -> None:
+        opening = Opening(
+            port,
+            SerialFormat(baudrate, parity, stopbits, bytesize, silence),
+            timeout=timeout,
+            retries=retries,
+            read_only=read_only,
+            rs485=rs485,
+            echo=echo,
+            turnaround=turnaround,
+            learn_timeout=learn_timeout,
+            low_latency=low_latency,
+            queue=queue,
+        )
+        self.simulator = opening.simulator
+        self.format = opening.format
+        self._timeout = opening.timeout
+        self._begin(opening)
+
+    def _begin(self, opening: Opening) -> None:
+        """Opens it, where that is done at once."""
+        raise NotImplementedError
+
+    def _core(self) -> _Native:
+        """The bus of the core. Raises `PortError` where it is not open yet."""
+        raise NotImplementedError
+
+    @property
+    def port(self) -> str:
+        """What was opened, for people."""
+        return self._core().port
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called; in a forked child True, for the line is its parent's."""
+        return self._core().closed
+
+    @property
+    def read_only(self) -> bool:
+        """Whether every write is refused."""
+        return self._core().read_only
+
+    @property
+    def timeout(self) -> float:
+        """Seconds a unit is given to answer."""
+        self._core()
+        return self._timeout
+
+    def __repr__(self) -> str:
+        return f"<Bus on {self.port}{', closed' if self.closed else ''}>"
+
+    def now(self) -> float:
+        """Seconds on the line's clock: real time, or the simulation's."""
+        return self._core().now()
+
+    def configure(self, unit: int, *, timeout: float | None = None, gap: float | None = None) -> None:
+        """Sets what *unit* needs otherwise than the bus, for every call from now on. None keeps what the bus has.
+
+        Args:
+            unit: Its address, 1..247.
+            timeout: Seconds it is given to answer.
+            gap: Seconds of silence before a request to it, where it needs more than the silence between frames: some
+                units are deaf for a while after they answered.
+        """
+        if timeout is not None:
+            timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+        if gap is not None:
+            gap = checks.number("gap", gap, 0.0, 3600.0)
+        self._core().configure(checks.unit(unit), timeout=timeout, gap=gap)
+
+    @property
+    def reconnects(self) -> int:
+        """How often the port was opened again after it was lost. Another drive may answer behind it."""
+        return self._core().reconnects
+
+    def stats(self) -> Stats:
+        """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
+
+        `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
+        """
+        return Stats(self._core().stats())

@@ -1,0 +1,99 @@
+"""What is known of the units of a line, the families for which a drive was asked: what a raw write would command.
+
+The same word means different things to different families: 5 stops an INVT drive and lets a VFD500 coast. So a write by
+address is held against the command register of the unit's family, and against those of the other families as well.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+
+from drivebus.errors import NotAllowed
+from drivebus.profile import Profile, profiles
+from drivebus.rtu import written
+
+__all__ = ["KnownUnits", "check_words"]
+
+_HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
+
+
+class KnownUnits:
+    """The profiles under which the units of a line were asked for."""
+
+    def __init__(self) -> None:
+        self._profiles: dict[int, dict[str, Profile]] = {}
+
+    def add(self, unit: int, profile: Profile) -> None:
+        """From now on *unit* is known as what *profile* describes."""
+        self._profiles.setdefault(unit, {})[profile.name] = profile
+        _command_registers()  # now, so that no stop has to wait for it
+
+    def check(self, unit: int, address: int, words: int | Sequence[int], force: bool = False) -> None:
+        """Raises `NotAllowed` if the words would command *unit* (0: any of them) what its family does not define."""
+        if force or not self._profiles:
+            return
+        for each in (unit,) if unit else tuple(self._profiles):
+            if each in self._profiles:
+                check_words(self._profiles[each].values(), each, address, words)
+
+    def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
+        """As `check`, for what a request to write carries; any other is let pass."""
+        write = written(pdu)
+        if write is not None:
+            address, words = write
+            self.check(unit, address, words, force)
+
+
+def check_words(families: Iterable[Profile], unit: int, address: int, words: int | Sequence[int]) -> None:
+    """Raises `NotAllowed` if the words at *address* are a command that none of *families*, which *unit* may be, has."""
+    known = list(families)
+    for offset, word in enumerate([words] if isinstance(words, int) else words):
+        commanded = [family for family in known if _plain(family, address + offset) == family.command_address]
+        if commanded:
+            if not any(word in family.command_codes() for family in commanded):
+                raise _undefined(commanded[0], unit, address + offset, word)
+        else:
+            _check_foreign(known, unit, address + offset)
+
+
+def _undefined(family: Profile, unit: int, address: int, word: int) -> NotAllowed:
+    codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(family.command_codes().items()))
+    return NotAllowed(
+        f"{word} at {address:04X}H is no command of unit {unit}, which is known as {family.title}: its codes are "
+        f"{codes or 'not known'}; {_HINT}",
+        unit=unit,
+    )
+
+
+def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None:
+    """Nothing of its own stands there, but another family has its command register there."""
+    foreign = _command_registers()
+    plain = {_plain(family, address) for family in families}
+    others = next((foreign[place] for place in plain if place in foreign), None)
+    if others is None or any(family.name_at(place) is not None for family in families for place in plain):
+        return
+    own = families[0].command_address
+    where = "is not known" if own is None else f"is {own:04X}H"
+    raise NotAllowed(
+        f"{address:04X}H is the command register of {others}; unit {unit} is known as {families[0].title}, whose "
+        f"command register {where}; {_HINT}",
+        unit=unit,
+    )
+
+
+def _plain(family: Profile, address: int) -> int:
+    """*address* without what tells RAM from EEPROM."""
+    memory = family.memory()
+    return address & ~(1 << (15 if memory is None else memory["bit"]))
+
+
+@functools.cache
+def _command_registers() -> dict[int, str]:
+    """The command registers of the shipped families, and whose they are."""
+    found: dict[int, list[str]] = {}
+    for name in profiles():
+        profile = Profile.builtin(name)
+        if profile.command_address is not None:
+            found.setdefault(profile.command_address, []).append(profile.title)
+    return {address: ", ".join(titles) for address, titles in found.items()}

@@ -1,0 +1,163 @@
+"""Words whose bits are things of their own: terminals, and the special control word.
+
+They are told and given by the names that the profile has for the bits. Words that can move a motor are sent once and
+never repeated, under the checks of a command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from drivebus import checks
+from drivebus.errors import NotAllowed
+from drivebus.operations import commands, control, setpoints, start_checks, words
+from drivebus.operations.commands import A_WORD
+from drivebus.operations.unit import Unit
+from drivebus.values import Description
+
+__all__ = ["bits", "inputs", "outputs", "set_virtual_inputs", "set_virtual_outputs", "special_control"]
+
+_WORD = 16
+_INPUTS, _OUTPUTS = "input_state", "output_state"
+"""What the words of the terminals are called in every family that has them."""
+
+
+async def bits(unit: Unit, name: str, *, unverified: bool = False) -> dict[str, str]:
+    """What the bits of the word *name* say, such as `{"motor": "motor 1"}`; empty for a plain number.
+
+    Raises:
+        NotAllowed: Unknown name, or not verified; nothing was sent.
+        NoAnswer, BadAnswer, Refused: See each.
+    """
+    unit = unit.trusting(unverified)
+    return unit.profile.fields(name, await _word(unit, name))
+
+
+async def inputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
+    """The digital inputs by the names at their terminals: whether each is on. Errors as for `bits`."""
+    return await _terminals(unit.trusting(unverified), _INPUTS)
+
+
+async def outputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
+    """The digital outputs by the names at their terminals: whether each is on. Errors as for `bits`."""
+    return await _terminals(unit.trusting(unverified), _OUTPUTS)
+
+
+async def set_virtual_inputs(
+    unit: Unit, /, *, unverified: bool = False, force: bool = False, **terminals: bool
+) -> None:
+    """Sets inputs that the bus gives in the place of terminals: `set_virtual_inputs(S1=True)`.
+
+    What is not named keeps what the drive says it has; where the word can only be written, it is off. What an input
+    does is set in the drive: it may start a motor. Sent once. The drive takes its commands from the terminals then,
+    so it need not obey the bus.
+
+    Args:
+        terminals: On or off for each name.
+        unverified: Also where that is not verified for the family.
+        force: Over a bad link too, as for `run`.
+
+    Raises:
+        NotAllowed: No such input, the drive is in fault or would not heed it, the link is bad, or it is not
+            verified. Nothing was sent.
+        NoAnswer, BadAnswer, PortError, Refused: Before it was sent, or the drive did not take it.
+        Unconfirmed: It was sent, and nothing is known of it: the motor may turn.
+    """
+    await _set_bits(unit.trusting(unverified), "virtual_inputs", terminals, force)
+
+
+async def set_virtual_outputs(
+    unit: Unit, /, *, unverified: bool = False, force: bool = False, **terminals: bool
+) -> None:
+    """Sets outputs that the bus commands: `set_virtual_outputs(RO1=True)`. Otherwise as `set_virtual_inputs`."""
+    await _set_bits(unit.trusting(unverified), "virtual_outputs", terminals, force)
+
+
+async def special_control(
+    unit: Unit, /, *, unverified: bool = False, force: bool = False, **fields: bool | int | str
+) -> None:
+    """Writes fields of the special control word: `special_control(motor=2, pre_excitation=True)`.
+
+    A field takes True or False, a label that the profile has for it, or a number: that of its label ("motor 2"), or
+    else its raw value. Otherwise as `set_virtual_inputs`.
+    """
+    await _set_bits(unit.trusting(unverified), "special_control", fields, force)
+
+
+async def _word(unit: Unit, name: str) -> int:
+    unit.evidence.reads([name])
+    [word] = await words.read_words(unit, unit.profile.address(name))
+    return word
+
+
+async def _terminals(unit: Unit, name: str) -> dict[str, bool]:
+    try:
+        unit.profile.describe(name)
+    except NotAllowed:
+        raise NotAllowed(
+            f"no {name.replace('_', ' ')} word of {unit.profile.title} is known; unit {unit.address} was not asked",
+            unit=unit.address,
+        ) from None
+    word = await _word(unit, name)
+    return {field: bool(word & mask) for field, mask in _masks(unit, name).items()}
+
+
+async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], force: bool) -> None:
+    register = setpoints.register_of(unit, setpoint)
+    unit.evidence.writes(register)
+    known, masks = unit.profile.describe(register), _masks(unit, register)
+    if not given:
+        raise NotAllowed(f"nothing to set was named; {register} has {', '.join(masks) or 'no bits that are known'}")
+    wanted = [
+        (masks[checks.one_of(f"bit of {register}", name, list(masks))], _bits(known, name, value))
+        for name, value in given.items()
+    ]
+    for name in given:
+        if name in known.unverified_bits:
+            unit.evidence.rule(f"where {name} is in {register} of {unit.profile.title}", known.note)
+    moves = unit.profile.is_command(unit.profile.address(register))
+    if moves:
+        start_checks.can_be_stopped(unit)
+        await start_checks.prove_link(unit, checks.flag("force", force))
+        # These words stand in for terminals, so the drive need not take its commands from the bus.
+        await start_checks.ready_to_start(unit, by_bus=False)
+    await control.check_heeded(unit, setpoint, register)
+    # What can only be written tells nothing: there, what is not named is off.
+    word = 0 if known.access == "wo" else await _word(unit, register)
+    for mask, value in wanted:
+        word = (word & ~mask) | (value * (mask & -mask) & mask)
+    address = unit.profile.address(register)
+    if not moves:
+        await words.write(unit, address, word, read_back=unit.profile.read_back(register))
+        return
+    unit.memory.started_unverified |= unit.unverified
+    await commands.send_once(unit, A_WORD, address, word)
+
+
+def _masks(unit: Unit, name: str) -> dict[str, int]:
+    """The bits of each field of the word *name*."""
+    nothing = unit.profile.fields(name, 0)
+    masks = dict.fromkeys(nothing, 0)
+    for bit in range(_WORD):
+        told = unit.profile.fields(name, 1 << bit)
+        for field in masks:
+            masks[field] |= (told[field] != nothing[field]) << bit
+    return masks
+
+
+def _bits(known: Description, name: str, value: object) -> int:
+    """*value* as the bits of the field *name*."""
+    choices = (known.bits or {}).get(name) or {0: "off", 1: "on"}
+    numbers = {label: number for number, label in choices.items()}
+    if isinstance(value, bool):
+        if len(choices) == 2:
+            return int(value)
+    elif isinstance(value, str):
+        if value in numbers:
+            return numbers[value]
+    elif isinstance(value, int):
+        called = numbers.get(f"{name} {value}", value)
+        if called in choices:
+            return called
+    allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
+    raise NotAllowed(f"{name} {value!r} is nothing that {known.name} can be; allowed is {allowed}")

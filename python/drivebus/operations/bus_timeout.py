@@ -1,0 +1,140 @@
+"""The communication time-out of a drive: what it does by itself when it hears nothing, set and given back.
+
+What keeps it from running out meanwhile is a thread in `drivebus.watchdog`, and a task in `drivebus.aio.watchdog`.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+
+from drivebus import checks
+from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
+from drivebus.operations import parameters, registers, speed, state
+from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.ramp import PATIENCE
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import not_verified
+from drivebus.values import Value
+
+__all__ = ["BusTimeout"]
+
+_READS_PER_TIMEOUT = 4
+"""How often the drive is asked within its time-out: three answers may be lost before it acts."""
+
+
+class BusTimeout:
+    """What is set in the drive, and what it had before.
+
+    Attributes:
+        timeout: Seconds of silence after which the drive acts.
+        action: What it then does: `"coast"` or `"stop"`.
+        verified: Whether a document of this very family prints the parameters and their values.
+        armed: Whether the drive acts by itself when it hears nothing. True after `close` where the motor still turned
+            or could not be asked.
+        error: What the last failure of keeping the line busy was, or of closing; None if there was none.
+    """
+
+    def __init__(self, drive: Unit, timeout: float, action: str) -> None:
+        settings = drive.profile.watchdog
+        if settings is None:
+            raise NotAllowed(
+                f"{drive.profile.title} has no communication time-out that is known; nothing was sent",
+                unit=drive.address,
+            )
+        if drive.profile.memory() is None:
+            raise NotAllowed(
+                f"no way to write {settings.timeout} of {drive.profile.title} to RAM alone is known, and a watchdog "
+                "that wears EEPROM each time is none; nothing was sent. Set the time-out in the drive, for good",
+                unit=drive.address,
+            )
+        if not (settings.verified or drive.unverified):
+            what = f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})"
+            raise not_verified(what, settings.note, drive.address)
+        high = drive.profile.describe(settings.timeout).high
+        self.timeout = checks.number("timeout", timeout, 0.0, math.inf if high is None else high, above=True)
+        self.action = checks.one_of("action", action, list(settings.actions))
+        self.verified = settings.verified
+        self.armed = False
+        self.error: DrivebusError | None = None
+        self._unit = drive
+        # The action comes first: a time-out must not run out on another one.
+        self._wanted: dict[str, Value] = {
+            settings.action: settings.actions[self.action],
+            settings.timeout: self.timeout,
+        }
+        for name, value in self._wanted.items():
+            drive.profile.encode(name, value)
+        # The time-out goes back first, for the same reason.
+        self._former: dict[str, Value] = dict.fromkeys((settings.timeout, settings.action), 0)
+
+    @property
+    def interval(self) -> float:
+        """Seconds between two questions that keep the line busy."""
+        return self.timeout / _READS_PER_TIMEOUT
+
+    async def set(self) -> None:
+        """Sets them, and reads them back."""
+        former = await registers.snapshot(self._unit, *self._former)
+        self._former = {name: former[name] for name in self._former}
+        try:
+            await parameters.write(self._unit, self._wanted)
+            shown = await registers.snapshot(self._unit, *self._wanted)
+        except BaseException:
+            # Ctrl-C as well. It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the
+            # line busy.
+            with suppress(DrivebusError):
+                await self._put_back()
+            raise
+        encode = self._unit.profile.encode
+        if any(encode(name, shown[name]) != encode(name, value) for name, value in self._wanted.items()):
+            await self._put_back()
+            raise Unconfirmed(
+                f"unit {self._unit.address} took {self._wanted} for its watchdog and shows {shown!r}; it has back what "
+                "it had",
+                unit=self._unit.address,
+            )
+        self.armed = True
+
+    async def give_back(self) -> None:
+        """Waits for a motor that slows down, and gives the drive the settings it had. A failure is kept in `error`."""
+        try:
+            if await self._comes_to_rest():
+                await self._put_back()
+        except DrivebusError as error:
+            self.error = error
+
+    async def ask(self) -> bool:
+        """Keeps the drive from acting for now. Whether that makes sense again: not on a line that was closed."""
+        try:
+            await state.ping(self._unit)
+        except DrivebusError as error:
+            self.error = error
+            return not self._unit.bus.closed
+        return True
+
+    async def _put_back(self) -> None:
+        with self._unit.bus.undisturbed() as bus:
+            await parameters.write(self._unit.over(bus), self._former)
+            self.armed = False
+
+    async def _comes_to_rest(self) -> bool:
+        """Whether the motor is stopped, once it no longer slows down."""
+        bus = self._unit.bus
+        lowest, deadline = math.inf, bus.now()
+        while not (await state.state(self._unit)).at_rest:
+            frequency = await speed.output_frequency(self._unit)
+            now = bus.now()
+            if frequency is not None and frequency < lowest:
+                lowest, deadline = frequency, now + PATIENCE
+            elif now >= deadline:
+                return False
+            await bus.sleep(POLL_INTERVAL)
+        return True
+
+    def __repr__(self) -> str:
+        now = "armed" if self.armed else "off"
+        unverified = "" if self.verified else ", its parameters unverified"
+        failed = f", failed last with: {self.error}" if self.error else ""
+        what = f"{self.action} after {self.timeout:g} s"
+        return f"<Watchdog of unit {self._unit.address}: {what}, {now}{unverified}{failed}>"

@@ -1,0 +1,135 @@
+"""Whether a drive is set to obey the bus, and to heed what the bus tells it, and setting the parameters that takes.
+
+The profile knows the parameters and the values. A value that no document of the family prints is shown as such, and is
+written only for who says so.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drivebus import checks
+from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.operations import parameters, registers
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import not_verified
+from drivebus.values import Control, ControlItem
+
+__all__ = ["check_control", "check_heeded", "check_set", "prepare_control", "wanted_for", "wanted_of_commands"]
+
+
+async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: bool = False) -> Control:
+    """Whether the drive is set to obey the bus: a list that is true when every item is as it must be.
+
+    Args:
+        setpoint: Which setpoint the bus is to give, such as `"torque"` or `"pid"`; None is the frequency.
+        unverified: Also read parameters that are not verified; without it such an item has no actual value.
+
+    Raises:
+        NotAllowed: The family has no such setpoint; the message has those it has. Nothing was sent.
+        NoAnswer, BadAnswer, Refused: See each.
+    """
+    unit = unit.trusting(unverified)
+    return await _check_items(unit, wanted_for(unit, setpoint))
+
+
+async def prepare_control(
+    unit: Unit, store: bool = False, *, setpoint: str | None = None, unverified: bool = False
+) -> Control:
+    """Sets the drive to obey the bus, writing only what differs, and returns what `check_control` then says.
+
+    To RAM: the drive forgets it when it is switched off, unless *store*, which keeps what this object set in RAM
+    before as well.
+
+    Args:
+        store: Keep it in EEPROM.
+        setpoint: Which setpoint the bus is to give; None is the frequency.
+        unverified: Also write values that are not verified. One that the drive has already is not written.
+
+    Raises:
+        NotAllowed: What has to be written is not verified for the family, or not to RAM. Nothing was written.
+        Refused: The drive kept what it had; parameters are locked while it runs, or by a password.
+        Unconfirmed: It took the values, and shows others.
+    """
+    store = checks.flag("store", store)
+    unit = unit.trusting(unverified)
+    wanted = wanted_for(unit, setpoint)
+    needed = {}
+    for item in await _check_items(unit, wanted):
+        if item.ok and not (store and parameters.is_in_ram(unit, item.code)):
+            continue
+        if item.actual is None or not (item.verified or unit.unverified):
+            what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"
+            raise not_verified(what, item.note, unit.address)
+        needed[item.code] = item.wanted
+    if needed:
+        await parameters.write(unit, needed, store=store)
+    control = await _check_items(unit, wanted)
+    if not control:
+        raise Unconfirmed(
+            f"unit {unit.address} took the settings and shows others:\n{control}",
+            unit=unit.address,
+        )
+    return control
+
+
+async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
+    """Raises `NotAllowed` if the drive would not heed *setpoint*, because it takes that from elsewhere."""
+    control = await _check_items(unit, unit.profile.needs(setpoint))
+    if not control:
+        raise NotAllowed(
+            f"unit {unit.address} would not heed its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
+            f"sent. prepare_control(setpoint={setpoint!r}) sets what is needed; write({register!r}, …) writes it "
+            "all the same",
+            unit=unit.address,
+        )
+
+
+async def check_set(unit: Unit, wanted: list[dict[str, Any]], what: str) -> None:
+    """Raises `NotAllowed` if one of *wanted* is surely not as it must be: then the unit does *what* is said.
+
+    What no document proves, or may not be read, keeps nobody from starting a motor.
+    """
+    sure = [row for row in wanted if row["verified"] or unit.unverified]
+    wrong = Control(item for item in await _check_items(unit, sure) if item.actual is not None and not item.ok)
+    if len(wrong):
+        raise NotAllowed(
+            f"unit {unit.address} {what}:\n{wrong}\nNothing that moves it was sent. prepare_control() (`drivebus "
+            "prepare`) sets what is needed",
+            unit=unit.address,
+        )
+
+
+def wanted_of_commands(unit: Unit) -> list[dict[str, Any]]:
+    """What must be set for commands alone, whatever the setpoints."""
+    names = unit.profile.setpoint_names()
+    of_setpoints = {row["code"] for name in names for row in unit.profile.needs(name)}
+    return [row for row in unit.profile.control() if row["code"] not in of_setpoints]
+
+
+def wanted_for(unit: Unit, setpoint: str | None) -> list[dict[str, Any]]:
+    """What must be set for *setpoint*, in the order in which to set it."""
+    known = unit.profile.setpoint_names()
+    if setpoint is not None:
+        checks.one_of("setpoint", setpoint, known)
+    of_frequency = unit.profile.needs("frequency") if "frequency" in known else []
+    needs = of_frequency if setpoint is None else unit.profile.needs(setpoint)
+    told = {row["code"] for row in (*of_frequency, *needs)}
+    return [*(row for row in unit.profile.control() if row["code"] not in told), *needs]
+
+
+async def _check_items(unit: Unit, wanted: list[dict[str, Any]]) -> Control:
+    codes = unit.evidence.readable(row["code"] for row in wanted)
+    actual = await registers.snapshot(unit, *codes) if codes else {}
+    return Control(
+        ControlItem(
+            code=row["code"],
+            wanted=registers.value(unit, row["code"], row["value"]),
+            actual=actual.get(row["code"]),
+            ok=row["code"] in actual and actual[row["code"]] == row["value"],
+            verified=row["verified"],
+            label=row["label"],
+            note=(None if row["code"] in actual else unit.evidence.unreadable(row["code"])) or row["note"] or "",
+        )
+        for row in wanted
+    )

@@ -1,0 +1,102 @@
+"""What both faces of a drive are made of: the view of its unit, and the operations as methods over it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Coroutine
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from drivebus.line.blocking import at_once
+from drivebus.operations import registers
+from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
+from drivebus.values import Description, Value
+
+__all__ = ["DriveFace", "awaited", "blocking", "documented_by", "unit_of"]
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_F = TypeVar("_F", bound=Callable[..., object])
+
+
+class DriveFace:
+    """A drive, as far as nothing has to be waited for.
+
+    Attributes:
+        unit: Its address, 1..247.
+        profile: What its words mean.
+        unverified: Whether what no document of its family proves is done all the same, in every call.
+    """
+
+    def __init__(self, unit: Unit) -> None:
+        self.unit: int = unit.address
+        self.profile: Profile = unit.profile
+        self._unit = unit
+
+    def __repr__(self) -> str:
+        return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
+
+    @property
+    def unverified(self) -> bool:
+        """Whether what no document of its family proves is done all the same, in every call."""
+        return self._unit.unverified
+
+    def readable(self, *names: str) -> list[str]:
+        """*names*, or without any the monitor registers of the family that may be read. Nothing is sent.
+
+        Raises:
+            NotAllowed: An unknown name, one that is not verified, or one whose meaning a parameter of the drive decides
+                (`variants` of `bus.drive` says which).
+        """
+        return registers.readable(self._unit, *names)
+
+    def describe(self, name: str) -> Description:
+        """All that is known of a register or parameter. Nothing is sent.
+
+        Raises:
+            NotAllowed: Unknown name; the message has the closest.
+        """
+        return self._unit.profile.describe(name)
+
+    def value(self, name: str, raw: int) -> Value:
+        """The word *raw* of *name* in engineering units."""
+        return registers.value(self._unit, name, raw)
+
+
+def unit_of(drive: DriveFace) -> Unit:
+    """The view of its unit on which a drive's methods work."""
+    return drive._unit
+
+
+def blocking(
+    operation: Callable[Concatenate[Unit, _P], Coroutine[Any, Any, _R]],
+) -> Callable[Concatenate[Any, _P], _R]:
+    """The method that carries *operation* out at once, with its name, its signature and its docstring."""
+
+    @functools.wraps(operation)
+    def method(drive: DriveFace, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        return at_once(operation(drive._unit, *args, **kwargs))
+
+    return method
+
+
+def awaited(
+    operation: Callable[Concatenate[Unit, _P], Coroutine[Any, Any, _R]],
+) -> Callable[Concatenate[Any, _P], Coroutine[Any, Any, _R]]:
+    """The method that awaits *operation*, with its name, its signature and its docstring."""
+
+    @functools.wraps(operation)
+    async def method(drive: DriveFace, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        return await operation(drive._unit, *args, **kwargs)
+
+    return method
+
+
+def documented_by(other: Callable[..., object]) -> Callable[[_F], _F]:
+    """Gives a method the docstring of the operation that it carries out."""
+
+    def document(method: _F) -> _F:
+        method.__doc__ = other.__doc__
+        return method
+
+    return document

@@ -1,0 +1,242 @@
+"""Commands that move a motor, and the proof that they did.
+
+Three rules hold for every command. What can be checked is checked before anything is sent. The command is sent once and
+never repeated. Success is what the drive's own state says afterwards; if that cannot be learnt, the caller is told so.
+"""
+
+from __future__ import annotations
+
+from drivebus import checks
+from drivebus.errors import NotAllowed
+from drivebus.operations import commands, control, setpoints, speed, start_checks, state
+from drivebus.operations.program_end import before_start
+from drivebus.operations.ramp import Fall
+from drivebus.operations.state import Seen
+from drivebus.operations.unit import Unit
+from drivebus.values import ControlSource, State
+
+__all__ = ["coast", "end_jog", "has_jog_stop", "jog", "jog_stop", "reset_fault", "run", "stop"]
+
+
+async def run(
+    unit: Unit,
+    hz: float | None = None,
+    reverse: bool = False,
+    *,
+    confirm: float = 1.0,
+    force: bool = False,
+    unverified: bool = False,
+) -> None:
+    """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
+
+    Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`. Where the
+    family has no state that may be used, when the drive has confirmed the command and shows no fault.
+
+    Args:
+        hz: Setpoint in Hz, 0 to the drive's own maximum; None keeps the one it has.
+        reverse: Turn the other way.
+        confirm: Seconds until the state word must show it; 0 does not look.
+        force: Start although the link is bad. Then it may be impossible to stop the motor over the bus.
+        unverified: Also where command, states or setpoint are not verified for the family. What ends it then needs
+            no such word.
+
+    Where two or more of the last ten exchanges failed, the link is proved first, by ten looks at the state.
+
+    Raises:
+        NotAllowed: The drive is in fault, not under bus control, or takes its speed from elsewhere; *hz* is above
+            its maximum; the link is bad; another drive answers at this address since the port was opened again; or
+            something is not verified for the family: the command, or both ways to stop what it starts. Nothing was
+            sent that moves it.
+        Refused: The drive did not start.
+        NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
+        Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
+    """
+    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    command = "run_reverse" if reverse else "run_forward"
+    unit = unit.trusting(unverified)
+    start_checks.may_be_given(unit, command)
+    await start_checks.prove_link(unit, force)
+    if hz is not None:
+        unit = await setpoints.with_setpoint(unit, "frequency")
+    raw = None if hz is None else await setpoints.word_of(unit, hz)
+    before = await start_checks.ready_to_start(unit)
+    if hz is not None:
+        await control.check_set(unit, unit.profile.needs("frequency"), "would not take its speed from the bus")
+    await _start(unit, command, raw, reverse, before, confirm)
+
+
+async def jog(
+    unit: Unit, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+) -> None:
+    """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
+
+    A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
+    not end it.
+    """
+    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    command = "jog_reverse" if reverse else "jog_forward"
+    unit = unit.trusting(unverified)
+    start_checks.may_be_given(unit, command)
+    await start_checks.prove_link(unit, force)
+    before = await start_checks.ready_to_start(unit)
+    if before.state.running:
+        raise NotAllowed(
+            f"unit {unit.address} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
+            "wait_until_stopped(), before a jog",
+            unit=unit.address,
+        )
+    await _start(unit, command, None, reverse, before, confirm)
+
+
+async def stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+    """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
+
+    Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
+    the bus tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped`
+    waits for that in any case. Where the family has no state that may be used, returns when the drive has confirmed
+    the command.
+
+    A frequency that falls is looked at beyond *confirm*: for as long as it falls, and a minute at most, or where
+    the drive's ramp is known half as long again as that takes. A drive that tells none is looked at for *confirm*.
+
+    It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
+    seems deaf too. Sent once.
+
+    Raises:
+        NotAllowed: The command is not verified for the family, and nothing was started as *unverified* either. It
+            was not sent.
+        Refused: The drive did not take it; it still runs if it ran.
+        PortError: It could not be sent; the drive goes on as it was.
+        Unconfirmed: It was sent, and the drive does not show it: the motor may still turn.
+    """
+    await _halt(unit.trusting(unverified), "stop", confirm)
+
+
+async def coast(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+    """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`.
+
+    Returns when the drive is stopped: what coasts has no ramp.
+    """
+    await _halt(unit.trusting(unverified), "coast", confirm)
+
+
+async def jog_stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+    """Ends a jog by the jog's own ramp. Errors as for `stop`; without such a command they say what does."""
+    unit = unit.trusting(unverified)
+    if "jog_stop" not in unit.profile.commands():
+        jogs = "jog_forward" in unit.profile.commands()
+        ends = ": stop() ends it along the ramp, coast() takes the voltage off" if jogs else ", nor one to jog"
+        raise NotAllowed(
+            f"{unit.profile.title} has no command that ends a jog alone{ends}; nothing was sent to unit {unit.address}",
+            unit=unit.address,
+        )
+    await _halt(unit, "jog_stop", confirm)
+
+
+async def end_jog(unit: Unit, *, unverified: bool = False) -> None:
+    """Ends a jog as the family does: by its jog stop, or else by a stop. Errors as for `stop`."""
+    unit = unit.trusting(unverified)
+    await (jog_stop(unit) if has_jog_stop(unit) else stop(unit))
+
+
+def has_jog_stop(unit: Unit) -> bool:
+    """Whether the family has a command that ends a jog alone, and it may be given."""
+    return _halting(unit, "jog_stop").evidence.unusable("jog_stop") is None
+
+
+async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+    """Resets a fault whose cause is gone. Sends nothing where there is none.
+
+    Raises:
+        NotAllowed: The command is not verified for the family, or another drive answers at this address since the
+            port was opened again. Nothing was sent.
+        Refused: The drive did not take it.
+        NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
+        Unconfirmed: It was sent, once, and the fault is still there: its cause is, most likely. Or nothing is
+            known of it.
+    """
+    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    unit = unit.trusting(unverified)
+    unit.evidence.commands("reset_fault")
+    before = await state.glance(unit)
+    untold = "state" in before.missing and "fault" in before.missing
+    if not (before.tripped or untold):
+        return
+
+    async def shows(seen: Seen) -> bool:
+        return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
+
+    await commands.give(unit, "reset_fault")
+    await commands.confirm(unit, "reset_fault", shows, confirm)
+
+
+async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
+    wanted = State.REVERSE if reverse else State.FORWARD
+    turning_round = before.state.running and before.state is not wanted
+    frequency = await speed.output_frequency(unit) if turning_round else None
+    # Who started it so must not be kept from stopping it.
+    unit.memory.started_unverified |= unit.unverified
+    before_start()
+    # Before it is sent: whoever is interrupted from here on has to end it.
+    unit.memory.starts += 1
+    unit.memory.started_as = State.UNKNOWN if command.startswith("jog") else wanted
+    await commands.give(unit, command, setpoint)
+
+    async def shows(seen: Seen) -> bool:
+        if "state" in seen.missing:
+            return seen.fault is None
+        if seen.state is wanted:
+            return True
+        # A motor that turns the other way must slow down first; its state word follows at zero.
+        now = await speed.output_frequency(unit) if turning_round else None
+        return now is not None and frequency is not None and now < frequency
+
+    await commands.confirm(unit, command, shows, confirm)
+
+
+async def _halt(unit: Unit, command: str, confirm: float) -> None:
+    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    unit = _halting(unit, command)
+    unit.evidence.commands(command)
+    sent = unit.bus.now()
+    await commands.give(unit, command)
+    if unit.evidence.without_state() is not None:
+        return  # its confirmation is all there is
+    fall = Fall(sent, unit.bus.now(), confirm)
+    # What coasts has no ramp, and what jogs is not at its setpoint.
+    by_ramp = command == "stop"
+    ramp: speed.Ramp | None = None
+
+    async def shows(seen: Seen) -> bool:
+        nonlocal by_ramp, ramp
+        asked = unit.bus.now()
+        if seen.state.at_rest:
+            return fall.rests(asked)
+        fall.goes_on()
+        if not seen.state.running:
+            return False
+        urgent = not fall.is_overdue(asked)
+        frequency, setpoint = await speed.frequencies(unit, urgent=urgent)
+        if frequency is None:
+            return False
+        fall.see(frequency, setpoint, asked, unit.bus.now())
+        by_ramp &= seen.source in (ControlSource.COMMUNICATION, None) and _turns_as_started(unit, seen.state)
+        if ramp is None and fall.is_worth_asking():
+            ramp = await speed.ramp(unit, urgent=urgent)
+            # One that is slow to say nothing of it has still been falling meanwhile.
+            fall.until += unit.bus.now() - fall.seen_at
+        if ramp is None or ramp.slope is None:
+            return False
+        return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
+
+    await commands.confirm(unit, command, shows, confirm, fall)
+
+
+def _turns_as_started(unit: Unit, seen: State) -> bool:
+    """Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog."""
+    return unit.memory.started_as in (None, seen)
+
+
+def _halting(unit: Unit, command: str) -> Unit:
+    """The same unit; where a start was forced on what is not verified, as *command* is, with the same trust."""
+    return unit.trusting(unit.memory.started_unverified and unit.evidence.unusable(command) is not None)

@@ -1,0 +1,142 @@
+"""A motor that turns for as long as a block of the program lasts, and is stopped whatever happens there."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager
+from typing import TypeAlias
+
+from drivebus.errors import DrivebusError, Unconfirmed
+from drivebus.line.blocking import at_once
+from drivebus.line.protocols import AwaitableBus
+from drivebus.operations import motion
+from drivebus.operations.program_end import Guard
+from drivebus.operations.unit import Unit
+
+__all__ = ["MotorBlock"]
+
+_END_ATTEMPTS = 3
+"""How often a stop is sent that is not confirmed, before the drive is told to coast."""
+
+_INTERRUPTED_AT_MOST = 64
+"""How often an attempt that was interrupted before anything was sent counts as none."""
+
+_Outcome: TypeAlias = tuple[DrivebusError | None, BaseException | None]
+"""What is left to raise: why it could not be ended, and what interrupted that."""
+
+
+class MotorBlock:
+    """Runs a motor for one block of the program, and ends it by all means.
+
+    Who makes it calls `begin`, and then, whatever comes of that, either `fail` or `finish`.
+
+    Args:
+        unit: What turns.
+        start: Starts it.
+        end: Ends it, over the view of the unit that it is given: it may be that of another thread.
+    """
+
+    def __init__(
+        self, unit: Unit, start: Callable[[], Awaitable[None]], end: Callable[[Unit], Awaitable[None]]
+    ) -> None:
+        self._unit = unit
+        self._start = start
+        self._end = end
+        # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
+        self._elsewhere = unit.over(unit.bus.blocking())
+        self._guard = Guard(self._end_at_once, unit.bus.line)
+        self._started = False
+        self._starts_before = unit.memory.starts
+
+    async def begin(self) -> None:
+        """Starts the motor.
+
+        Raises:
+            NotAllowed: Also where the end of the program has begun. Nothing was sent.
+        """
+        self._guard.arm()
+        with self._guard.beginning():
+            await self._start()
+        self._started = True
+        self._guard.check()
+
+    async def fail(self, reason: BaseException) -> None:
+        """The block, or its beginning, ended with *reason*, which is to be raised after this."""
+        if isinstance(reason, GeneratorExit):
+            self._leave()
+            return
+        try:
+            with self._keeping_interruptions(), self._unit.bus.undisturbed() as bus:
+                # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
+                # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
+                may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
+                failure = interrupted = None
+                if self._started or (may_turn and self._unit.memory.starts > self._starts_before):
+                    failure, interrupted = await self._stop(bus)
+                    if failure is not None and hasattr(reason, "add_note"):
+                        reason.add_note(f"and unit {self._unit.address} could not be stopped: {failure}")
+                self._guard.disarm()
+                if interrupted is not None:
+                    raise interrupted
+        except KeyboardInterrupt:
+            # Of several that end the same block, and what ends the program anyway, the first is raised.
+            if isinstance(reason, Exception):
+                raise
+
+    async def finish(self) -> None:
+        """The block went well. Raises what came of stopping the motor."""
+        with self._keeping_interruptions(), self._unit.bus.undisturbed() as bus:
+            failure, interrupted = await self._stop(bus)
+            self._guard.disarm()
+            unwelcome = failure or interrupted
+            if unwelcome is not None:
+                raise unwelcome
+
+    def _keeping_interruptions(self) -> AbstractContextManager[object]:
+        before = self._unit.memory.halts
+        return self._guard.keeping_interruptions(lambda: self._unit.memory.halts > before)
+
+    async def _stop(self, bus: AwaitableBus) -> _Outcome:
+        if not self._guard.begin_to_end():
+            return None, None
+        try:
+            return await self._end_by_all_means(self._unit.over(bus))
+        except GeneratorExit:
+            self._leave()
+            raise
+
+    def _leave(self) -> None:
+        """Ends it where nothing can be awaited any more: the block was thrown away, as its event loop may be."""
+        failure = self._end_at_once() if self._guard.begin_to_end() else None
+        self._guard.disarm()
+        if failure is not None:
+            raise failure
+
+    def _end_at_once(self) -> BaseException | None:
+        with self._keeping_interruptions():
+            failure, interrupted = at_once(self._end_by_all_means(self._elsewhere))
+        return failure or interrupted
+
+    async def _end_by_all_means(self, unit: Unit) -> _Outcome:
+        """Ends it, or coasts where that fails. Returns what is left to raise: a failure, and what interrupted it."""
+        interrupted: BaseException | None = None
+        failure: DrivebusError | None = None
+        attempts = interruptions = 0
+        while attempts <= _END_ATTEMPTS:
+            sent_before = unit.memory.halts
+            try:
+                await (self._end(unit) if attempts < _END_ATTEMPTS else motion.coast(unit))
+            except DrivebusError as error:
+                failure = error
+                attempts += 1
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                # A second Ctrl-C must not leave the motor running: it is raised once the drive was told to stop.
+                interrupted = interrupted or error
+                interruptions += 1
+                # What was interrupted before it was sent was no attempt.
+                attempts += unit.memory.halts > sent_before or interruptions > _INTERRUPTED_AT_MOST
+            else:
+                return None, interrupted
+        return failure, interrupted

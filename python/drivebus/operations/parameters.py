@@ -1,0 +1,265 @@
+"""Writing registers and parameters of one unit by name: what is allowed, and where it is kept.
+
+All checks come before the first write: names, ranges (also those that other parameters narrow), the state the drive
+must be in, and evidence. What makes a motor turn is not written here: commands are refused, `Drive` has methods for
+them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, overload
+
+from drivebus import checks
+from drivebus.errors import DrivebusError, NotAllowed, StoreWarning, level_of_the_program
+from drivebus.operations import registers, state, variants, words
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import Evidence
+from drivebus.values import Description, Value
+
+__all__ = ["Planned", "check_now", "is_in_ram", "plan_write", "put_in_ram", "stored", "write", "write_one"]
+
+_STORES_BEFORE_WARNING = 5
+"""EEPROM writes of one parameter by one program that are taken for use; more look like a loop."""
+
+
+class Planned(NamedTuple):
+    """One write that is allowed, as far as the profile tells."""
+
+    known: Description
+    name: str
+    address: int
+    raw: int
+
+
+class _Limit(NamedTuple):
+    """Another parameter that narrows a range."""
+
+    other: str
+    low: bool
+
+
+@overload
+async def write(unit: Unit, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+@overload
+async def write(unit: Unit, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
+async def write(
+    unit: Unit,
+    name: str | Mapping[str, object],
+    value: object = None,
+    store: bool = False,
+    *,
+    unverified: bool = False,
+) -> None:
+    """Writes one value, or several from a mapping, each by its own request.
+
+    A confirmation that was lost is cleared up by reading the value. Only where the drive shows another one is the
+    write repeated, as often as the bus repeats a read. What does something when it is written (P00.15 tunes the
+    motor) tells nothing by being read: it is sent once.
+
+    Parameters go to RAM: they are lost when the drive is switched off. With *store* they go to EEPROM, whose
+    write life is limited; one that already has its value is not written again. A drive tells the value in force,
+    not where it is kept: what this object wrote to RAM is stored, what somebody else did is taken for stored.
+    Where no way to write to RAM alone is known of the family, a parameter is written only with *store*.
+
+    All checks come first: if one value is not allowed, none is sent. A range that another parameter narrows (P00.04
+    is not above P00.03) is asked of the drive, in one go with its state; each of several values sees those before.
+
+    Args:
+        name: A register name or parameter code, or a mapping of them to values.
+        value: In engineering units, or the label of a choice.
+        store: Keep parameters in EEPROM. Registers are kept nowhere, and are written as they are.
+        unverified: Also what is not verified for the family.
+
+    Raises:
+        NotAllowed: Unknown name, out of range, read-only, a command, not verified, or writable only while stopped
+            and the drive runs; or another drive answers at this address since the port was opened again. Nothing
+            was sent.
+        NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same, unless the error's
+            `started` is None: then it was not sent.
+        Refused: The drive kept what it had.
+        Unconfirmed: The drive shows another value, however often it was written.
+
+    Where one of several fails, those before it were written; the error's note names them.
+    """
+    if not isinstance(name, (str, Mapping)):
+        raise NotAllowed(f"name {name!r} is no text, nor names with values; nothing was sent", unit=unit.address)
+    store = checks.flag("store", store)
+    wanted = name if isinstance(name, Mapping) else {name: value}
+    if not isinstance(name, Mapping) and value is None:
+        raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
+    _check_deciding(unit, wanted)
+    unit = await variants.settled(unit.trusting(unverified), *wanted)
+    planned = [plan_write(unit, key, asked, store) for key, asked in wanted.items()]
+    await check_now(unit, planned)
+    done: list[str] = []
+    for item in planned:
+        try:
+            await write_one(unit, item, store)
+        except DrivebusError as error:
+            if done and hasattr(error, "add_note"):
+                error.add_note(f"written before it: {', '.join(done)}")
+            raise
+        done.append(item.name)
+
+
+def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
+    """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
+    for variant, rule in variants.rules(unit).items():
+        parameter = _key(unit.profile.describe(rule["parameter"]))
+        name = next((name for name in wanted if _key(unit.profile.describe(name)) == parameter), None)
+        if name is None:
+            continue
+        depends = next((other for other in wanted if unit.profile.describe(other).variant == variant), None)
+        if depends is not None:
+            raise NotAllowed(
+                f"{name} decides what {depends} means; nothing was sent to unit {unit.address}. Write {name} by "
+                "itself, and first",
+                unit=unit.address,
+            )
+        chosen = unit.profile.variants_chosen.get(variant)
+        if chosen is not None and unit.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
+            raise NotAllowed(
+                f"{name} = {wanted[name]!r} would change the {variant} of unit {unit.address}, which was said to be "
+                f"{chosen}; nothing was sent. Write it by a drive without variants=…",
+                unit=unit.address,
+            )
+
+
+def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
+    """The write of *value* to *name*. Raises `NotAllowed` where the profile does not allow it."""
+    known = unit.profile.describe(name)
+    if not known.writable:
+        raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=unit.address)
+    if known.address is not None and unit.profile.is_command(known.address):
+        raise NotAllowed(
+            f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
+            "or reset_fault(), or for terminals and the special control word their own methods",
+            unit=unit.address,
+        )
+    unit.evidence.writes(name)
+    if known.kind == "parameter" and not store and unit.profile.memory() is None:
+        raise NotAllowed(
+            f"no way to write {name} to RAM alone is known of {unit.profile.title}, so every write may wear its "
+            f"EEPROM; nothing was sent to unit {unit.address}. With store=True (`--store`) it is kept there",
+            unit=unit.address,
+        )
+    raw = unit.profile.encode(name, value)
+    address = unit.profile.address(name, store=store)
+    if known.kind == "parameter" and (address != known.address or not store):
+        memory = unit.profile.memory()
+        kept = "EEPROM" if store else "RAM"
+        reason = None if memory is None else memory["reason"]
+        unit.evidence.rule(f"how {unit.profile.title} keeps a parameter in {kept}", reason)
+    return Planned(known, name, address, raw)
+
+
+async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
+    """Checks what only the drive knows: whether it is stopped, and ranges that its parameters narrow."""
+    only_stopped = [item.name for item in planned if item.known.access == "stop"]
+    # Where no state is known the drive has to refuse by itself.
+    state_word = unit.profile.role("state") if only_stopped and unit.evidence.without_state() is None else None
+    limits = [limit for item in planned for limit in _limits(unit, item.known)]
+    others = unit.evidence.readable(dict.fromkeys(limit.other for limit in limits))
+    names = [*([state_word] if state_word else []), *others]
+    if not names:
+        return
+    values = await registers.snapshot(unit, *names)
+    if state_word is not None:
+        now = state.state_of(unit, int(values[state_word]))
+        state.remember(unit, str(now))
+        if now.running:
+            raise NotAllowed(
+                f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {unit.address} "
+                f"runs ({now}); nothing was written",
+                unit=unit.address,
+            )
+    in_force = {_key(unit.profile.describe(name)): values[name] for name in others}
+    for item in planned:
+        _check_range(unit, item, in_force)
+        in_force[_key(item.known)] = registers.value(unit, item.name, item.raw)
+
+
+def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> None:
+    value = registers.value(unit, item.name, item.raw)
+    for other, low in _limits(unit, item.known):
+        narrow = unit.profile.describe(other)
+        limit = in_force.get(_key(narrow))
+        if limit is None or (value >= limit if low else value <= limit):
+            continue
+        raise NotAllowed(
+            f"{item.name} ({item.known.label}) = {value:g} {item.known.unit} is {'below' if low else 'above'} "
+            f"{other} ({narrow.label}), which is {limit:g} {narrow.unit} in unit {unit.address}; nothing was written. "
+            f"Write {other} first, or before it in the same call",
+            unit=unit.address,
+        )
+
+
+def _limits(unit: Unit, known: Description) -> list[_Limit]:
+    """The parameters that narrow the range of *known*, by its own row or by theirs."""
+    named = ((known.low_from, True), (known.high_from, False))
+    limits = [_Limit(other, low) for other, low in named if other is not None]
+    if known.kind == "parameter":
+        have = {unit.profile.describe(limit.other).code for limit in limits}
+        limits += [limit for limit in unit.evidence.once(_narrowing).get(_key(known), ()) if limit.other not in have]
+    return limits
+
+
+async def write_one(unit: Unit, item: Planned, store: bool) -> None:
+    """Sends one write, and remembers to which memory."""
+    read_back = unit.profile.read_back(item.name)
+    if item.known.kind != "parameter" or not store:
+        if item.known.kind == "parameter":
+            put_in_ram(unit, item.known)
+        await words.write(unit, item.address, item.raw, read_back=read_back)
+        return
+    # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
+    [in_force] = await words.read_words(unit, unit.profile.address(item.name))
+    if in_force == item.raw and not is_in_ram(unit, item.name):
+        return
+    # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
+    await words.write(unit, item.address, item.raw, read_back=None if in_force == item.raw else read_back)
+    stored(unit, item.known)
+
+
+def is_in_ram(unit: Unit, name: str) -> bool:
+    """Whether this program wrote *name* to RAM, and not to EEPROM since: what it reads as is then not stored."""
+    return _key(unit.profile.describe(name)) in unit.memory.in_ram
+
+
+def put_in_ram(unit: Unit, known: Description) -> None:
+    """Says that a parameter is about to be written to RAM: the drive may take it although its answer is lost."""
+    unit.memory.in_ram.add(_key(known))
+
+
+def stored(unit: Unit, known: Description) -> None:
+    """Says that a parameter was written to EEPROM, and warns of a program that does that in a loop."""
+    name = _key(known)
+    unit.memory.in_ram.discard(name)
+    unit.memory.stores[name] += 1
+    times = unit.memory.stores[name]
+    if times >= _STORES_BEFORE_WARNING:
+        warnings.warn(
+            f"{name} of unit {unit.address} was stored in EEPROM {times} times by this program; "
+            "its write life is limited: write to RAM (store=False) in a loop",
+            StoreWarning,
+            stacklevel=level_of_the_program(),
+        )
+
+
+def _narrowing(evidence: Evidence) -> Mapping[str, Sequence[_Limit]]:
+    """For each parameter the others whose range it narrows, as limits of its own."""
+    profile = evidence.profile
+    found: dict[str, list[_Limit]] = {}
+    for other in map(profile.describe, profile.names()):
+        if other.kind == "parameter":
+            for bound, low in ((other.low_from, False), (other.high_from, True)):
+                if bound is not None:
+                    found.setdefault(_key(profile.describe(bound)), []).append(_Limit(_key(other), low))
+    return found
+
+
+def _key(known: Description) -> str:
+    """One name for a parameter that has two."""
+    return known.code or known.name

@@ -1,0 +1,112 @@
+"""Registers and parameters of one unit by name, read in engineering units in the fewest requests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+from drivebus.errors import NotAllowed
+from drivebus.operations import variants, words
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import Evidence
+from drivebus.profile.plan import labelled
+from drivebus.values import Snapshot, Value
+
+__all__ = ["contradiction", "monitor", "read", "readable", "snapshot", "value"]
+
+
+def value(unit: Unit, name: str, raw: int) -> Value:
+    """The word *raw* of *name* in engineering units."""
+    return labelled(unit.profile.describe(name), unit.profile.decode(name, raw))
+
+
+@overload
+async def read(unit: Unit, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
+@overload
+async def read(
+    unit: Unit, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
+) -> dict[str, Value]: ...
+async def read(unit: Unit, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
+    """Reads registers or parameters in the fewest requests.
+
+    One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
+    where the drive counts, and `Choice` where the profile has a name for what came.
+
+    With *verify* each request is repeated until the same words came twice in a row: for values on which much
+    depends, where even a damaged answer whose CRC is right by chance (one in 65 536) must not pass.
+
+    With *unverified* also what no document of the family prints.
+
+    Raises:
+        NotAllowed: No name, an unknown one, or one that is not verified; nothing was sent.
+        NoAnswer, BadAnswer, Refused: See each. With *verify* also where the words change all the time.
+    """
+    if not names:
+        raise NotAllowed("read() needs at least one name, such as 'output_current' or 'P00.11'")
+    values = await snapshot(unit.trusting(unverified), *names, verify=verify)
+    return values[names[0]] if len(names) == 1 else dict(values)
+
+
+async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bool = False) -> Snapshot:
+    """Reads *names* in the fewest requests, under one time stamp. *verify* and *unverified* as for `read`."""
+    unit = unit.trusting(unverified)
+    unit.evidence.reads(names)
+    unit = await variants.settled(unit, *names)
+    plan = unit.profile.compile(names)
+    answers: list[list[int]] = []
+    started = ended = 0.0
+    for address, count in plan.reads:
+        with words.explained(unit):
+            came, sent, ended = await unit.bus.read_stamped(unit.address, address, count, verify=verify)
+        started = started if answers else sent
+        answers.append(came)
+    values = dict(zip(plan.names, plan.values(answers), strict=True))
+    return Snapshot(values, plan.units, started, ended - started)
+
+
+async def monitor(unit: Unit, *names: str, unverified: bool = False) -> Snapshot:
+    """Reads *names*, or all monitor registers of the family, in the fewest requests, under one time stamp.
+
+    The result is a mapping whose names are attributes too: `drive.monitor().output_current`; its `units` say in
+    what each is. Without names, what is not verified is left out.
+
+    Raises:
+        NotAllowed: An unknown name, or one that is not verified; nothing was sent.
+        NoAnswer, BadAnswer, Refused: See each.
+    """
+    unit = unit.trusting(unverified)
+    return await snapshot(unit, *(names or readable(unit)))
+
+
+def readable(unit: Unit, *names: str) -> list[str]:
+    """See `Drive.readable`."""
+    if not names:
+        # The same each time, and looked up for every sample of a monitor.
+        return list(unit.evidence.once(_monitored))
+    unit.evidence.reads(names)
+    for name in names:
+        if variants.is_open(unit, name):
+            variant = unit.profile.describe(name).variant or ""
+            rule = variants.rules(unit)[variant]
+            raise NotAllowed(
+                f"what {name} means depends on {rule['parameter']} of unit {unit.address}: give variants=… to "
+                f"bus.drive() (`--variant {variant}=…`; {', '.join(map(repr, rule['choices']))})",
+                unit=unit.address,
+            )
+    return list(names)
+
+
+async def contradiction(unit: Unit) -> str | None:
+    """What the unit says of itself that speaks against its profile, and what to do; None if nothing does.
+
+    Reads, as the first write does. For a *trust_profile* too.
+
+    Raises:
+        NoAnswer, BadAnswer, PortError: It did not tell.
+    """
+    return await unit.memory.identity.contradiction(unit.bus)
+
+
+def _monitored(evidence: Evidence) -> Sequence[str]:
+    known, undecided = evidence.readable(evidence.profile.monitor_names()), evidence.once(variants.undecided)
+    return [name for name in known if evidence.profile.describe(name).variant not in undecided]

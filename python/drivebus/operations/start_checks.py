@@ -1,0 +1,87 @@
+"""What is checked before a motor is started: the link, the drive, and that it can be stopped again."""
+
+from __future__ import annotations
+
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.operations import control, state
+from drivebus.operations.state import Seen
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import Evidence
+from drivebus.values import ControlSource, State
+
+__all__ = ["can_be_stopped", "may_be_given", "prove_link", "ready_to_start"]
+
+_FAILURES_ALLOWED = 1
+"""Of the last ten exchanges with a unit. One answer in ten may be lost on a line that works, to a burst of noise. Where
+two are, the next may be the one that stops the motor."""
+
+_LOOKS_TO_PROVE = 10
+"""Looks at the state that prove a link in doubt: as many as `Link` counts, so that the old ones count no more."""
+
+
+def may_be_given(unit: Unit, command: str) -> None:
+    """Raises `NotAllowed` where *command* may not be given, or what it starts could not be stopped again."""
+    unit.evidence.commands(command)
+    can_be_stopped(unit)
+
+
+def can_be_stopped(unit: Unit) -> None:
+    """Raises `NotAllowed` where a motor that turns could not be stopped over the bus."""
+    reasons = {halt: unit.evidence.unusable(halt) for halt in ("stop", "coast")}
+    if all(reasons.values()):
+        told = "; ".join(f"{halt}: {(reason or '').rstrip('.')}" for halt, reason in reasons.items())
+        what = f"a motor that unit {unit.address} starts could not be stopped over the bus"
+        raise unit.evidence.missing(what, told, _both_unusable)
+
+
+async def prove_link(unit: Unit, force: bool) -> None:
+    """No motor starts on a link that may not carry its stop. Sends nothing where the last exchanges went well."""
+    link = await unit.bus.link(unit.address)
+    if force or link.failed <= _FAILURES_ALLOWED:
+        return
+    lost = looks = 0
+    while looks < _LOOKS_TO_PROVE and lost <= _FAILURES_ALLOWED:
+        looks += 1
+        try:
+            await state.ping(unit)
+        except Refused:
+            pass
+        except (NoAnswer, BadAnswer):
+            lost += 1
+    link = await unit.bus.link(unit.address)
+    if lost > _FAILURES_ALLOWED or link.failed > _FAILURES_ALLOWED:
+        raise NotAllowed(
+            f"the link to unit {unit.address} is bad: {link}, and {lost} of {looks} looks at its state failed; "
+            "nothing that moves it was sent, for its stop might be lost as well. Mend the line (bus.stats() may "
+            "say how), or start all the same with force=True (`--force`)",
+            unit=unit.address,
+        )
+
+
+async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
+    """How the drive stands. Raises `NotAllowed` where it would not start, or not obey the bus (*by_bus*)."""
+    seen = await state.glance(unit)
+    if seen.tripped:
+        raise NotAllowed(
+            f"unit {unit.address} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
+            "Remove the cause, then reset_fault()",
+            unit=unit.address,
+        )
+    if seen.state is State.POWER_OFF:
+        raise NotAllowed(
+            f"unit {unit.address} has no voltage on its DC bus; nothing that moves it was sent", unit=unit.address
+        )
+    if by_bus and seen.source not in (ControlSource.COMMUNICATION, None):
+        raise NotAllowed(
+            f"unit {unit.address} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
+            "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
+            unit=unit.address,
+        )
+    if by_bus and seen.source is None:
+        await control.check_set(unit, control.wanted_of_commands(unit), "does not take its commands from the bus")
+    return seen
+
+
+def _both_unusable(evidence: Evidence) -> str | None:
+    """Why a motor could not be stopped; None if it could."""
+    return evidence.unusable("stop") and evidence.unusable("coast")

@@ -1,0 +1,287 @@
+"""What one drive is doing, as its status words say, in the fewest reads.
+
+Which words those are, and what they mean, the profile says. What no document of the family proves is left out, and the
+reason is kept: half of a status is better than none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from drivebus.errors import NotAllowed
+from drivebus.operations import registers, words
+from drivebus.operations.unit import Unit
+from drivebus.profile.evidence import Evidence
+from drivebus.profile.plan import ReadPlan
+from drivebus.values import ControlSource, Fault, State, Status
+
+__all__ = [
+    "Seen",
+    "fault",
+    "fault_history",
+    "glance",
+    "look",
+    "ping",
+    "planned",
+    "remember",
+    "seen_last",
+    "state",
+    "state_of",
+    "state_word",
+    "status",
+]
+
+
+class Seen(NamedTuple):
+    """The status words of one look, decoded.
+
+    What the family's words do not tell, or may not be asked for, stands in *missing*, with the reason.
+    """
+
+    state: State
+    fields: Mapping[str, str]
+    fault: Fault | None
+    time: float
+    missing: Mapping[str, str]
+    in_fault: bool
+    """Whether the state word says that the drive is in fault. It may run all the same."""
+
+    @property
+    def source(self) -> ControlSource | None:
+        """Where the drive takes its commands from, if its words tell."""
+        channel = self.fields.get("control_channel")
+        return next((source for source in ControlSource if source.value == channel), None)
+
+    @property
+    def tripped(self) -> bool:
+        """Whether the drive is in fault: by its state word, or where that is not known by its fault number."""
+        return self.in_fault or ("state" in self.missing and self.fault is not None)
+
+    def __str__(self) -> str:
+        if "state" in self.missing:
+            return f"state not known, {self.fault or ('fault not known' if 'fault' in self.missing else 'no fault')}"
+        if self.in_fault and self.state is not State.FAULT:
+            return f"{self.state}, in fault: {self.fault or 'not named'}"
+        return f"{self.state}, {self.fault}" if self.fault else str(self.state)
+
+
+class _Look(NamedTuple):
+    """What a look reads, worked out once for each profile."""
+
+    plan: ReadPlan | None
+    state: str | None
+    words: Sequence[str]
+    fault: str | None
+    missing: Mapping[str, str]
+
+
+async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Seen:
+    """The status words, in one read where they stand side by side.
+
+    Raises:
+        NotAllowed: Nothing of them may be read; the message has the reason.
+    """
+    unit = unit.trusting(unverified)
+    seen = await glance(unit, urgent=urgent)
+    if planned(unit).plan is None:
+        what = f"nothing of the state of unit {unit.address} may be read"
+        raise unit.evidence.missing(what, seen.missing["state"], Evidence.without_state)
+    return seen
+
+
+async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
+    """As `look`; where nothing may be read, nothing is, and nothing is told."""
+    plan = planned(unit)
+    if plan.plan is None:
+        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False)
+    answers: list[list[int]] = []
+    first = 0.0
+    for address, count in plan.plan.reads:
+        with words.explained(unit):
+            came, time, _ = await unit.bus.read_stamped(unit.address, address, count, urgent=urgent)
+        first = first if answers else time
+        answers.append(came)
+    values = dict(zip(plan.plan.names, map(int, plan.plan.values(answers)), strict=True))
+    fields: dict[str, str] = {}
+    for word in plan.words:
+        fields.update(unit.profile.fields(word, values[word]))
+    number = values[plan.fault] if plan.fault is not None else 0
+    seen = Seen(
+        State.UNKNOWN if plan.state is None else state_of(unit, values[plan.state]),
+        fields,
+        unit.profile.fault(number) if number else None,
+        first,
+        plan.missing,
+        plan.state is not None and unit.profile.is_in_fault(values[plan.state]),
+    )
+    remember(unit, str(seen))
+    return seen
+
+
+async def state(unit: Unit, *, unverified: bool = False) -> State:
+    """What the drive is doing: one read of its state word.
+
+    Raises:
+        NotAllowed: The family has no state word that is known, or verified. Nothing was sent.
+    """
+    unit = unit.trusting(unverified)
+    [word] = await words.read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
+    seen = state_of(unit, word)
+    remember(unit, str(seen))
+    return seen
+
+
+async def ping(unit: Unit) -> None:
+    """One read of what the family is known to answer: of its state word, if it has one.
+
+    Raises:
+        NotAllowed: Nothing of it is known. Nothing was sent.
+    """
+    if unit.evidence.without_state() is None:
+        await state(unit)
+        return
+    roles = [unit.profile.role("state"), unit.profile.role("fault")]
+    named = [*roles, *unit.profile.monitor_names(), *unit.profile.names()]
+    for name in unit.evidence.readable(name for name in named if name is not None):
+        await words.read_words(unit, unit.profile.address(name))
+        return
+    raise NotAllowed(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
+
+
+def planned(unit: Unit) -> _Look:
+    """What a look at the unit reads."""
+    return unit.evidence.once(_plan)
+
+
+def _plan(evidence: Evidence) -> _Look:
+    missing: dict[str, str] = {}
+    profile = evidence.profile
+    state, fault = profile.role("state"), profile.role("fault")
+    no_state, no_fault = evidence.without_state(), evidence.without_fault()
+    others = evidence.readable(word for word in profile.status_words if word != state)
+    if no_state is not None:
+        state, missing["state"] = None, no_state
+    if no_fault is not None:
+        fault, missing["fault"] = None, no_fault
+    names = [*([state] if state else []), *others, *([fault] if fault else [])]
+    in_status = [state] if state is not None and state in profile.status_words else []
+    plan = profile.compile(names) if names else None
+    return _Look(plan, state, [*in_status, *others], fault, missing)
+
+
+async def status(unit: Unit, *, unverified: bool = False) -> Status:
+    """State, readiness, control source, frequency and fault, in two reads where the family has them together.
+
+    What the family does not tell, or what is not verified, is None (the state: `State.UNKNOWN`), and `missing` has
+    the reason.
+
+    Raises:
+        NoAnswer, BadAnswer, Refused: See each.
+    """
+    unit = unit.trusting(unverified)
+    return await _status(unit, await glance(unit))
+
+
+async def _status(unit: Unit, seen: Seen) -> Status:
+    missing = dict(seen.missing)
+    names = {}
+    for role in ("frequency", "setpoint"):
+        name = unit.profile.role(role)
+        reason = f"no such register of {unit.profile.title} is known"
+        if name is not None:
+            reason = unit.evidence.unreadable(name) or ""
+        if name is None or reason:
+            missing[role] = reason
+        else:
+            names[role] = name
+    frequencies = await registers.snapshot(unit, *names.values()) if names else {}
+    told = {role: float(frequencies[name]) for role, name in names.items()}
+    motor = seen.fields.get("motor", "")
+    ready = seen.fields.get("ready")
+    alarm = seen.fields.get("overload_alarm")
+    for what, field in (
+        ("ready", ready),
+        ("source", seen.source),
+        ("motor", motor or None),
+        ("overload_alarm", alarm),
+    ):
+        if field is None:
+            missing[what] = f"no status word of {unit.profile.title} that may be read tells it"
+    return Status(
+        state=seen.state,
+        ready=None if ready is None else ready == "ready",
+        source=seen.source,
+        motor=int(motor.removeprefix("motor ")) if motor.startswith("motor ") else None,
+        overload_alarm=None if alarm is None else alarm != "none",
+        frequency=told.get("frequency"),
+        setpoint=told.get("setpoint"),
+        fault=seen.fault,
+        fields=seen.fields,
+        time=seen.time or getattr(frequencies, "time", 0.0),
+        missing=missing,
+    )
+
+
+async def fault(unit: Unit, *, unverified: bool = False) -> Fault | None:
+    """The present fault, or None.
+
+    Raises:
+        NotAllowed: The family has no fault register that is known, or verified. Nothing was sent.
+    """
+    unit = unit.trusting(unverified)
+    reason = unit.evidence.without_fault()
+    if reason is not None:
+        raise unit.evidence.missing("the present fault may not be read", reason, Evidence.without_fault)
+    return (await glance(unit)).fault
+
+
+async def fault_history(unit: Unit, *, unverified: bool = False) -> list[Fault]:
+    """The last faults, the latest first; as many as the drive keeps.
+
+    The latest has its `values`: what the drive saw when it tripped, where it keeps that.
+    """
+    unit = unit.trusting(unverified)
+    names = unit.evidence.readable(unit.profile.fault_history)
+    if not names:
+        return []
+    codes = (await registers.snapshot(unit, *names)).values()
+    faults = [unit.profile.fault(int(code)) for code in codes if code]
+    kept = unit.evidence.readable(unit.profile.fault_values)
+    if faults and kept:
+        faults[0] = replace(faults[0], values=await registers.snapshot(unit, *kept))
+    return faults
+
+
+def state_word(unit: Unit, what: str) -> str:
+    """The name of the state word, for what cannot be done without."""
+    reason = unit.evidence.without_state()
+    name = unit.profile.role("state")
+    if reason is None and name is not None:
+        return name
+    needs = f"{what} needs a state word, and that of {unit.profile.title} may not be used"
+    raise unit.evidence.missing(needs, reason or "", Evidence.without_state)
+
+
+def state_of(unit: Unit, word: int) -> State:
+    """What the state *word* says; unknown where the family has no name for it."""
+    try:
+        return State(unit.profile.state(word))
+    except ValueError:
+        return State.UNKNOWN
+
+
+def remember(unit: Unit, seen: str) -> None:
+    """Keeps the last state that was seen, for errors after which none can be read."""
+    unit.memory.last_state = (seen, unit.bus.now())
+
+
+def seen_last(unit: Unit) -> str:
+    """The last state that was seen, and how long ago on the line's clock."""
+    if unit.memory.last_state is None:
+        return "no state was ever seen"
+    seen, at = unit.memory.last_state
+    # A line that is lost may have no clock.
+    age = max(unit.bus.now() - at, 0.0)
+    return f"state seen last, {age:.1f} s ago: {seen}"

@@ -1,0 +1,67 @@
+"""What a parameter of the drive decides of the meaning of its words, and asking the drive how it is set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from typing import Any
+
+from drivebus.errors import NotAllowed
+from drivebus.operations.unit import Unit
+from drivebus.operations.words import read_words
+from drivebus.profile.evidence import Evidence, not_verified
+
+__all__ = ["is_open", "rules", "settled", "undecided"]
+
+
+def rules(unit: Unit) -> Mapping[str, dict[str, Any]]:
+    """Each variant of the family, with the parameter that decides it and what that may say."""
+    return unit.evidence.once(_rules)
+
+
+def is_open(unit: Unit, name: str) -> bool:
+    """Whether a parameter of the drive decides what *name* means, and nobody said how."""
+    return unit.profile.describe(name).variant in unit.evidence.once(undecided)
+
+
+def undecided(evidence: Evidence) -> Set[str]:
+    """The variants of the family that nobody said how they are."""
+    return set(evidence.once(_rules)) - set(evidence.profile.variants_chosen)
+
+
+async def settled(unit: Unit, *names: str) -> Unit:
+    """The same unit, with everything fixed on which the meaning of *names* depends."""
+    still_open = unit.evidence.once(undecided)
+    if not still_open:
+        return unit
+    wanted = [known.variant for name in names if (known := unit.profile.describe(name)).variant]
+    chosen = {variant: await _chosen(unit, variant) for variant in wanted if variant in still_open}
+    if not chosen:
+        return unit
+    return unit.under(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
+
+
+async def _chosen(unit: Unit, variant: str) -> str:
+    """What the drive's own parameter says of *variant*."""
+    rule = rules(unit)[variant]
+    parameter, choices = rule["parameter"], rule["choices"]
+    which = ", ".join(map(repr, choices))
+    given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant {variant}=…`; {which}) says which"
+    if not unit.evidence.allows(rule["reason"]):
+        raise not_verified(
+            f"what {parameter} decides in {unit.profile.title}, and so what the word means (its {variant})",
+            f"{rule['reason'].rstrip('.')}; {given}",
+            unit.address,
+        )
+    unit.evidence.reads([parameter])
+    [raw] = await read_words(unit, unit.profile.address(parameter))
+    for choice, value in choices.items():
+        if value == raw:
+            return str(choice)
+    raise NotAllowed(
+        f"{parameter} of unit {unit.address} is {raw}, which means nothing known; {given}. Nothing was written",
+        unit=unit.address,
+    )
+
+
+def _rules(evidence: Evidence) -> Mapping[str, dict[str, Any]]:
+    return evidence.profile.variants()

@@ -1,0 +1,103 @@
+"""Waiting until a motor has reached its speed, or stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivebus import checks
+from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.operations import state
+from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.unit import Unit
+from drivebus.values import State, Status
+
+__all__ = ["wait_for_speed", "wait_until_stopped"]
+
+_STANDSTILL = 0.05
+"""Output frequency in Hz below which a drive that has stopped counts as stopped."""
+
+
+async def wait_for_speed(
+    unit: Unit, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False
+) -> Status:
+    """Waits until the output frequency is *hz*, or the setpoint in force if None.
+
+    Args:
+        hz: Wanted output frequency in Hz, whichever way the motor turns.
+        tolerance: How far off it may be, in Hz.
+        timeout: Seconds of the line's clock.
+        unverified: Also by words that are not verified for the family.
+
+    Raises:
+        NotAllowed: State or frequency of the family are not known, or not verified. Nothing was sent.
+        Unconfirmed: The drive tripped meanwhile, or the time was up; the message says where it stands. The drive
+            keeps running if it ran.
+        NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
+    """
+    wanted = None if hz is None else checks.number("frequency", hz, 0.0)
+    tolerance = checks.number("tolerance", tolerance, 0.0)
+    goal = "its setpoint" if wanted is None else f"{wanted:g} Hz"
+
+    def reached(status: Status) -> bool:
+        target = status.setpoint if wanted is None else wanted
+        if status.frequency is None or target is None:
+            return False
+        # Hundredths are what drives count in; binary floats must not turn 0.1 into a miss.
+        return status.state.running and abs(status.frequency - target) <= tolerance + 1e-9
+
+    unit = unit.trusting(unverified)
+    _check_told(unit, "waiting for the speed", "frequency", *(["setpoint"] if wanted is None else []))
+    return await _wait(unit, reached, f"{goal} was not reached", timeout)
+
+
+def _check_told(unit: Unit, what: str, *roles: str) -> None:
+    """Raises `NotAllowed` if the family does not tell its state, or one of *roles*."""
+    state.state_word(unit, what)
+    for role in roles:
+        name = unit.profile.role(role)
+        if name is None:
+            raise NotAllowed(
+                f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that "
+                "is known",
+                unit=unit.address,
+            )
+        unit.evidence.reads([name])
+
+
+async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: bool = False) -> Status:
+    """Waits until the drive is stopped and its output frequency is zero.
+
+    A motor that coasts has no output frequency: its shaft may still turn, and the drive does not know.
+
+    Raises:
+        NotAllowed: The state of the family is not known, or not verified. Nothing was sent.
+        Unconfirmed: The drive tripped meanwhile, or the time was up.
+        NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
+    """
+
+    def stopped(status: Status) -> bool:
+        turns = status.frequency is not None and status.frequency > _STANDSTILL
+        return status.state.at_rest and not turns
+
+    unit = unit.trusting(unverified)
+    _check_told(unit, "waiting for the standstill")
+    return await _wait(unit, stopped, "it did not stop", timeout)
+
+
+async def _wait(unit: Unit, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
+    timeout = checks.number("timeout", timeout, 0.0)
+    deadline = unit.bus.now() + timeout
+    while True:
+        status = await state.status(unit)
+        if status.state is State.FAULT or status.fault is not None:
+            raise Unconfirmed(
+                f"unit {unit.address} tripped while waiting: {status.fault or 'fault not named'}", unit=unit.address
+            )
+        if reached(status):
+            return status
+        if unit.bus.now() >= deadline:
+            raise Unconfirmed(
+                f"unit {unit.address}: {otherwise} within {timeout:g} s; it is {status}",
+                unit=unit.address,
+            )
+        await unit.bus.sleep(POLL_INTERVAL)

@@ -1,0 +1,141 @@
+"""The words of one unit by address: read and written as they are, with refusals in the words of its family."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from drivebus import checks
+from drivebus.errors import PortError, Refused
+from drivebus.line.write_guard import check_words
+from drivebus.operations.unit import Unit
+from drivebus.values import State
+
+__all__ = ["explained", "read_words", "send", "write", "write_words"]
+
+_LOCKED = ("password_error", "password_protected")
+"""What INVT's families call the exceptions that have to do with the user password."""
+
+_UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
+"""What an exception is called that no profile names, and one that the specification does not name either."""
+
+
+async def read_words(
+    unit: Unit, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+) -> list[int]:
+    """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""
+    with explained(unit):
+        return await unit.bus.read(unit.address, address, count, urgent=urgent, verify=verify)
+
+
+async def write_words(unit: Unit, address: int, value: int | Sequence[int], force: bool = False) -> None:
+    """Writes one word (an int: 06H) or several (a sequence: 10H) by address, as they are. Sent once.
+
+    As `Bus.write`, but another drive that answers at this address gets nothing, and a refusal says what this family
+    means by it. A word in the command register moves the motor.
+
+    Args:
+        address: 0..0xFFFF, with the bit for RAM or EEPROM where the family has one.
+        value: Words of 0..0xFFFF.
+        force: Also a command that the family does not define.
+
+    Raises:
+        NotAllowed: Out of range, or such a command; or another drive answers at this address since the port was
+            opened again. Nothing was sent.
+        NoAnswer, BadAnswer, PortError: The drive may have taken it, unless the error's `started` is None.
+        Refused: The drive did not take it.
+    """
+    address, words = checks.address(address), checks.payload(value)
+    if not checks.flag("force", force):
+        check_words([unit.profile], unit.address, address, words)
+    if unit.profile.is_command(address):
+        unit.memory.started_as = State.UNKNOWN
+    await write(unit, address, words, force=force)
+
+
+async def write(
+    unit: Unit,
+    address: int,
+    value: int | Sequence[int],
+    *,
+    read_back: int | None = None,
+    force: bool = False,
+    judged: bool = True,
+) -> None:
+    """Writes to the unit, if it still is the one it was and, where that is *judged*, does not say it is another."""
+    connection = await unit.memory.identity.check(unit.bus, judged=judged)
+    try:
+        await send(unit, address, value, read_back=read_back, connection=connection, force=force)
+    except PortError as error:
+        if error.started is not None or unit.bus.reconnects == connection:
+            raise
+        # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
+        connection = await unit.memory.identity.check(unit.bus, judged=judged)
+        await send(unit, address, value, read_back=read_back, connection=connection, force=force)
+
+
+async def send(
+    unit: Unit,
+    address: int,
+    value: int | Sequence[int],
+    *,
+    urgent: bool = False,
+    read_back: int | None = None,
+    connection: int | None = None,
+    force: bool = False,
+) -> None:
+    """Writes to whatever unit answers at the address: for a stop, which asks nothing before."""
+    # What a bus of somebody's own must know is the rest: only a raw write is ever forced.
+    forced = {"force": True} if force else {}
+    with explained(unit):
+        await unit.bus.write(
+            unit.address, address, value, urgent=urgent, read_back=read_back, connection=connection, **forced
+        )
+
+
+@contextmanager
+def explained(unit: Unit) -> Iterator[None]:
+    """A block in which a refusal says what this family means by its code, and what it was that was refused."""
+    try:
+        yield
+    except Refused as error:
+        name, meaning = unit.profile.exception(error.code)
+        if name == _UNKNOWN and error.name != _NOWHERE:
+            name = error.name
+            meaning = f"so in the Modbus specification; what a {unit.profile.title} means by it is not known"
+        raise Refused(
+            f"unit {unit.address} refused {_asked(error.request)}: exception {error.code:02X}H, {name}: {meaning}"
+            f"{_about_password(unit, name)}",
+            code=error.code,
+            name=name,
+            meaning=meaning,
+            unit=error.unit,
+            request=error.request,
+            raw=error.raw,
+            started=error.started,
+            ended=error.ended,
+        ) from None
+
+
+def _about_password(unit: Unit, exception: str) -> str:
+    """What to do about a drive that is locked."""
+    if exception not in _LOCKED:
+        return ""
+    described = map(unit.profile.describe, unit.profile.names())
+    password = next((known for known in described if known.code and "password" in known.label.lower()), None)
+    held = "The user password" if password is None else f"{password.code} holds the user password"
+    return (
+        f". {held}{' is set' if password is None else ', and it is set'}: type it in at the keypad, or take it off "
+        "there, and ask again. How to unlock the drive over the bus is not printed"
+    )
+
+
+def _asked(request: bytes) -> str:
+    """What a request frame asked for, for people."""
+    if len(request) < 6:
+        return "the request"
+    address = f"{int.from_bytes(request[2:4], 'big'):04X}H"
+    number = int.from_bytes(request[4:6], "big")
+    if request[1] == 0x03:
+        return f"to read {number} word{'s' if number != 1 else ''} at {address}"
+    return f"to write {number} at {address}" if request[1] == 0x06 else f"to write {number} words at {address}"

@@ -1,0 +1,8 @@
+"""What a family of drives means by its words, and how sure that is.
+
+`profile` holds a family, `plan` the fewest reads for some names, `evidence` the rule for what no document proves.
+"""
+
+from drivebus.profile.profile import Profile, profiles
+
+__all__ = ["Profile", "profiles"]

@@ -1,0 +1,167 @@
+"""What may be asked of a drive where its documents are silent.
+
+What documents of the very family print may be used. What they print in part, or for a sister series, may be read;
+written it is only for who says `unverified=True`, and so is whatever they do not print at all. What has no address
+cannot be asked for in any case. Profiles know which is which, and why; here the rule stands, and its words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+from drivebus.errors import NotAllowed
+from drivebus.profile.profile import Profile
+
+__all__ = ["Evidence", "not_verified"]
+
+_T = TypeVar("_T")
+
+_WHY_UNKNOWN = "no document of this family says so"
+
+
+def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
+    """The error for *what* of *unit*, which is not verified for the *reason* that the profile gives."""
+    return NotAllowed(
+        f"{what} is not verified: {_sentence(reason)} Nothing was sent to unit {unit}; with unverified=True "
+        "(`--unverified`) it is done all the same",
+        unit=unit,
+    )
+
+
+class Evidence:
+    """The rule for one unit: one profile, under one trust. What it works out once is kept here.
+
+    Args:
+        profile: What is known of its family.
+        unit: Its address, for messages.
+        unverified: Whether what is not verified may be used.
+    """
+
+    def __init__(self, profile: Profile, unit: int, unverified: bool) -> None:
+        self.profile = profile
+        self.unverified = unverified
+        self.unit = unit
+        self._readable: set[str] = set()
+        self._worked_out: dict[Callable[[Evidence], Any], Any] = {}
+
+    def trusting(self, unverified: bool) -> Evidence:
+        """The rule under which, if *unverified*, what is not verified may be used as well."""
+        return self.once(_all_of_it) if unverified and not self.unverified else self
+
+    def of(self, profile: Profile) -> Evidence:
+        """The same trust in another profile."""
+        return Evidence(profile, self.unit, self.unverified)
+
+    def once(self, work: Callable[[Evidence], _T]) -> _T:
+        """What *work* makes of this, worked out when it is asked for first."""
+        try:
+            result: _T = self._worked_out[work]
+        except KeyError:
+            # Kept only when it is whole: another thread may ask meanwhile.
+            result = self._worked_out[work] = work(self)
+        return result
+
+    def reads(self, names: Iterable[str]) -> None:
+        """Raises `NotAllowed` if one of *names* may not be read."""
+        for name in names:
+            if not isinstance(name, str):
+                raise NotAllowed(f"name {name!r} is no text; nothing was sent to unit {self.unit}", unit=self.unit)
+            # Programs read the same few names again and again.
+            if name in self._readable:
+                continue
+            missing = self.unreadable(name)
+            if missing is not None:
+                known = self.profile.describe(name)
+                if known.address is None:
+                    raise self._without_address(name)
+                if known.access == "wo":
+                    raise NotAllowed(f"{self._named(name)} can only be written; nothing was sent", unit=self.unit)
+                raise not_verified(f"reading {self._named(name)}", missing, self.unit)
+            self._readable.add(name)
+
+    def unreadable(self, name: str) -> str | None:
+        """Why *name* may not be read; None if it may."""
+        known = self.profile.describe(name)
+        if known.address is None:
+            return f"its address is not known: {_sentence(known.reason or known.note)}"
+        if known.access == "wo":
+            return "it can only be written"
+        if known.evidence == "assumed" and not self.unverified:
+            return known.reason or _WHY_UNKNOWN
+        return None
+
+    def readable(self, names: Iterable[str]) -> list[str]:
+        """Those of *names* that may be read."""
+        return [name for name in names if self.unreadable(name) is None]
+
+    def writes(self, name: str) -> None:
+        """Raises `NotAllowed` if *name* may not be written."""
+        known = self.profile.describe(name)
+        if known.address is None:
+            raise self._without_address(name)
+        if known.evidence != "verified" and not self.unverified:
+            raise not_verified(f"writing {self._named(name)}", known.reason, self.unit)
+
+    def commands(self, name: str) -> None:
+        """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
+        reason = self.unusable(name)
+        if name not in self.profile.commands():
+            raise NotAllowed(f"{reason}; nothing was sent to unit {self.unit}", unit=self.unit)
+        if reason is not None:
+            raise not_verified(f"the command {name} of {self.profile.title}", reason, self.unit)
+
+    def unusable(self, command: str) -> str | None:
+        """Why *command* may not be given; None if it may."""
+        if command not in self.profile.commands():
+            return f"no command {command} of {self.profile.title} is known"
+        reason = self.profile.command_reason(command)
+        return None if self.allows(reason) else reason
+
+    def without_state(self) -> str | None:
+        """Why the family's states may not be used; None if they may."""
+        word = self.profile.role("state")
+        if word is None:
+            return f"no state word of {self.profile.title} is known"
+        return self.unreadable(word) or (None if self.unverified else self.profile.state_reason())
+
+    def without_fault(self) -> str | None:
+        """Why the present fault may not be read; None if it may."""
+        register = self.profile.role("fault")
+        return f"no fault register of {self.profile.title} is known" if register is None else self.unreadable(register)
+
+    def missing(self, what: str, reason: str, better: Callable[[Evidence], str | None]) -> NotAllowed:
+        """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
+        helps = better(self.trusting(True)) is None
+        hint = "; with unverified=True (`--unverified`) what is assumed of it is used" if helps else ""
+        return NotAllowed(f"{what}: {_sentence(reason)} Nothing was sent to unit {self.unit}{hint}", unit=self.unit)
+
+    def allows(self, reason: str | None) -> bool:
+        """Whether what has a *reason* not to be used may be used all the same; with None there is no such reason."""
+        return reason is None or self.unverified
+
+    def rule(self, what: str, reason: str | None) -> None:
+        """Raises `NotAllowed` if *what* has a *reason* not to be used, and nobody said that it may be all the same."""
+        if not self.allows(reason):
+            raise not_verified(what, reason, self.unit)
+
+    def _named(self, name: str) -> str:
+        return f"{name} ({self.profile.describe(name).label}) of {self.profile.title}"
+
+    def _without_address(self, name: str) -> NotAllowed:
+        known = self.profile.describe(name)
+        return NotAllowed(
+            f"the address of {self._named(name)} is not known: {_sentence(known.reason or known.note)} Nothing was "
+            f"sent to unit {self.unit}; an overlay on the profile can fill it in (docs/profiles.md)",
+            unit=self.unit,
+        )
+
+
+def _all_of_it(evidence: Evidence) -> Evidence:
+    """The rule of *evidence* with trust in what is not verified."""
+    return Evidence(evidence.profile, evidence.unit, True)
+
+
+def _sentence(reason: str | None) -> str:
+    text = (reason or _WHY_UNKNOWN).strip().rstrip(".")
+    return f"{text}."

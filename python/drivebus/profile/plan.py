@@ -1,0 +1,53 @@
+"""A read plan: what to read for some names, and what the words that come mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from drivebus import _native
+from drivebus.values import Choice, Description, Value
+
+__all__ = ["ReadPlan", "labelled"]
+
+
+def labelled(row: Description, value: float) -> Value:
+    """*value* with its label, where *row* has one for it. A float is no choice, although one may equal its number."""
+    label = row.choices.get(value) if row.choices and isinstance(value, int) else None
+    return value if label is None else Choice(int(value), label)
+
+
+class ReadPlan:
+    """What to read for some names, and what the words that come mean: worked out once, used for every answer.
+
+    Attributes:
+        names: As they were asked for.
+        reads: Address and number of words of each read: the fewest that hold all of them.
+        units: The engineering unit of each name.
+        native: The same for the compiled core, which knows no labels.
+    """
+
+    __slots__ = ("_labels", "names", "native", "reads", "units")
+
+    def __init__(self, native: _native.Plan, known: Sequence[Description]) -> None:
+        self.native = native
+        self.names = tuple(native.names)
+        self.reads = tuple(native.reads)
+        self.units: Mapping[str, str] = {name: row.unit for name, row in zip(self.names, known, strict=True)}
+        self._labels = [
+            (index, {value: labelled(row, value) for value in row.choices})
+            for index, row in enumerate(known)
+            if row.choices
+        ]
+
+    def values(self, answers: Sequence[Sequence[int]]) -> list[Value]:
+        """The value of each name, in their order, out of the words that each read brought."""
+        return self.named(self.native.values(answers))
+
+    def named(self, values: list[Value]) -> list[Value]:
+        """*values*, with a `Choice` for each that the profile has a label for; the list itself is changed."""
+        for index, labels in self._labels:
+            value = values[index]
+            # A float is never a choice, although one may equal its number.
+            if isinstance(value, int):
+                values[index] = labels.get(value, value)
+        return values
