@@ -42,7 +42,7 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
 }
 
 # The one file with `unsafe`, which says why: two ioctls that no crate offers.
-UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
+UNSAFE_ALLOWED = "crates/line/src/ports/tty/low_latency.rs"
 
 # Modules of ours that each Python module may import. `drivebus` is the public package itself; `__init__` makes it.
 # What speaks to a drive (`identity` to `drive`) knows a bus by its protocol only.
@@ -255,7 +255,7 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ("crates/rtu/src/crc.rs", "//!", "unsafe fn f() {}\n//!", "rtu/src/crc.rs: must not use `unsafe`"),
     ("crates/rtu/Cargo.toml", "[lints]\nworkspace = true", "", "crates/rtu/Cargo.toml: lacks [lints]"),
     ("Cargo.toml", 'unsafe_code = "deny"', 'unsafe_code = "warn"', "Cargo.toml: [workspace.lints.rust] lacks"),
-    ("crates/line/src/tty.rs", "//!", "unsafe fn f() {}\n//!", "line/src/tty.rs: must not use `unsafe`"),
+    ("crates/line/src/ports/tty.rs", "//!", "unsafe fn f() {}\n//!", "line/src/ports/tty.rs: must not use `unsafe`"),
     (
         "crates/drives/Cargo.toml",
         HEAD,

@@ -1,5 +1,9 @@
 //! The bus as its callers see it: safe from any thread, one exchange at a time, retries by kind.
 
+pub(crate) mod call;
+pub(crate) mod errand;
+mod listen;
+
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -7,21 +11,21 @@ use std::time::Duration;
 
 use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
 
-use crate::call::{Call, CallOptions};
-use crate::clock::{monotonic, sleep_until};
-use crate::echo::AdapterEcho;
+use crate::bus::call::{Call, CallOptions};
 use crate::error::{CallError, Failure};
-use crate::exchange::{Ask, Done};
-use crate::link::{Link, Links};
-use crate::opener::Opener;
+use crate::health::link::{Link, Links};
+use crate::health::stats::Stats;
+use crate::line::{Line, LineClock};
 use crate::owner::Owner;
-use crate::process::Process;
-use crate::punctual;
-use crate::queue::{LOOK_UP, NoTurn, Priority, Queue};
-use crate::resync::FreshWords;
-use crate::stats::Stats;
-use crate::units::UnitOptions;
-use crate::{Line, LineClock};
+use crate::owner::delays::UnitOptions;
+use crate::owner::echo::AdapterEcho;
+use crate::owner::exchange::{Ask, Done};
+use crate::owner::opener::Opener;
+use crate::owner::resync::FreshWords;
+use crate::system::clock::{monotonic, sleep_until};
+use crate::system::process::Process;
+use crate::system::punctual;
+use crate::turns::queue::{LOOK_UP, NoTurn, Priority, Queue};
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]

@@ -4,6 +4,11 @@
 //! in virtual time there is no such thread, for nobody would stop it: time moves only while somebody waits, so who
 //! waits for samples does the asking, and nobody else does.
 
+pub(crate) mod ring;
+mod runner;
+mod samples;
+mod schedule;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::{self, JoinHandle, ThreadId};
@@ -12,13 +17,13 @@ use std::time::Duration;
 use drivebus_rtu::{BeginError, SerialFormat, UnitAddress};
 
 use crate::bus::Bus;
-use crate::clock::monotonic;
 use crate::error::Failure;
-use crate::poll_ring::PollBatch;
-use crate::poll_run::{Progress, Runner};
-use crate::poll_samples::Samples;
-use crate::process::Process;
-use crate::queue::LOOK_UP;
+use crate::poll::ring::PollBatch;
+use crate::poll::runner::{Progress, Runner};
+use crate::poll::samples::Samples;
+use crate::system::clock::monotonic;
+use crate::system::process::Process;
+use crate::turns::queue::LOOK_UP;
 
 /// What is asked of one unit in each cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
