@@ -9,67 +9,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, UnitAddress};
 
-use crate::bus::call::{Call, CallOptions};
+use crate::ask::{Ask, Done};
+use crate::bus::call::Call;
 use crate::error::{CallError, Failure};
 use crate::health::link::{Link, Links};
 use crate::health::stats::Stats;
 use crate::line::{Line, LineClock};
+use crate::options::{BusOptions, CallOptions, UnitOptions};
 use crate::owner::Owner;
-use crate::owner::delays::UnitOptions;
-use crate::owner::echo::AdapterEcho;
-use crate::owner::exchange::{Ask, Done};
 use crate::owner::opener::Opener;
 use crate::owner::resync::FreshWords;
-use crate::system::clock::{monotonic, sleep_until};
+use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
 use crate::system::process::Process;
 use crate::system::punctual;
-use crate::turns::queue::{LOOK_UP, NoTurn, Priority, Queue};
-
-/// How a bus behaves.
-#[derive(Debug, Clone, Copy)]
-pub struct BusOptions {
-    /// Characters and silence.
-    pub format: SerialFormat,
-    /// The longest wait from the end of a request to the end of its answer.
-    pub timeout: Duration,
-    /// How often a read is asked once more. A damaged answer, which took no time-out, counts half. A write is never.
-    pub retries: u32,
-    /// Whether every request that may change something in a unit is refused before it is sent.
-    pub read_only: bool,
-    /// What is known about the adapter sending our own bytes back.
-    pub echo: AdapterEcho,
-    /// How long units are given to act on a broadcast, in which nothing is sent.
-    pub turnaround: Duration,
-    /// Whether a read waits no longer than its unit's answers have taught: four times the longest delay of the last 32,
-    /// at least 100 ms, beside the time that the answer's characters take, and never longer than the time-out. What is
-    /// polled waits so in any case.
-    pub learn_timeout: bool,
-    /// How many requests may wait for the line; who comes then is told so at once ([`Failure::QueueFull`]). A stop is
-    /// always let in. 0 would let nobody wait.
-    pub queue: usize,
-}
-
-/// More than any program means to have under way, and some tens of megabytes.
-pub(crate) const DEFAULT_QUEUE: usize = 65_536;
-
-impl BusOptions {
-    /// Half a second, two retries of reads, writing allowed, the adapter's echo found out, the turnaround delay of the
-    /// specification, no time-outs that learn, 65 536 requests that may wait.
-    pub const fn new(format: SerialFormat) -> Self {
-        Self {
-            format,
-            timeout: Duration::from_millis(500),
-            retries: 2,
-            read_only: false,
-            echo: AdapterEcho::Auto,
-            turnaround: TURNAROUND,
-            learn_timeout: false,
-            queue: DEFAULT_QUEUE,
-        }
-    }
-}
+use crate::turns::order::Priority;
+use crate::turns::queue::{NoTurn, Queue};
 
 /// One line and its owner.
 ///

@@ -10,6 +10,7 @@
 //! | room | what is in it |
 //! | --- | --- |
 //! | `line`, `error` | what every kind of line promises; what can become of a call |
+//! | `ask`, `options` | one request as it goes to the line; what may be told to do otherwise |
 //! | `by_unit` | what is kept of each unit |
 //! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
 //! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
@@ -19,6 +20,7 @@
 //! | `bus` | the line as its callers see it: calls, errands, listening |
 //! | `poll` | what a bus asks again and again by itself |
 
+mod ask;
 mod bus;
 mod by_unit;
 mod error;
@@ -26,28 +28,29 @@ mod health;
 mod line;
 #[cfg(test)]
 mod nobody;
+mod options;
 mod owner;
 mod poll;
 mod ports;
 mod system;
 mod turns;
 
-pub use bus::call::CallOptions;
+pub use ask::Done;
+pub use bus::Bus;
 pub use bus::errand::{Errand, Reply, Running};
-pub use bus::{Bus, BusOptions};
 pub use error::{CallError, Failure};
 pub use health::hint::Hint;
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Stats};
 pub use line::{Line, LineClock, PortError, PortErrorKind};
-pub use owner::delays::UnitOptions;
-pub use owner::echo::AdapterEcho;
-pub use owner::exchange::Done;
+pub use options::{AdapterEcho, BusOptions, CallOptions, UnitOptions};
 pub use owner::opener::Opener;
+pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
-pub use poll::{Poll, PollCounts, PollError, PollTarget};
+pub use poll::samples::PollCounts;
+pub use poll::target::{PollError, PollTarget};
 pub use ports::adapters::facts::PortFacts;
 pub use ports::adapters::identity::Places;
 pub use ports::{mbap, rs485, tcp, tty};
 pub use system::clock;
-pub use turns::queue::Priority;
+pub use turns::order::Priority;

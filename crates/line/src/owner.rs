@@ -14,14 +14,15 @@ use std::time::Duration;
 
 use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
+use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::health::link::Links;
 use crate::health::stats::Stats;
 use crate::line::{Line, LineClock};
+use crate::options::AdapterEcho;
 use crate::owner::dead_units::DeadUnits;
 use crate::owner::delays::Delays;
-use crate::owner::echo::AdapterEcho;
-use crate::owner::exchange::{Ask, Done, exchange};
+use crate::owner::exchange::exchange;
 use crate::owner::longer::Longer;
 use crate::owner::lumps::Lumps;
 use crate::owner::opener::{LineOpener, Opener};

@@ -17,35 +17,14 @@ use std::time::Duration;
 
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
+use crate::ask::{Ask, Done};
 use crate::bus::Bus;
 use crate::bus::call::course::{Course, is_unanswered};
 use crate::error::{CallError, Failure};
+use crate::options::CallOptions;
 use crate::owner::dead_units::Verdict;
-use crate::owner::exchange::{Ask, Done};
-use crate::turns::queue::{NoTurn, Priority, Turn};
-
-/// What one call wants otherwise than the bus; `None` keeps what the bus has.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct CallOptions {
-    /// The longest wait for the answer.
-    pub timeout: Option<Duration>,
-    /// How often a read is asked once more; after a damaged answer, which took no time-out, twice as often.
-    pub retries: Option<u32>,
-    /// Who goes first; `None` is [`Priority::Write`] for what changes something and [`Priority::Read`] for the rest.
-    pub priority: Option<Priority>,
-    /// Whether the request goes out at once, whatever is in doubt about the unit: for a stop, which must not wait for an
-    /// echo to come back. Its confirmation may then belong to the very same request, sent before.
-    pub in_doubt: bool,
-    /// Whether a read is asked until the same words came twice in a row: against noise that happens to match its CRC
-    /// (one damaged answer in 65 536).
-    pub verify: bool,
-    /// Where the words of a write can be read. Then a confirmation that is missing is looked for there, and the write is
-    /// repeated only while the unit shows other words. For absolute values only: what a command does, nobody can read back.
-    pub read_back: Option<u16>,
-    /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
-    /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
-    pub connection: Option<u64>,
-}
+use crate::turns::order::Priority;
+use crate::turns::queue::{NoTurn, Turn};
 
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {

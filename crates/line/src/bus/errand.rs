@@ -10,12 +10,13 @@ use std::sync::{Arc, Weak};
 
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 
+use crate::ask::Done;
 use crate::bus::Bus;
-use crate::bus::call::{Call, CallOptions};
+use crate::bus::call::Call;
 use crate::error::{CallError, Failure};
-use crate::owner::exchange::Done;
-use crate::turns::order::Ticket;
-use crate::turns::queue::{NoTurn, Priority, Queue, Turn};
+use crate::options::CallOptions;
+use crate::turns::order::{Priority, Ticket};
+use crate::turns::queue::{NoTurn, Queue, Turn};
 
 /// A request, and who is told what became of it.
 pub struct Errand {

@@ -7,7 +7,8 @@ use drivebus_rtu::Instant;
 use crate::bus::Bus;
 use crate::error::Failure;
 use crate::owner::Owner;
-use crate::turns::queue::{LOOK_UP, Priority};
+use crate::system::clock::LOOK_UP;
+use crate::turns::order::Priority;
 
 impl Bus {
     /// Gives `hear` what comes within `time`, each piece with the moment it was handed over. Nothing is sent.

@@ -2,10 +2,10 @@
 
 use drivebus_rtu::UnitAddress;
 
+use crate::ask::Done;
 use crate::by_unit::ByUnit;
 use crate::error::{CallError, Failure};
 use crate::line::PortErrorKind;
-use crate::owner::exchange::Done;
 
 /// Of the last 10 exchanges with one unit, how many brought an answer; of fewer, while there were fewer.
 ///
@@ -80,8 +80,8 @@ mod tests {
 
     use drivebus_rtu::{BeginError, ExceptionCode, FrameError, Instant, Request};
 
+    use crate::ask::Ask;
     use crate::line::PortError;
-    use crate::owner::exchange::Ask;
 
     use super::*;
 

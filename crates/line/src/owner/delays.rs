@@ -1,19 +1,10 @@
-//! What is set for single units, and what their answers have taught about how long to wait for them.
+//! The delays of the units of a line, and what they teach about how long to wait for an answer.
 
 use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
 
 use crate::by_unit::ByUnit;
-
-/// What one unit needs otherwise than the bus; `None` keeps what the bus has.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct UnitOptions {
-    /// The longest wait from the end of a request to the end of its answer.
-    pub timeout: Option<Duration>,
-    /// The least silence before a request to the unit, where it needs more than the 3.5 characters of every other.
-    pub gap: Option<Duration>,
-}
 
 /// How many answers are remembered: a few seconds of polling.
 const REMEMBERED: usize = 32;

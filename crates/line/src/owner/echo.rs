@@ -5,21 +5,11 @@
 
 use drivebus_rtu::{Destination, Request, Tally};
 
+use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
-use crate::owner::exchange::{Ask, Done};
+use crate::options::AdapterEcho;
 use crate::owner::resync::Tried;
 use crate::owner::{Owner, is_line_trouble};
-
-/// What is known about the adapter sending our own bytes back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AdapterEcho {
-    /// Find out.
-    Auto,
-    /// It does: the request is taken off before every answer.
-    Present,
-    /// It does not.
-    Absent,
-}
 
 /// How often one attempt looks whether the adapter echoes, where noise hides it.
 const LOOKS: u32 = 3;

@@ -4,12 +4,14 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Master, Request};
+use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Master};
 
+use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::line::Line;
 use crate::owner::lumps::{Arrivals, Ended, Lumps};
-use crate::turns::queue::{LOOK_UP, Queue};
+use crate::system::clock::LOOK_UP;
+use crate::turns::queue::Queue;
 
 /// How long before an answer can be whole it is waited for again, in characters and on top of them: the first bytes may
 /// have been handed over so much after they came. A receiver hands over what fills its FIFO, a machine wakes up late.
@@ -18,53 +20,6 @@ const EARLY: (u32, Duration) = (2, Duration::from_micros(150));
 /// How long a unit that was silent the last time is waited for while a stop waits for the line. A unit answers within
 /// some ten milliseconds; what it says later than this may meet the stop on the wire.
 const STOP_WAITS: Duration = Duration::from_millis(100);
-
-/// One request on its way.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ask<'a> {
-    pub(crate) destination: Destination,
-    pub(crate) request: &'a Request<'a>,
-    /// How long to wait after the request: for the answer, or for the units to act on a broadcast.
-    pub(crate) timeout: Duration,
-    /// Whether a read waits no longer than its unit's answers have taught.
-    pub(crate) learns: bool,
-    /// The least silence before it, if that is more than every request keeps.
-    pub(crate) gap: Duration,
-    /// Whether it goes out at once, even to a unit that may still answer something else.
-    pub(crate) in_doubt: bool,
-    /// Where stops wait that go before it, even when it is on its way: its unit was silent the last time.
-    pub(crate) yields: Option<&'a Queue>,
-}
-
-/// When an exchange happened, on the line's clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Done {
-    /// The first bit of the request.
-    pub sent: Instant,
-    /// The last byte of the answer.
-    pub ended: Instant,
-}
-
-impl Ask<'_> {
-    /// The whole request frame.
-    pub(crate) fn frame(&self) -> Vec<u8> {
-        Adu::request(self.destination, self.request).as_bytes().to_vec()
-    }
-
-    /// The error of this request; `sent` and `ended` are moments of the line's clock, `raw` is what came.
-    pub(crate) fn failed(
-        &self,
-        failure: Failure,
-        sent: Option<Instant>,
-        ended: impl Into<Option<Instant>>,
-        raw: &[u8],
-    ) -> Box<CallError> {
-        let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
-        let ended = ended.into();
-        Box::new(CallError { failure, destination, request, raw, sent, ended })
-    }
-}
 
 /// Sends one request over `line` and gives its answer to `take`. `usual`: how long the unit takes at most until it begins to
 /// answer, where that is known; `lumps`: how answers come over this line.
@@ -259,12 +214,12 @@ fn conclude(
 mod tests {
     use std::thread;
 
-    use drivebus_rtu::{SerialFormat, UnitAddress};
+    use drivebus_rtu::{Request, SerialFormat, UnitAddress};
 
     use super::*;
     use crate::line::PortError;
     use crate::turns::crew::Waiter;
-    use crate::turns::queue::Priority;
+    use crate::turns::order::Priority;
 
     /// A line on which nobody answers, or somebody says a byte now and then. Time passes only while it is waited on.
     #[derive(Debug, Default)]

@@ -11,8 +11,7 @@ use drivebus_rtu::Instant;
 
 use crate::error::Failure;
 use crate::line::{Line, PortError, PortErrorKind};
-use crate::system::clock::monotonic;
-use crate::turns::queue::LOOK_UP;
+use crate::system::clock::{LOOK_UP, monotonic};
 
 /// Opens the line, at first and again after it was lost.
 pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Line>, PortError> + Send>;

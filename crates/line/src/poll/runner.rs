@@ -8,13 +8,13 @@ use std::time::Duration;
 use drivebus_rtu::{Answer, Instant, Request};
 
 use crate::bus::Bus;
-use crate::bus::call::CallOptions;
 use crate::error::Failure;
-use crate::poll::PollTarget;
+use crate::options::CallOptions;
 use crate::poll::ring::PollSample;
 use crate::poll::samples::Samples;
 use crate::poll::schedule::{Schedule, Step};
-use crate::turns::queue::Priority;
+use crate::poll::target::PollTarget;
+use crate::turns::order::Priority;
 
 /// What came of going on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,8 +160,10 @@ mod tests {
     use drivebus_rtu::{Adu, SerialFormat, UnitAddress};
 
     use super::*;
+    use crate::line::{Line, PortError};
+    use crate::options::BusOptions;
+    use crate::poll::Poll;
     use crate::system::clock::{monotonic, sleep_until};
-    use crate::{BusOptions, Line, Poll, PortError};
 
     /// A unit that has zero everywhere. It says what it hears, and answers the first request only when it is told to.
     #[derive(Debug)]

@@ -8,11 +8,23 @@ use std::time::Duration;
 use drivebus_rtu::Instant;
 
 use crate::bus::Bus;
-use crate::poll::PollCounts;
 use crate::poll::ring::{PollBatch, PollSample, Ring};
 use crate::poll::schedule::Schedule;
-use crate::system::clock::{monotonic, sleep_until};
-use crate::turns::queue::LOOK_UP;
+use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
+
+/// What a poll did so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PollCounts {
+    /// Cycles that are over: in each, every target was asked once.
+    pub cycles: u64,
+    /// Samples that have no words.
+    pub missing: u64,
+    /// Beats that were over before the line was free, or, in virtual time, before somebody asked.
+    pub late: u64,
+    /// Samples that gave way to newer ones before somebody took them.
+    pub dropped: u64,
+}
 
 /// How long before a beat the poll's thread stops looking whether it is to end, and only waits.
 const NEAR: Duration = Duration::from_millis(1);

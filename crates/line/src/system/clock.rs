@@ -10,6 +10,9 @@ use drivebus_rtu::{Duration, Instant};
 
 use crate::system::punctual::{PUNCTUAL, Wait};
 
+/// How often somebody who waits looks up to see whether it should still wait.
+pub(crate) const LOOK_UP: Duration = Duration::from_millis(50);
+
 /// Now, in nanoseconds of the system's monotonic clock.
 ///
 /// On Linux the same clock as Python's `time.monotonic_ns()`, and the same in every process.

@@ -9,8 +9,8 @@ use drivebus_rtu::UnitAddress;
 
 use crate::bus::Bus;
 use crate::bus::errand::{self, Errand};
-use crate::turns::order::Ticket;
-use crate::turns::queue::{NoTurn, Priority, Queue, State, Turn};
+use crate::turns::order::{Priority, Ticket};
+use crate::turns::queue::{NoTurn, Queue, State, Turn};
 
 /// Most threads of one bus, but for stops, which always get one. One has the line; others stand by for units that are
 /// silent, and of those there may be many.
@@ -254,9 +254,9 @@ mod tests {
     use drivebus_rtu::{Request, SerialFormat};
 
     use super::*;
-    use crate::bus::call::CallOptions;
     use crate::error::Failure;
-    use crate::{BusOptions, nobody};
+    use crate::nobody;
+    use crate::options::{BusOptions, CallOptions};
 
     #[test]
     fn who_is_told_that_there_is_no_thread_may_use_the_queue() {

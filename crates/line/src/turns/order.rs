@@ -4,8 +4,6 @@ use std::cmp::Ordering;
 
 use drivebus_rtu::UnitAddress;
 
-use crate::turns::queue::Priority;
-
 /// How many turns of a higher class, asked for later, somebody who waits lets go before it. Stops do not count.
 ///
 /// Chosen so that the higher class keeps 32 of 33 turns however much waits below it, and so that who waits at a line
@@ -15,6 +13,24 @@ pub(crate) const OVERTAKEN_AT_MOST: u32 = 32;
 /// Broadcasts are a unit of their own, with the address they have on the wire; 247 is the highest.
 const UNITS: usize = 248;
 const CLASSES: usize = 4;
+
+/// Who goes first among those who wait for the line.
+///
+/// Stops go in the order they came. Within each other class the units take turns, and the calls for one unit go in the
+/// order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
+/// of several such the one that came first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Priority {
+    /// What makes a motor stop, and the reads that confirm it: before all who wait.
+    Stop,
+    /// What changes something in a unit.
+    Write,
+    /// What somebody waits for.
+    #[default]
+    Read,
+    /// What is asked again and again: when nobody else wants the line.
+    Poll,
+}
 
 /// A place in the order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,35 +3,15 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
-use std::time::Duration;
 
 use drivebus_rtu::UnitAddress;
 
-use crate::bus::DEFAULT_QUEUE;
-use crate::system::clock::monotonic;
+use crate::system::clock::{LOOK_UP, monotonic};
 use crate::turns::crew::{Crew, Waiter};
-use crate::turns::order::{Order, Ticket};
+use crate::turns::order::{Order, Priority, Ticket};
 
-/// How often somebody who waits looks up to see whether it should still wait.
-pub(crate) const LOOK_UP: Duration = Duration::from_millis(50);
-
-/// Who goes first among those who wait for the line.
-///
-/// Stops go in the order they came. Within each other class the units take turns, and the calls for one unit go in the
-/// order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
-/// of several such the one that came first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Priority {
-    /// What makes a motor stop, and the reads that confirm it: before all who wait.
-    Stop,
-    /// What changes something in a unit.
-    Write,
-    /// What somebody waits for.
-    #[default]
-    Read,
-    /// What is asked again and again: when nobody else wants the line.
-    Poll,
-}
+/// More than any program means to have under way, and some tens of megabytes.
+pub(crate) const DEFAULT_QUEUE: usize = 65_536;
 
 /// A queue at the line. The calling thread itself works on the line when its turn comes, so that a lone caller pays
 /// for no hand-over.

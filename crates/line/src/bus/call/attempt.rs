@@ -5,13 +5,14 @@ use std::sync::MutexGuard;
 
 use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request};
 
+use crate::ask::{Ask, Done};
 use crate::bus::call::course::{Course, Form, Hearing};
 use crate::bus::call::{Call, is_silence};
 use crate::error::{CallError, Failure};
-use crate::owner::exchange::{Ask, Done};
 use crate::owner::resync::Tried;
 use crate::owner::{Next, Owner};
-use crate::turns::queue::{Priority, Turn};
+use crate::turns::order::Priority;
+use crate::turns::queue::Turn;
 
 /// How the question may be put.
 enum Question {

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
 
+use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::line::PortErrorKind;
-use crate::owner::exchange::{Ask, Done};
 use crate::owner::{Asked, Owner};
 
 /// How many more attempts than questions there may be: those that end with a probe.

@@ -1,6 +1,7 @@
 //! Threads that wait for their turn, and the one that has it.
 
 use std::sync::mpsc;
+use std::time::Duration;
 
 use super::*;
 

@@ -3,9 +3,9 @@
 use drivebus_rtu::{Duration, ExceptionCode, FrameError, SerialFormat, UnitAddress};
 
 use super::*;
-use crate::bus::call::CallOptions;
+use crate::bus::Bus;
 use crate::nobody;
-use crate::{Bus, BusOptions};
+use crate::options::{BusOptions, CallOptions};
 
 const UNIT: UnitAddress = UnitAddress::MIN;
 const REFUSAL: Failure = Failure::Refused { function: 8, code: ExceptionCode::ILLEGAL_FUNCTION };

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use drivebus_rtu::{AnswerError, ExceptionCode, FrameError, SerialFormat};
 
 use super::*;
-use crate::owner::echo::AdapterEcho;
+use crate::line::PortError;
+use crate::nobody;
+use crate::options::AdapterEcho;
 use crate::owner::resync::FreshWords;
-use crate::{PortError, nobody};
 
 const TIMEOUT: Duration = Duration::from_millis(100);
 const UNIT: UnitAddress = UnitAddress::MIN;
