@@ -17,7 +17,7 @@ use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, S
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::health::link::Links;
-use crate::health::stats::Stats;
+use crate::health::stats::{Asked, Stats};
 use crate::line::{Line, LineClock};
 use crate::options::AdapterEcho;
 use crate::owner::dead_units::DeadUnits;
@@ -46,9 +46,6 @@ pub(crate) enum Next {
     /// The unit may still answer something else, and everything was tried.
     GiveUp,
 }
-
-/// How many requests went to a unit, and how often the port was opened again by then.
-pub(crate) type Asked = (u64, u64);
 
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
@@ -144,8 +141,7 @@ impl Owner {
 
     /// What was asked of `unit` so far: who finds it unchanged knows that nobody else has asked it since.
     pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
-        let stats = self.stats();
-        (stats.units.get(&unit).map_or(0, |counters| counters.requests), stats.reconnects)
+        self.stats().asked(unit)
     }
 
     /// The line, if it is open.

@@ -48,7 +48,7 @@ impl<'b> Call<'b, '_> {
             let attribution = match question {
                 Question::Same(Form::Plain) => {
                     let ask = Ask { in_doubt: true, ..self.ask };
-                    return course.ask(&mut owner, &ask, Form::Plain, give_up, take);
+                    return put(course, &mut owner, &ask, Form::Plain, give_up, take);
                 }
                 Question::Same(Form::Apart(count)) | Question::Apart(count) => {
                     let again = matches!(question, Question::Same(_));
@@ -64,7 +64,7 @@ impl<'b> Call<'b, '_> {
                 }
                 Question::Unproven => {
                     course.is_unproven();
-                    let result = course.ask(&mut owner, &self.ask, Form::Plain, give_up, &mut |_| ());
+                    let result = put(course, &mut owner, &self.ask, Form::Plain, give_up, &mut |_| ());
                     return owner.unless_echoed(&self.ask, result, give_up);
                 }
                 // What was heard goes on.
@@ -73,7 +73,7 @@ impl<'b> Call<'b, '_> {
             };
             let again = matches!(question, Question::Same(_));
             if !self.go_on_hearing(course, &owner, attribution) {
-                let result = course.ask(&mut owner, &self.ask, Form::Plain, give_up, take);
+                let result = put(course, &mut owner, &self.ask, Form::Plain, give_up, take);
                 return owner.unless_echoed(&self.ask, result, give_up);
             }
             if std::mem::take(&mut asks) {
@@ -118,7 +118,7 @@ impl<'b> Call<'b, '_> {
                     _ => self.none_settled(tried, &owner),
                 });
             }
-            if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(&owner, unit)) {
+            if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(|| owner.asked(unit))) {
                 return Ok((owner, Question::Same(form)));
             }
             match owner.next(&self.ask, tried, in_time, apart) {
@@ -169,16 +169,16 @@ impl<'b> Call<'b, '_> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
         let (&Request::ReadHolding { address, count: asked, .. }, Some(unit)) = (self.ask.request, self.unit) else {
-            return course.ask(owner, &self.ask, Form::Plain, give_up, take);
+            return put(course, owner, &self.ask, Form::Plain, give_up, take);
         };
         let Ok(request) = Request::read(address, count) else {
-            return course.ask(owner, &self.ask, Form::Plain, give_up, take);
+            return put(course, owner, &self.ask, Form::Plain, give_up, take);
         };
         if !again && owner.master.in_quarantine(owner.now(), unit) {
             owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
         }
         let ask = Ask { request: &request, in_doubt: again, ..self.ask };
-        let result = course.ask(owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
+        let result = put(course, owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
         if count > asked {
             match &result {
                 Ok(_) => owner.longer.given(unit, address),
@@ -241,13 +241,13 @@ impl<'b> Call<'b, '_> {
             Ok(done) if is_last => (Some(done.sent), Some(done.ended)),
             Ok(_) => {
                 // What this call left open before may still come; it is an answer like this one.
-                course.repeats(owner, unit, again);
+                course.repeats(again, || owner.asked(unit));
                 return Ok(None);
             }
             Err(error) => {
                 let Failure::Refused { function, code } = error.failure else {
                     let result = Err(error);
-                    course.leaves_open(owner, &self.ask, Form::Repeated, &result);
+                    course.leaves_open(&self.ask, Form::Repeated, &result, |unit| owner.asked(unit));
                     return result.map(|_: Done| None);
                 };
                 if agreement.hear(unit, &Answer::exception(function, code)) {
@@ -263,6 +263,21 @@ impl<'b> Call<'b, '_> {
         course.hearing = None;
         Err(self.ask.failed(failure, sent, ended, &[]))
     }
+}
+
+/// Asks in this form, and has `course` remember whether the same may be asked again.
+fn put(
+    course: &mut Course,
+    owner: &mut Owner,
+    ask: &Ask<'_>,
+    form: Form,
+    give_up: &mut dyn FnMut() -> bool,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<Done, Box<CallError>> {
+    course.asks(owner.now());
+    let result = owner.exchange(ask, give_up, take);
+    course.leaves_open(ask, form, &result, |unit| owner.asked(unit));
+    result
 }
 
 /// Whether a refusal came, whatever it was meant for.

@@ -1,14 +1,14 @@
 //! The attempts of one call: how long they may take, how many requests, what one leaves to the next, and after which failure
-//! there is a next.
+//! there is a next. Here it is counted only; who sends is in `attempt`.
 
 use std::time::Duration;
 
-use drivebus_rtu::{Agreement, Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Agreement, Destination, Instant, Request, UnitAddress};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
+use crate::health::stats::Asked;
 use crate::line::PortErrorKind;
-use crate::owner::{Asked, Owner};
 
 /// How many more attempts than questions there may be: those that end with a probe.
 const PROBED_IN_VAIN: u32 = 4;
@@ -125,32 +125,17 @@ impl Course {
         self.asked
     }
 
-    /// Asks in this form, and remembers whether the same may be asked again.
-    pub(crate) fn ask(
-        &mut self,
-        owner: &mut Owner,
-        ask: &Ask<'_>,
-        form: Form,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        self.asks(owner.now());
-        let result = owner.exchange(ask, give_up, take);
-        self.leaves_open(owner, ask, form, &result);
-        result
-    }
-
-    /// Remembers whether what came of `ask` lets the same be asked again.
+    /// Remembers whether what came of `ask` in this form lets the same be asked again. `asked` tells what a unit was asked.
     pub(crate) fn leaves_open(
         &mut self,
-        owner: &Owner,
         ask: &Ask<'_>,
         form: Form,
         result: &Result<Done, Box<CallError>>,
+        asked: impl FnOnce(UnitAddress) -> Asked,
     ) {
         self.left_open = match (result, ask.destination, ask.request) {
             (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
-                Some((owner.asked(unit), form))
+                Some((asked(unit), form))
             }
             _ => None,
         };
@@ -167,15 +152,15 @@ impl Course {
         self.until = self.until.map(|until| until + longer);
     }
 
-    /// The question is repeated, `again` where all that `unit` owes is the answer to it.
-    pub(crate) fn repeats(&mut self, owner: &Owner, unit: UnitAddress, again: bool) {
-        self.left_open = again.then(|| (owner.asked(unit), Form::Repeated));
+    /// The question is repeated, `again` where all that its unit owes is the answer to it. `asked` tells what that was asked.
+    pub(crate) fn repeats(&mut self, again: bool, asked: impl FnOnce() -> Asked) {
+        self.left_open = again.then(|| (asked(), Form::Repeated));
     }
 
-    /// How the question was put, if all that `unit` owes is the answer to this very one, so that it may be asked again as it
-    /// was. Says so once.
-    pub(crate) fn owes_only_this(&mut self, owner: &Owner, unit: UnitAddress) -> Option<Form> {
-        self.left_open.take().filter(|(then, _)| *then == owner.asked(unit)).map(|(_, form)| form)
+    /// How the question was put, if all that its unit owes is the answer to this very one, so that it may be asked again as
+    /// it was. `asked` tells what the unit was asked. Says so once.
+    pub(crate) fn owes_only_this(&mut self, asked: impl FnOnce() -> Asked) -> Option<Form> {
+        self.left_open.take().filter(|(then, _)| *then == asked()).map(|(_, form)| form)
     }
 
     /// The question is put in another way the next time.

@@ -8,6 +8,7 @@ use super::*;
 use crate::line::PortError;
 use crate::nobody;
 use crate::options::AdapterEcho;
+use crate::owner::Owner;
 use crate::owner::resync::FreshWords;
 
 const TIMEOUT: Duration = Duration::from_millis(100);
@@ -245,7 +246,7 @@ fn after(
     };
     let mut course = Course::new(TIMEOUT, 1);
     let result = result.map_err(|failure| Box::new(failed(failure, at(0))));
-    course.leaves_open(owner, &ask, form, &result);
+    course.leaves_open(&ask, form, &result, |unit| owner.asked(unit));
     course
 }
 
@@ -261,24 +262,24 @@ fn only_a_read_that_brought_no_answer_may_be_asked_again_as_it_was() {
     for form in [Form::Plain, Form::Apart(3), Form::Repeated] {
         for failure in unanswered() {
             let mut course = after(&owner, UNIT.into(), &read, form, Err(failure));
-            assert_eq!(course.owes_only_this(&owner, UNIT), Some(form));
-            assert_eq!(course.owes_only_this(&owner, UNIT), None, "it is said once");
+            assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(form));
+            assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "it is said once");
         }
     }
     let answered = passing().into_iter().filter(|failure| !unanswered().contains(failure));
     for failure in answered.chain(final_ones()) {
         let mut course = after(&owner, UNIT.into(), &read, Form::Plain, Err(failure.clone()));
-        assert_eq!(course.owes_only_this(&owner, UNIT), None, "{failure:?}");
+        assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "{failure:?}");
     }
     let done = Done { sent: at(0), ended: at(10) };
-    assert_eq!(after(&owner, UNIT.into(), &read, Form::Plain, Ok(done)).owes_only_this(&owner, UNIT), None);
+    assert_eq!(after(&owner, UNIT.into(), &read, Form::Plain, Ok(done)).owes_only_this(|| owner.asked(UNIT)), None);
     // What acts may have acted.
     for request in [Request::write(100, 5), Request::write_many(100, &[5]).unwrap(), Request::echo(7)] {
         let mut course = after(&owner, UNIT.into(), &request, Form::Plain, Err(SILENCE));
-        assert_eq!(course.owes_only_this(&owner, UNIT), None, "{request:?}");
+        assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "{request:?}");
     }
     let mut broadcast = after(&owner, Destination::Broadcast, &read, Form::Plain, Err(SILENCE));
-    assert_eq!(broadcast.owes_only_this(&owner, UNIT), None);
+    assert_eq!(broadcast.owes_only_this(|| owner.asked(UNIT)), None);
 }
 
 #[test]
@@ -286,24 +287,24 @@ fn who_asked_something_else_in_between_may_have_left_that_open() {
     let owner = owner();
     let mut course = lost_read(&owner, Form::Plain);
     owner.stats().units.entry(UNIT).or_default().requests += 1;
-    assert_eq!(course.owes_only_this(&owner, UNIT), None, "another request");
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "another request");
     let mut course = lost_read(&owner, Form::Plain);
     owner.stats().reconnects += 1;
-    assert_eq!(course.owes_only_this(&owner, UNIT), None, "another connection");
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "another connection");
     let mut course = lost_read(&owner, Form::Plain);
     owner.stats().units.entry(UnitAddress::MAX).or_default().requests += 1;
-    assert_eq!(course.owes_only_this(&owner, UNIT), Some(Form::Plain), "another unit's is no rival");
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(Form::Plain), "another unit's is no rival");
 }
 
 #[test]
 fn a_question_that_is_repeated_goes_on_only_where_nothing_else_is_owed() {
     let owner = owner();
     let mut course = Course::new(TIMEOUT, 0);
-    course.repeats(&owner, UNIT, false);
-    assert_eq!(course.owes_only_this(&owner, UNIT), None);
-    course.repeats(&owner, UNIT, true);
-    assert_eq!(course.owes_only_this(&owner, UNIT), Some(Form::Repeated));
+    course.repeats(false, || owner.asked(UNIT));
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None);
+    course.repeats(true, || owner.asked(UNIT));
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(Form::Repeated));
     let mut course = lost_read(&owner, Form::Apart(2));
     course.asks_otherwise();
-    assert_eq!(course.owes_only_this(&owner, UNIT), None, "it is put in another way");
+    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "it is put in another way");
 }
