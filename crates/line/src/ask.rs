@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_rtu::{Adu, Destination, Instant, Request};
 
 use crate::error::{CallError, Failure};
-use crate::turns::queue::Queue;
+use crate::turns::queue::Stops;
 
 /// One request on its way.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +21,7 @@ pub(crate) struct Ask<'a> {
     /// Whether it goes out at once, even to a unit that may still answer something else.
     pub(crate) in_doubt: bool,
     /// Where stops wait that go before it, even when it is on its way: its unit was silent the last time.
-    pub(crate) yields: Option<&'a Queue>,
+    pub(crate) yields: Option<&'a dyn Stops>,
 }
 
 /// When an exchange happened, on the line's clock.

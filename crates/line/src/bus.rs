@@ -13,6 +13,7 @@ use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, UnitAddres
 
 use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
+use crate::bus::errand::Errand;
 use crate::error::{CallError, Failure};
 use crate::health::link::{Link, Links};
 use crate::health::stats::Stats;
@@ -25,7 +26,7 @@ use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
 use crate::system::process::Process;
 use crate::system::punctual;
 use crate::turns::order::Priority;
-use crate::turns::queue::{NoTurn, Queue};
+use crate::turns::queue::{NoTurn, Queue, Stops};
 
 /// One line and its owner.
 ///
@@ -33,7 +34,7 @@ use crate::turns::queue::{NoTurn, Queue};
 /// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
-    pub(crate) queue: Arc<Queue>,
+    pub(crate) queue: Arc<Queue<Errand>>,
     owner: Mutex<Owner>,
     /// What can be asked for while somebody waits on the line.
     stats: Arc<Mutex<Stats>>,
@@ -243,7 +244,7 @@ impl Bus {
             learns: learns && options.timeout.is_none(),
             gap,
             in_doubt: options.in_doubt,
-            yields: (options.priority != Some(Priority::Stop)).then_some(&*self.queue),
+            yields: (options.priority != Some(Priority::Stop)).then_some(&*self.queue as &dyn Stops),
         }
     }
 

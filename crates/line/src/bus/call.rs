@@ -20,6 +20,7 @@ use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 use crate::ask::{Ask, Done};
 use crate::bus::Bus;
 use crate::bus::call::course::{Course, is_unanswered};
+use crate::bus::errand::Errand;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::owner::dead_units::Verdict;
@@ -82,7 +83,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// As [`run`](Self::run), for who has the turn.
     pub(crate) fn run_in(
         &mut self,
-        mut turn: Turn<'b>,
+        mut turn: Turn<'b, Errand>,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
@@ -117,7 +118,7 @@ impl<'b, 'r> Call<'b, 'r> {
         })
     }
 
-    fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b>, Box<CallError>> {
+    fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b, Errand>, Box<CallError>> {
         self.bus.queue.turn(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))
     }
 
@@ -133,7 +134,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// A unit that was silent lately waits off the line, while others use it, for as long as it would have been silent.
     fn spare_the_others(
         &mut self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         unit: UnitAddress,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
@@ -172,7 +173,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// Leaves the line to others until `until`.
     pub(crate) fn stand_by(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         until: Instant,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
@@ -192,7 +193,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// Asks what may be asked once only.
     fn once(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         course: &mut Course,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
@@ -204,7 +205,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// Asks, and asks again as often as `course` says while nothing comes of it.
     fn repeat(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         course: &mut Course,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
@@ -237,7 +238,7 @@ impl<'b, 'r> Call<'b, 'r> {
     /// out over: behind another one, another unit may answer.
     fn write_value(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         course: &mut Course,
         address: u16,
         give_up: &mut dyn FnMut() -> bool,

@@ -7,6 +7,7 @@
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
+use std::thread;
 
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 
@@ -15,6 +16,7 @@ use crate::bus::Bus;
 use crate::bus::call::Call;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
+use crate::turns::crew::Employer;
 use crate::turns::order::{Priority, Ticket};
 use crate::turns::queue::{NoTurn, Queue, Turn};
 
@@ -80,7 +82,7 @@ impl Errand {
     }
 
     /// Asks, in the turn of this errand, and tells what came of it.
-    fn carry_out(mut self, bus: &Bus, turn: Turn<'_>) {
+    fn carry_out(mut self, bus: &Bus, turn: Turn<'_, Errand>) {
         // Always one: it was made of a request.
         let Some(request) = self.request() else { return };
         let mut pdu = Vec::new();
@@ -172,7 +174,7 @@ impl Bus {
             Destination::Broadcast => None,
         };
         let wanted = Arc::clone(&errand.wanted);
-        match self.queue.leave_work(priority, unit, errand, self) {
+        match self.queue.leave_work(priority, unit, errand, || Box::new(Worked(Arc::downgrade(self)))) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),
             Err((errand, why)) => {
                 let failure = if why == NoTurn::Full { self.no_turn(why) } else { Failure::Closed };
@@ -201,8 +203,23 @@ fn pdu_of(from: Destination, answer: &Answer<'_>) -> Vec<u8> {
     }
 }
 
+/// The bus that a crew works for.
+#[derive(Debug)]
+struct Worked(Weak<Bus>);
+
+impl Employer for Worked {
+    fn is_there(&self) -> bool {
+        self.0.strong_count() > 0
+    }
+
+    fn hire(&self) -> bool {
+        let bus = Weak::clone(&self.0);
+        thread::Builder::new().name(String::from("drivebus-worker")).spawn(move || work(&bus)).is_ok()
+    }
+}
+
 /// One of the crew: carries out what is next, until nothing comes for a while or the bus is gone.
-pub(crate) fn work(bus: &Weak<Bus>) {
+fn work(bus: &Weak<Bus>) {
     let Some(queue) = bus.upgrade().map(|bus| {
         bus.enter_thread();
         Arc::clone(&bus.queue)
@@ -219,10 +236,69 @@ pub(crate) fn work(bus: &Weak<Bus>) {
 }
 
 /// Leaves the crew however its thread ends.
-struct Member<'a>(&'a Queue);
+struct Member<'a>(&'a Queue<Errand>);
 
 impl Drop for Member<'_> {
     fn drop(&mut self) {
         self.0.leave_crew();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use drivebus_rtu::{SerialFormat, UnitAddress};
+
+    use super::*;
+    use crate::nobody;
+    use crate::options::BusOptions;
+
+    /// A system that gives threads which never come, or none.
+    #[derive(Debug)]
+    struct Gives(bool);
+
+    impl Employer for Gives {
+        fn is_there(&self) -> bool {
+            true
+        }
+
+        fn hire(&self) -> bool {
+            self.0
+        }
+    }
+
+    #[test]
+    fn who_is_told_that_there_is_no_thread_may_use_the_queue() {
+        let bus = Bus::open(nobody::opener(), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
+        let bus = Arc::new(bus);
+        bus.queue.lock().crew.works_for(|| Box::new(Gives(false)));
+        let (tell, told) = channel();
+        let queue = Arc::clone(&bus.queue);
+        let unit = UnitAddress::new(1).unwrap();
+        let errand = Errand::new(unit.into(), &Request::write(0x2000, 5), CallOptions::default(), move |outcome| {
+            tell.send((outcome.unwrap_err().failure, queue.state.try_lock().is_ok())).unwrap();
+        });
+        bus.send(errand);
+        assert_eq!(told.recv(), Ok((Failure::Closed, true)));
+    }
+
+    #[test]
+    fn whose_turn_has_come_waits_no_longer_however_late_its_thread_comes() {
+        let (tell, told) = channel();
+        let options = BusOptions { queue: 2, ..BusOptions::new(SerialFormat::DEFAULT) };
+        let bus = Arc::new(Bus::open(nobody::opener(), options, &mut || false).unwrap());
+        bus.queue.lock().crew.works_for(|| Box::new(Gives(true)));
+        let unit = UnitAddress::new(1).unwrap();
+        for number in 0..5 {
+            let tell = tell.clone();
+            bus.send(Errand::new(unit.into(), &Request::write(0x2000, 5), CallOptions::default(), move |outcome| {
+                tell.send((number, outcome.unwrap_err().failure)).unwrap();
+            }));
+        }
+        assert_eq!(
+            told.try_iter().collect::<Vec<_>>(),
+            [(3, Failure::QueueFull { room: 2 }), (4, Failure::QueueFull { room: 2 })]
+        );
     }
 }

@@ -11,7 +11,7 @@ use crate::error::{CallError, Failure};
 use crate::line::Line;
 use crate::owner::lumps::{Arrivals, Ended, Lumps};
 use crate::system::clock::LOOK_UP;
-use crate::turns::queue::Queue;
+use crate::turns::queue::Stops;
 
 /// How long before an answer can be whole it is waited for again, in characters and on top of them: the first bytes may
 /// have been handed over so much after they came. A receiver hands over what fills its FIFO, a machine wakes up late.
@@ -115,7 +115,7 @@ fn follow(
                 return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
             }
             let quiet = out.map_or(Duration::ZERO, |out| now.saturating_duration_since(arrivals.last().max(out)));
-            if quiet >= STOP_WAITS && ask.yields.is_some_and(Queue::has_stop) {
+            if quiet >= STOP_WAITS && ask.yields.is_some_and(Stops::has_stop) {
                 master.abort(now);
                 return Err(ask.failed(Failure::NoAnswer { timeout: quiet, attempts: 1 }, sent, now, &[]));
             }
@@ -218,8 +218,11 @@ mod tests {
 
     use super::*;
     use crate::line::PortError;
-    use crate::turns::crew::Waiter;
     use crate::turns::order::Priority;
+    use crate::turns::queue::Waiter;
+
+    /// A queue in which no work is left.
+    type Queue = crate::turns::queue::Queue<()>;
 
     /// A line on which nobody answers, or somebody says a byte now and then. Time passes only while it is waited on.
     #[derive(Debug, Default)]
@@ -269,7 +272,7 @@ mod tests {
             learns: false,
             gap: Duration::ZERO,
             in_doubt: true,
-            yields,
+            yields: yields.map(|queue| queue as &dyn Stops),
         };
         let mut master = Master::new(&SerialFormat::DEFAULT);
         let known = (None, &mut Lumps::of(line));

@@ -1,36 +1,64 @@
 //! Whose turn it is: one owner of the line at a time. Who waits sleeps until it is called; who is called is decided by
 //! [`Order`] at the last moment, so that a stop that comes while the next one wakes up still goes first.
 
+mod work;
+
+use std::fmt;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
 
 use drivebus_rtu::UnitAddress;
 
 use crate::system::clock::{LOOK_UP, monotonic};
-use crate::turns::crew::{Crew, Waiter};
+use crate::turns::crew::Crew;
 use crate::turns::order::{Order, Priority, Ticket};
 
 /// More than any program means to have under way, and some tens of megabytes.
 pub(crate) const DEFAULT_QUEUE: usize = 65_536;
 
+/// Who waits for the line.
+#[derive(Debug)]
+pub(crate) enum Waiter<W> {
+    /// A thread that will use it.
+    Thread(Thread),
+    /// What one of the crew is to do with it.
+    Work(W),
+}
+
+impl<W> Waiter<W> {
+    fn into_work(self) -> Option<W> {
+        match self {
+            Self::Work(work) => Some(work),
+            Self::Thread(_) => None,
+        }
+    }
+}
+
+/// What tells whether a stop waits for the line.
+pub(crate) trait Stops: fmt::Debug + Send + Sync {
+    /// Whether one waits.
+    fn has_stop(&self) -> bool;
+}
+
 /// A queue at the line. The calling thread itself works on the line when its turn comes, so that a lone caller pays
 /// for no hand-over.
 ///
-/// Work that is left here waits in the same order, without a thread: one of the [`Crew`] is called when its turn comes.
+/// Work (`W`) that is left here waits in the same order, without a thread: one of the [`Crew`] is called when its turn
+/// comes.
 #[derive(Debug)]
-pub(crate) struct Queue {
+pub(crate) struct Queue<W> {
     /// How many may wait, stops aside.
     pub(crate) room: usize,
-    pub(crate) state: Mutex<State>,
+    pub(crate) state: Mutex<State<W>>,
     /// Where the crew waits to be called.
     pub(crate) called: Condvar,
 }
 
-#[derive(Debug, Default)]
-pub(crate) struct State {
+#[derive(Debug)]
+pub(crate) struct State<W> {
     pub(crate) owner: Option<(Ticket, Thread)>,
     /// While the line is free and somebody waits, the next one has been called.
-    pub(crate) order: Order<Waiter>,
+    pub(crate) order: Order<Waiter<W>>,
     pub(crate) crew: Crew,
 }
 
@@ -47,18 +75,18 @@ pub(crate) enum NoTurn {
 
 /// The right to use the line, until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Turn<'a> {
-    pub(crate) queue: &'a Queue,
+pub(crate) struct Turn<'a, W> {
+    pub(crate) queue: &'a Queue<W>,
     pub(crate) ticket: Ticket,
 }
 
-impl Default for Queue {
+impl<W> Default for Queue<W> {
     fn default() -> Self {
         Self::with_room(DEFAULT_QUEUE)
     }
 }
 
-impl Queue {
+impl<W> Queue<W> {
     /// A queue in which `room` may wait, stops aside.
     pub(crate) fn with_room(room: usize) -> Self {
         Self { room, state: Mutex::default(), called: Condvar::new() }
@@ -76,7 +104,7 @@ impl Queue {
         priority: Priority,
         unit: Option<UnitAddress>,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Turn<'_>, NoTurn> {
+    ) -> Result<Turn<'_, W>, NoTurn> {
         self.enter(priority, unit, self.room, give_up)
     }
 
@@ -86,7 +114,7 @@ impl Queue {
         priority: Priority,
         unit: Option<UnitAddress>,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Turn<'_>, NoTurn> {
+    ) -> Result<Turn<'_, W>, NoTurn> {
         self.enter(priority, unit, usize::MAX, give_up)
     }
 
@@ -96,7 +124,7 @@ impl Queue {
         unit: Option<UnitAddress>,
         room: usize,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Turn<'_>, NoTurn> {
+    ) -> Result<Turn<'_, W>, NoTurn> {
         let thread = thread::current();
         let mut state = self.lock();
         let is_free = state.owner.is_none() && state.order.is_empty();
@@ -124,24 +152,40 @@ impl Queue {
         self.lock().has(thread::current().id())
     }
 
-    /// Whether a stop waits.
-    pub(crate) fn has_stop(&self) -> bool {
-        self.lock().order.has_stop()
-    }
-
     /// How many wait.
     #[cfg(test)]
     pub(crate) fn waiting(&self) -> usize {
         self.lock().order.waiting().count()
     }
 
+    /// Wakes who is next, if the line is free. It looks for itself whether it still is.
+    ///
+    /// Nobody counts on a thread that has had its turn and comes back: first it tells what came of it, and who is told may
+    /// take long.
+    fn call_next(&self, state: MutexGuard<'_, State<W>>) {
+        if state.owner.is_some() {
+            return;
+        }
+        match state.order.next() {
+            Some(Waiter::Thread(thread)) => thread.unpark(),
+            Some(Waiter::Work(_)) => self.call_crew(state),
+            None => {}
+        }
+    }
+
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
-    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, State<W>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Turn<'_> {
+impl<W: fmt::Debug + Send> Stops for Queue<W> {
+    fn has_stop(&self) -> bool {
+        self.lock().order.has_stop()
+    }
+}
+
+impl<W> Turn<'_, W> {
     /// Lets the stops that wait go first, and comes back with the turn; `false` when `give_up` said so before, and the
     /// turn is lost then. Who steps aside stays ahead of all who are no stops.
     ///
@@ -194,13 +238,19 @@ impl Turn<'_> {
     }
 }
 
-impl Drop for Turn<'_> {
+impl<W> Drop for Turn<'_, W> {
     fn drop(&mut self) {
         self.leave();
     }
 }
 
-impl State {
+impl<W> Default for State<W> {
+    fn default() -> Self {
+        Self { owner: None, order: Order::default(), crew: Crew::default() }
+    }
+}
+
+impl<W> State<W> {
     /// Whether who comes with `priority` finds no room among the `room` who may wait. A stop always does.
     ///
     /// On a free line the next has been called: it counts no longer, however late its thread comes.

@@ -8,6 +8,7 @@ use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request};
 use crate::ask::{Ask, Done};
 use crate::bus::call::course::{Course, Form, Hearing};
 use crate::bus::call::{Call, is_silence};
+use crate::bus::errand::Errand;
 use crate::error::{CallError, Failure};
 use crate::owner::resync::Tried;
 use crate::owner::{Next, Owner};
@@ -33,7 +34,7 @@ impl<'b> Call<'b, '_> {
     /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
     pub(crate) fn attempt(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         course: &mut Course,
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
@@ -88,7 +89,7 @@ impl<'b> Call<'b, '_> {
     /// Does what has to come before the question, and comes back with the line when it may be put.
     fn until_sure(
         &self,
-        turn: &mut Turn<'b>,
+        turn: &mut Turn<'b, Errand>,
         course: &mut Course,
         tried: &mut Tried,
         apart: bool,

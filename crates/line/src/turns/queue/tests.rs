@@ -7,6 +7,9 @@ use super::*;
 
 use Priority::{Poll, Read, Stop, Write};
 
+/// A queue in which no work is left.
+type Queue = super::Queue<()>;
+
 fn unit(raw: u8) -> Option<UnitAddress> {
     UnitAddress::new(raw).ok()
 }
