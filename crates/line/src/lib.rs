@@ -37,7 +37,8 @@ mod turns;
 
 pub use ask::Done;
 pub use bus::Bus;
-pub use bus::errand::{Errand, Reply, Running};
+pub use bus::errand::{Errand, Reply};
+pub use bus::workers::Running;
 pub use error::{CallError, Failure};
 pub use health::hint::Hint;
 pub use health::link::Link;

@@ -18,9 +18,9 @@ use std::time::Duration;
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::ask::{Ask, Done};
-use crate::bus::Bus;
 use crate::bus::call::course::{Course, is_unanswered};
 use crate::bus::errand::Errand;
+use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::owner::dead_units::Verdict;
@@ -29,7 +29,7 @@ use crate::turns::queue::{NoTurn, Turn};
 
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
-    pub(crate) bus: &'b Bus,
+    pub(crate) bus: &'b Shared,
     pub(crate) ask: Ask<'r>,
     pub(crate) unit: Option<UnitAddress>,
     pub(crate) priority: Priority,
@@ -42,7 +42,7 @@ pub(crate) struct Call<'b, 'r> {
 }
 
 impl<'b, 'r> Call<'b, 'r> {
-    pub(crate) fn new(bus: &'b Bus, ask: Ask<'r>, options: CallOptions) -> Self {
+    pub(crate) fn new(bus: &'b Shared, ask: Ask<'r>, options: CallOptions) -> Self {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         Self {
             bus,
@@ -51,7 +51,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 Destination::Broadcast => None,
             },
             priority: options.priority.unwrap_or(kind),
-            retries: options.retries.unwrap_or(bus.options().retries),
+            retries: options.retries.unwrap_or(bus.options.retries),
             verify: options.verify,
             read_back: options.read_back.filter(|_| ask.request.is_write()),
             connection: options.connection,

@@ -45,17 +45,18 @@ impl Bus {
     ) -> Result<(), Failure> {
         let end = self.now() + time;
         loop {
-            let _turn = self.queue.turn(Priority::Poll, None, give_up).map_err(|why| self.no_turn(why))?;
-            let mut owner = self.lock();
+            let _turn =
+                self.shared.queue.turn(Priority::Poll, None, give_up).map_err(|why| self.shared.no_turn(why))?;
+            let mut owner = self.shared.lock();
             owner.prepare(give_up)?;
-            let now = self.now_of(&owner);
+            let now = self.shared.now_of(&owner);
             if now >= end {
                 return Ok(());
             }
             owner.hear(end.min(now + LOOK_UP), hear)?;
             drop(owner);
             if self.is_shut() || give_up() {
-                return Err(self.given_up());
+                return Err(self.shared.given_up());
             }
         }
     }

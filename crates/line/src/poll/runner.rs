@@ -237,7 +237,7 @@ mod tests {
                 scope.spawn(move || {
                     bus.call(unit.into(), &request, options, &mut || false, &mut |_| ()).unwrap();
                 });
-                while bus.queue.waiting() < waiting {
+                while bus.waiting() < waiting {
                     thread::yield_now();
                 }
             }
