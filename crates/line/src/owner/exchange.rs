@@ -110,14 +110,10 @@ fn follow(
         }
         if now.saturating_duration_since(looked_up) >= LOOK_UP {
             looked_up = now;
-            if give_up() {
-                master.abort(now);
-                return Err(ask.failed(Failure::Interrupted, sent, now, &[]));
-            }
             let quiet = out.map_or(Duration::ZERO, |out| now.saturating_duration_since(arrivals.last().max(out)));
-            if quiet >= STOP_WAITS && ask.yields.is_some_and(Stops::has_stop) {
+            if let Some(failure) = ends_early(ask, quiet, give_up) {
                 master.abort(now);
-                return Err(ask.failed(Failure::NoAnswer { timeout: quiet, attempts: 1 }, sent, now, &[]));
+                return Err(ask.failed(failure, sent, now, &[]));
             }
         }
         let wake = now + LOOK_UP;
@@ -129,6 +125,16 @@ fn follow(
             until = now;
         }
     }
+}
+
+/// Why the wait ends before its time, if it does: its caller gave up, or a stop waits and it was `quiet` for so long.
+#[cold]
+fn ends_early(ask: &Ask<'_>, quiet: Duration, give_up: &mut dyn FnMut() -> bool) -> Option<Failure> {
+    if give_up() {
+        return Some(Failure::Interrupted);
+    }
+    let gives_way = quiet >= STOP_WAITS && ask.yields.is_some_and(Stops::has_stop);
+    gives_way.then_some(Failure::NoAnswer { timeout: quiet, attempts: 1 })
 }
 
 /// Asks `give_up` where no answer came: time-outs may be shorter than the time between two looks, and retries many.
