@@ -10,14 +10,14 @@
 //! | room | what is in it |
 //! | --- | --- |
 //! | `line`, `error` | what every kind of line promises; what can become of a call |
-//! | `ask`, `options` | one request as it goes to the line; what may be told to do otherwise |
 //! | `by_unit` | what is kept of each unit |
 //! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
 //! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
-//! | `turns` | whose turn it is at the line |
-//! | `health` | what is counted, and what the figures most likely mean |
-//! | `owner` | who has the line, one exchange at a time: what is known of it and of its units |
-//! | `bus` | the line as its callers see it: calls, errands, listening |
+//! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
+//! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
+//! | `health` | what is counted, how well each unit is reached, and what the figures most likely mean |
+//! | `owner` | who has the turn: what is known of the line and its units, and one exchange at a time |
+//! | `bus` | the bus as its callers see it: calls, errands, listening |
 //! | `poll` | what a bus asks again and again by itself |
 
 mod ask;
