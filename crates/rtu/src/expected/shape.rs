@@ -19,22 +19,10 @@
 //!
 //! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.21. A request that is not as it says has a free answer.
 
-use core::fmt;
-
-use super::AnswerError;
-
-/// Bytes of a request after its function code that an answer can be held to repeat.
-const MOST: usize = 6;
+use crate::answer::{AnswerError, Head, MOST};
 
 /// Most bytes of data behind one byte count.
 const MAX_DATA: u16 = 251;
-
-/// The first bytes after the function code, as they stand in a request or an answer. Displays as hex.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Head {
-    bytes: [u8; MOST],
-    len: u8,
-}
 
 /// What an answer must look like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,35 +44,9 @@ enum Rest {
     Queue,
 }
 
-impl Head {
-    /// The first `len` of `bytes`, or as many as can be kept.
-    fn of(bytes: &[u8], len: usize) -> Self {
-        let mut head = Self::default();
-        for (slot, &byte) in head.bytes.iter_mut().zip(bytes.iter().take(len)) {
-            *slot = byte;
-            head.len += 1;
-        }
-        head
-    }
-
-    fn as_bytes(&self) -> &[u8] {
-        self.bytes.get(..usize::from(self.len)).unwrap_or_default()
-    }
-}
-
-impl fmt::Display for Head {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, byte) in self.as_bytes().iter().enumerate() {
-            let space = if index == 0 { "" } else { " " };
-            write!(f, "{space}{byte:02X}")?;
-        }
-        Ok(())
-    }
-}
-
 impl Shape {
     /// Any answer will do.
-    const FREE: Self = Self { repeats: Head { bytes: [0; MOST], len: 0 }, rest: Rest::Free };
+    const FREE: Self = Self { repeats: Head::NONE, rest: Rest::Free };
 
     /// What the answer to the request `pdu` must look like.
     pub(super) fn of_answer_to(pdu: &[u8]) -> Self {
@@ -146,8 +108,8 @@ impl Shape {
     pub(super) fn check(&self, pdu: &[u8]) -> Result<(), AnswerError> {
         let wrong = Err(AnswerError::Length { len: pdu.len() });
         let data = pdu.get(1..).unwrap_or_default();
-        let came = Head::of(data, self.repeats.len.into());
-        if came.len < self.repeats.len {
+        let came = Head::of(data, self.repeats.len());
+        if came.len() < self.repeats.len() {
             return wrong;
         }
         if came != self.repeats {
