@@ -1,6 +1,6 @@
 //! Evidence: how well a fact is documented, and so whether it may be used without being asked for by name.
 
-use crate::command::Command;
+use crate::parts::command::Command;
 use crate::profile::Profile;
 
 /// How well documents of the family prove a fact.

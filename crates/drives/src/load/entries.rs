@@ -8,8 +8,8 @@ use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
 use crate::entry::{Entry, Kind};
-use crate::lookup::{closest, group, names, parse_code};
-use crate::memory::Memory;
+use crate::parts::memory::Memory;
+use crate::profile::lookup::{closest, group, names, parse_code};
 
 /// The registers and parameters, and where each address is.
 #[derive(Debug, Default)]

@@ -5,8 +5,8 @@ use super::manifest::{Extends, Manifest, line};
 use super::placed::Placed;
 use super::problems::Problems;
 use crate::evidence::Evidence;
-use crate::lookup::{closest, names};
 use crate::profile::Profile;
+use crate::profile::lookup::{closest, names};
 
 /// Tables whose rules a sibling can confirm as a whole.
 const TABLES: [&str; 10] =

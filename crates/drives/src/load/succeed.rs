@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use crate::entry::{Entry, Kind};
 use crate::evidence::Evidence;
-use crate::lookup::names;
 use crate::profile::Profile;
+use crate::profile::lookup::names;
 
 /// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in
 /// whose place something else stands now lose their roles.

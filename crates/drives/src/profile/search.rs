@@ -1,9 +1,9 @@
 //! Search: registers and parameters by what somebody remembers of them.
 
 use crate::entry::Entry;
-use crate::lookup::{names, near};
 use crate::profile::Profile;
-use crate::synonyms::SYNONYMS;
+use crate::profile::lookup::{names, near};
+use crate::profile::synonyms::SYNONYMS;
 
 /// Nobody types more words than this; more only cost time.
 const MOST_WORDS: usize = 16;
@@ -136,7 +136,7 @@ fn rank(entry: &Entry, word: &str) -> Option<u32> {
 mod tests {
     use super::{rank, terms, words};
     use crate::profile::Profile;
-    use crate::synonyms::SYNONYMS;
+    use crate::profile::synonyms::SYNONYMS;
 
     #[test]
     fn each_synonym_leads_to_a_row_of_a_shipped_profile() {

@@ -1,8 +1,8 @@
 //! Roles: what every drive has under some name, by the name it has in this family.
 
 use crate::entry::Entry;
+use crate::parts::setpoint::Setpoint;
 use crate::profile::Profile;
-use crate::setpoint::Setpoint;
 
 /// The registers that have a role beyond being read and written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

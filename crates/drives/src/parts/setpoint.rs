@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::command::Control;
+use crate::parts::command::Control;
 
 /// What a drive can be given over the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]

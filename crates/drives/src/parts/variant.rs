@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::lookup::closest;
 use crate::profile::Profile;
+use crate::profile::lookup::closest;
 use crate::quantity::Quantity;
 
 /// A parameter that decides what some registers mean.
