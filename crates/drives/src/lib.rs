@@ -32,6 +32,19 @@
 //! A family is a folder: `profile.toml` holds the rules, `registers.csv`, `parameters.csv` and `faults.csv` the long
 //! tables, each row with its source. Shipped profiles are part of the program; [`Profile::builtin_names`] lists them.
 //!
+//! # Rooms
+//!
+//! Each rests on those before it.
+//!
+//! | room | what is in it |
+//! | --- | --- |
+//! | `decimal`, `text`, `evidence` | exact numbers, text as people write it, how well a fact is proved |
+//! | `value`, `quantity`, `bits`, `entry` | what a word means, and the register or parameter that holds it |
+//! | `plan` | many words in the cheapest reads |
+//! | `parts` | what a profile is made of beside its entries: commands, states, faults, … |
+//! | `profile` | all that is known of a family, and the questions it answers |
+//! | `load` | how a profile comes into being: read from a folder, and checked |
+//!
 //! # Decisions
 //!
 //! * Scaling is decimal arithmetic on digits. A float goes in by its shortest decimal form, so `0.29` means 0.29, and
@@ -50,6 +63,7 @@ mod parts;
 mod plan;
 mod profile;
 mod quantity;
+mod text;
 mod value;
 
 pub use bits::BitField;

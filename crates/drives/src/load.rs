@@ -29,7 +29,7 @@ use manifest::Manifest;
 use problems::Problems;
 
 use crate::profile::Profile;
-use crate::profile::lookup::closest;
+use crate::text::closest;
 
 /// The files of a profile.
 const FILES: [&str; 4] = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"];

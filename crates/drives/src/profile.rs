@@ -1,14 +1,16 @@
 //! Profiles: all that is known of one family of drives, and the questions it answers.
 //!
-//! How a profile comes into being is `load`'s business, how names are found `lookup`'s, what the family calls the things
-//! that every family has `roles`'.
+//! How a profile comes into being is `load`'s business. Questions that need more than a look into the profile have rooms
+//! below: names in `lookup`, what the family calls the things that every family has in `roles`, and so on.
 
 pub(crate) mod counts;
 pub(crate) mod lookup;
 pub(crate) mod read_plan;
+mod reasons;
 pub(crate) mod roles;
 mod search;
 mod synonyms;
+mod variants;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

@@ -15,8 +15,8 @@ use crate::entry::Entry;
 use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
 use crate::profile::Profile;
-use crate::profile::lookup::closest;
 use crate::profile::roles::Roles;
+use crate::text::closest;
 
 /// Reads and checks all of `files`, over `base`. What is wrong goes to `problems`; then there may be no profile.
 pub(super) fn profile(

@@ -18,8 +18,8 @@ use crate::parts::memory::Memory;
 use crate::parts::serial::SerialDefaults;
 use crate::parts::variant::{Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
-use crate::profile::lookup::parse_address;
 use crate::quantity::{Quantity, limits};
+use crate::text::parse_address;
 
 /// Checks that `low` ≤ `item` ≤ `high`.
 pub(super) fn within<T>(file: &File, item: &Placed<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>

@@ -6,10 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::entry::{Entry, Kind};
+use crate::entry::{Entry, Kind, names};
 use crate::evidence::Evidence;
 use crate::profile::Profile;
-use crate::profile::lookup::names;
 
 /// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in
 /// whose place something else stands now lose their roles.

@@ -70,9 +70,7 @@ impl std::str::FromStr for Command {
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         Self::ALL.into_iter().find(|command| command.name() == name).ok_or_else(|| ParseCommandError {
             name: name.to_owned(),
-            closest: crate::profile::lookup::closest(name, Self::ALL.into_iter().map(Self::name))
-                .unwrap_or_default()
-                .to_owned(),
+            closest: crate::text::closest(name, Self::ALL.into_iter().map(Self::name)).unwrap_or_default().to_owned(),
         })
     }
 }

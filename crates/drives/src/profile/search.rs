@@ -1,9 +1,9 @@
 //! Search: registers and parameters by what somebody remembers of them.
 
-use crate::entry::Entry;
+use crate::entry::{Entry, names};
 use crate::profile::Profile;
-use crate::profile::lookup::{names, near};
 use crate::profile::synonyms::SYNONYMS;
+use crate::text::near;
 
 /// Nobody types more words than this; more only cost time.
 const MOST_WORDS: usize = 16;
