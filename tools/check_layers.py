@@ -30,6 +30,9 @@ CRATES: dict[str, set[str]] = {
 # The trait of `line` and what its methods speak of: all that `sim` may name.
 LINE_TRAIT = {"Line", "LineClock", "PortError", "PortErrorKind"}
 
+# The rooms of `line`, each on those before it.
+ROOMS = ["line", "error", "by_unit", "system", "turns", "options", "ask", "ports", "health", "owner", "bus", "poll"]
+
 # What the pure crates must not know. Comments and strings do not count.
 FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "rtu": re.compile(r"\b(?:std|alloc)::|\bextern\s+crate\b|\bunsafe\b|\blog::|println!"),
@@ -199,6 +202,24 @@ def crate_findings(root: Path) -> Iterator[str]:
                 yield f"{path.relative_to(root)}: takes `{wrong}` of drivebus_line; its trait is {sorted(LINE_TRAIT)}"
 
 
+def room_findings(root: Path) -> Iterator[str]:
+    """Rules between the rooms of `line`. Tests may look anywhere."""
+    source = root / "crates/line/src"
+    for path in sorted(source.rglob("*.rs")):
+        room = path.relative_to(source).with_suffix("").parts[0]
+        if room in ("lib", "nobody") or path.stem == "tests":
+            continue
+        if room not in ROOMS:
+            yield f"{path.relative_to(root)}: which rooms may it use? Say so in tools/check_layers.py"
+            continue
+        below = ROOMS[: ROOMS.index(room) + 1]
+        for match in re.finditer(r"\bcrate::(\w+|\{)", code_of(path)):
+            if match[1] in ROOMS and match[1] not in below:
+                yield f"{path.relative_to(root)}: {room} must not use {match[1]}"
+            elif match[1] not in ROOMS:
+                yield f"{path.relative_to(root)}: names `{match[0]}`, and not the room it comes from"
+
+
 def imports(path: Path, package: Path) -> Iterator[tuple[int, str]]:
     """Each module of ours that *path* imports: its first name below the package, or `drivebus` for the package."""
     here = list(path.relative_to(package).with_suffix("").parts)
@@ -239,7 +260,7 @@ def python_findings(root: Path) -> Iterator[str]:
 
 def findings(root: Path) -> list[str]:
     """Everything that is wrong."""
-    return [*crate_findings(root), *python_findings(root)]
+    return [*crate_findings(root), *room_findings(root), *python_findings(root)]
 
 
 # For manifests.
@@ -276,6 +297,9 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line::{Line, Bus};\n//!", "takes `Bus` of drivebus_line"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line as line;\n//!", "takes `*` of drivebus_line"),
+    ("crates/line/src/turns/queue.rs", "use crate::", "use crate::bus::Bus;\nuse crate::", "turns must not use bus"),
+    ("crates/line/src/error.rs", "use crate::", "use crate::Bus;\nuse crate::", "names `crate::Bus`, and not the room"),
+    ("crates/line/src/new.rs", None, "\nuse crate::bus::Bus;\n", "new.rs: which rooms may it use"),
     ("python/drivebus/errors.py", None, "\nfrom drivebus import _native\n", "errors must not import _native"),
     ("python/drivebus/profile.py", None, "\nfrom .bus import Bus\n", "profile must not import bus"),
     ("python/drivebus/drive.py", None, "\nfrom ._native import crc16\n", "drive must not import _native"),

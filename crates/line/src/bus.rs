@@ -31,9 +31,9 @@ use crate::owner::opener::Opener;
 
 /// One line and its owner.
 ///
-/// The calling thread works on the line itself when its turn comes; others wait in the order of [`Priority`](crate::Priority). `give_up`
-/// is
-/// asked about every 50 ms while a call waits, and ends it with [`Failure::Interrupted`].
+/// The calling thread works on the line itself when its turn comes; others wait in the order of
+/// [`Priority`](crate::Priority). `give_up` is asked about every 50 ms while a call waits, and ends it with
+/// [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
     shared: Shared,
@@ -190,12 +190,6 @@ impl Bus {
         self.shared.options.format.t35().max(gap)
     }
 
-    /// How many wait for the line.
-    #[cfg(test)]
-    pub(crate) fn waiting(&self) -> usize {
-        self.shared.queue.waiting()
-    }
-
     /// Why a bus that [is closed](Self::is_closed) is.
     pub(crate) fn ended(&self) -> Failure {
         if self.is_shut() { Failure::Closed } else { Failure::Forked }
@@ -208,5 +202,13 @@ impl Drop for Bus {
         if self.shared.is_of_this_process() {
             self.shared.dismiss();
         }
+    }
+}
+
+#[cfg(test)]
+impl Bus {
+    /// How many wait for the line.
+    pub(crate) fn waiting(&self) -> usize {
+        self.shared.queue.waiting()
     }
 }

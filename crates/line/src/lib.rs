@@ -12,9 +12,9 @@
 //! | `line`, `error` | what every kind of line promises; what can become of a call |
 //! | `by_unit` | what is kept of each unit |
 //! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
-//! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
 //! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
 //! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
+//! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
 //! | `health` | what is counted, how well each unit is reached, and what the figures most likely mean |
 //! | `owner` | who has the turn: what is known of the line and its units, and one exchange at a time |
 //! | `bus` | the bus as its callers see it: calls, errands, listening |

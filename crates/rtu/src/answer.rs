@@ -111,7 +111,8 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// The answer that `pdu` is, by itself: whether it answers a request, [`Expected::judge`](crate::Expected::judge) tells.
+    /// The answer that `pdu` is, by itself: whether it answers a request, [`Expected::judge`](crate::Expected::judge)
+    /// tells.
     ///
     /// # Errors
     ///

@@ -152,7 +152,8 @@ impl Course {
         self.until = self.until.map(|until| until + longer);
     }
 
-    /// The question is repeated, `again` where all that its unit owes is the answer to it. `asked` tells what that was asked.
+    /// The question is repeated, `again` where all that its unit owes is the answer to it. `asked` tells what the unit was
+    /// asked.
     pub(crate) fn repeats(&mut self, again: bool, asked: impl FnOnce() -> Asked) {
         self.left_open = again.then(|| (asked(), Form::Repeated));
     }
