@@ -30,6 +30,22 @@ CRATES: dict[str, set[str]] = {
 # The trait of `line` and what its methods speak of: all that `sim` may name.
 LINE_TRAIT = {"Line", "LineClock", "PortError", "PortErrorKind"}
 
+# The rooms of `line`, each on those before it.
+LINE_ROOMS = [
+    "line",
+    "error",
+    "by_unit",
+    "system",
+    "turns",
+    "options",
+    "ask",
+    "ports",
+    "health",
+    "owner",
+    "bus",
+    "poll",
+]
+
 # What the pure crates must not know. Comments and strings do not count.
 FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "rtu": re.compile(r"\b(?:std|alloc)::|\bextern\s+crate\b|\bunsafe\b|\blog::|println!"),
@@ -42,7 +58,7 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
 }
 
 # The one file with `unsafe`, which says why: two ioctls that no crate offers.
-UNSAFE_ALLOWED = "crates/line/src/tty/low_latency.rs"
+UNSAFE_ALLOWED = "crates/line/src/ports/tty/low_latency.rs"
 
 # The rooms of the Python package, from the ground up: each may import those of the rows above its own.
 ROOMS: list[set[str]] = [
@@ -144,6 +160,24 @@ def crate_findings(root: Path) -> Iterator[str]:
             names = {name.split(" as ")[0].strip() for name in (match[1] or match[2] or "*").split(",")} - {""}
             for wrong in sorted(names - LINE_TRAIT):
                 yield f"{path.relative_to(root)}: takes `{wrong}` of drivebus_line; its trait is {sorted(LINE_TRAIT)}"
+
+
+def room_findings(root: Path) -> Iterator[str]:
+    """Rules between the rooms of `line`. Tests may look anywhere."""
+    source = root / "crates/line/src"
+    for path in sorted(source.rglob("*.rs")):
+        room = path.relative_to(source).with_suffix("").parts[0]
+        if room in ("lib", "nobody") or path.stem == "tests":
+            continue
+        if room not in LINE_ROOMS:
+            yield f"{path.relative_to(root)}: which rooms may it use? Say so in tools/check_layers.py"
+            continue
+        below = LINE_ROOMS[: LINE_ROOMS.index(room) + 1]
+        for match in re.finditer(r"\bcrate::(\w+|\{)", code_of(path)):
+            if match[1] in LINE_ROOMS and match[1] not in below:
+                yield f"{path.relative_to(root)}: {room} must not use {match[1]}"
+            elif match[1] not in LINE_ROOMS:
+                yield f"{path.relative_to(root)}: names `{match[0]}`, and not the room it comes from"
 
 
 def imports(path: Path, package: Path) -> Iterator[tuple[int, list[str]]]:
@@ -276,7 +310,7 @@ def habit_findings(root: Path) -> Iterator[str]:
 
 def findings(root: Path) -> list[str]:
     """Everything that is wrong."""
-    return [*crate_findings(root), *python_findings(root), *habit_findings(root)]
+    return [*crate_findings(root), *room_findings(root), *python_findings(root), *habit_findings(root)]
 
 
 # For manifests.
@@ -292,7 +326,7 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ("crates/rtu/src/crc.rs", "//!", "unsafe fn f() {}\n//!", "rtu/src/crc.rs: must not use `unsafe`"),
     ("crates/rtu/Cargo.toml", "[lints]\nworkspace = true", "", "crates/rtu/Cargo.toml: lacks [lints]"),
     ("Cargo.toml", 'unsafe_code = "deny"', 'unsafe_code = "warn"', "Cargo.toml: [workspace.lints.rust] lacks"),
-    ("crates/line/src/tty.rs", "//!", "unsafe fn f() {}\n//!", "line/src/tty.rs: must not use `unsafe`"),
+    ("crates/line/src/ports/tty.rs", "//!", "unsafe fn f() {}\n//!", "line/src/ports/tty.rs: must not use `unsafe`"),
     (
         "crates/drives/Cargo.toml",
         HEAD,
@@ -313,6 +347,9 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line::{Line, Bus};\n//!", "takes `Bus` of drivebus_line"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line as line;\n//!", "takes `*` of drivebus_line"),
+    ("crates/line/src/turns/queue.rs", "use crate::", "use crate::bus::Bus;\nuse crate::", "turns must not use bus"),
+    ("crates/line/src/error.rs", "use crate::", "use crate::Bus;\nuse crate::", "names `crate::Bus`, and not the room"),
+    ("crates/line/src/new.rs", None, "\nuse crate::bus::Bus;\n", "new.rs: which rooms may it use"),
     ("python/drivebus/errors.py", None, "\nfrom drivebus import _native\n", "errors must not import _native"),
     ("python/drivebus/profile/plan.py", None, "\nfrom drivebus.bus import Bus\n", "profile must not import bus"),
     ("python/drivebus/drive.py", None, "\nfrom ._native import crc16\n", "drive must not import _native"),

@@ -229,3 +229,8 @@ pub enum AccessError {
         label: String,
     },
 }
+
+/// What an entry is called.
+pub(crate) fn names(entry: &Entry) -> impl Iterator<Item = &str> {
+    std::iter::once(entry.name()).chain(entry.alias())
+}

@@ -1,8 +1,5 @@
 //! Evidence: how well a fact is documented, and so whether it may be used without being asked for by name.
 
-use crate::command::Command;
-use crate::profile::Profile;
-
 /// How well documents of the family prove a fact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Evidence {
@@ -34,29 +31,5 @@ impl Evidence {
             Self::Unverified => "no",
             Self::Assumed => "assumed",
         }
-    }
-}
-
-impl Profile {
-    /// Why `command` is not verified: its code, or the register it is written to. `None` where both are, or where there is
-    /// no such command.
-    pub fn command_reason(&self, command: Command) -> Option<&str> {
-        let known = self.commands.get(&command)?;
-        if !known.verified {
-            return Some(&self.commands_note);
-        }
-        let register = self.entry_at(self.command_address?)?;
-        (!register.verified()).then_some(&register.note)
-    }
-
-    /// Why what the state word means is not verified, or where it is. `None` where both are known, or where no state word
-    /// is.
-    pub fn state_reason(&self) -> Option<&str> {
-        let word = self.state.as_ref()?;
-        if !word.verified {
-            return Some(&word.note);
-        }
-        let register = self.entry(&word.register)?;
-        (register.evidence == Evidence::Assumed).then_some(&register.note)
     }
 }

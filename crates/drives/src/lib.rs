@@ -32,6 +32,19 @@
 //! A family is a folder: `profile.toml` holds the rules, `registers.csv`, `parameters.csv` and `faults.csv` the long
 //! tables, each row with its source. Shipped profiles are part of the program; [`Profile::builtin_names`] lists them.
 //!
+//! # Rooms
+//!
+//! Each rests on those before it.
+//!
+//! | room | what is in it |
+//! | --- | --- |
+//! | `decimal`, `text`, `evidence` | exact numbers, text as people write it, how well a fact is proved |
+//! | `value`, `quantity`, `bits`, `entry` | what a word means, and the register or parameter that holds it |
+//! | `plan` | many words in the cheapest reads |
+//! | `parts` | what a profile is made of beside its entries: commands, states, faults, … |
+//! | `profile` | all that is known of a family, and the questions it answers |
+//! | `load` | how a profile comes into being: read from a folder, and checked |
+//!
 //! # Decisions
 //!
 //! * Scaling is decimal arithmetic on digits. A float goes in by its shortest decimal form, so `0.29` means 0.29, and
@@ -42,52 +55,38 @@
 //!   knows no drive's settings, and named, so that a caller who read the parameter can check further.
 
 mod bits;
-mod command;
-mod counts;
 mod decimal;
 mod entry;
 mod evidence;
-mod fault;
-mod identification;
 mod load;
-mod lookup;
-mod memory;
+mod parts;
 mod plan;
 mod profile;
 mod quantity;
-mod read_plan;
-mod roles;
-mod rules;
-mod search;
-mod serial;
-mod setpoint;
-mod state;
-mod synonyms;
+mod text;
 mod value;
-mod variant;
-mod watchdog;
 
 pub use bits::BitField;
-pub use command::{Command, CommandCode, Control, ParseCommandError};
-pub use counts::Counts;
 pub use entry::{Access, AccessError, Entry, Kind, Store};
 pub use evidence::Evidence;
-pub use fault::{Exception, Fault};
-pub use identification::{Identification, Signature};
 pub use load::ProfileError;
-pub use lookup::NameError;
-pub use memory::{Memory, MemoryBit};
+pub use parts::command::{Command, CommandCode, Control, ParseCommandError};
+pub use parts::fault::{Exception, Fault};
+pub use parts::identification::{Identification, Signature};
+pub use parts::memory::{Memory, MemoryBit};
+pub use parts::rules::{Requests, UnitKind};
+pub use parts::serial::SerialDefaults;
+pub use parts::setpoint::{Setpoint, SetpointRole};
+pub use parts::state::{State, StateRule, StateWord};
+pub use parts::variant::{Variant, VariantChoice, VariantError};
+pub use parts::watchdog::Watchdog;
 pub use plan::{ReadCost, ReadSpan, plan_reads};
 pub use profile::Profile;
+pub use profile::counts::Counts;
+pub use profile::lookup::NameError;
+pub use profile::read_plan::ReadPlan;
 pub use quantity::Quantity;
-pub use read_plan::ReadPlan;
-pub use rules::{Requests, UnitKind};
-pub use serial::SerialDefaults;
-pub use setpoint::{Setpoint, SetpointRole};
-pub use state::{State, StateRule, StateWord};
 pub use value::{Input, Limits, Value, ValueError};
-pub use variant::{Variant, VariantChoice, VariantError};
-pub use watchdog::Watchdog;
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

@@ -28,8 +28,8 @@ use std::sync::{Arc, OnceLock};
 use manifest::Manifest;
 use problems::Problems;
 
-use crate::lookup::closest;
 use crate::profile::Profile;
+use crate::text::closest;
 
 /// The files of a profile.
 const FILES: [&str; 4] = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"];

@@ -1,24 +1,33 @@
 //! Profiles: all that is known of one family of drives, and the questions it answers.
 //!
-//! How a profile comes into being is `load`'s business, how names are found `lookup`'s, what the family calls the things
-//! that every family has `roles`'.
+//! How a profile comes into being is `load`'s business. Questions that need more than a look into the profile have rooms
+//! below: names in `lookup`, what the family calls the things that every family has in `roles`, and so on.
+
+pub(crate) mod counts;
+pub(crate) mod lookup;
+pub(crate) mod read_plan;
+mod reasons;
+pub(crate) mod roles;
+mod search;
+mod synonyms;
+mod variants;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::command::{Command, CommandCode, Control};
 use crate::entry::{Access, AccessError, Entry, Kind, Store};
-use crate::fault::{Exception, Fault};
-use crate::identification::{Identification, Signature};
-use crate::memory::{Memory, MemoryBit};
+use crate::parts::command::{Command, CommandCode, Control};
+use crate::parts::fault::{Exception, Fault};
+use crate::parts::identification::{Identification, Signature};
+use crate::parts::memory::{Memory, MemoryBit};
+use crate::parts::rules::{Groups, Requests, UnitKind};
+use crate::parts::serial::{SerialDefaults, USUAL_READ_COST};
+use crate::parts::setpoint::{Setpoint, SetpointRole};
+use crate::parts::state::{State, StateWord};
+use crate::parts::variant::Variant;
+use crate::parts::watchdog::Watchdog;
 use crate::plan::{ReadRules, ReadSpan, plan_spans};
-use crate::roles::Roles;
-use crate::rules::{Groups, Requests, UnitKind};
-use crate::serial::{SerialDefaults, USUAL_READ_COST};
-use crate::setpoint::{Setpoint, SetpointRole};
-use crate::state::{State, StateWord};
-use crate::variant::Variant;
-use crate::watchdog::Watchdog;
+use crate::profile::roles::Roles;
 
 /// What one family of drives means by its registers.
 ///

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::decimal::{Counts, Decimal};
-use crate::lookup::{closest, parse_address};
+use crate::text::{closest, parse_address};
 use crate::value::{Input, Limits, Value, ValueError};
 
 /// What a word means: value = counts / 10^decimals in [`unit`](Self::unit), within a range, or one of some choices.

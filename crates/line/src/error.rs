@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request};
 
-use crate::PortError;
+use crate::line::PortError;
 
 /// A call that brought no answer, with all that is known of it.
 ///

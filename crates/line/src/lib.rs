@@ -4,65 +4,54 @@
 //! gateway, or the simulated line of `drivebus-sim`. It is safe from any thread. One caller at a time owns the line; the
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
 //! over at its last byte. The documentation of `drivebus-sim` opens one and asks something.
+//!
+//! The rooms, each on those before it:
+//!
+//! | room | what is in it |
+//! | --- | --- |
+//! | `line`, `error` | what every kind of line promises; what can become of a call |
+//! | `by_unit` | what is kept of each unit |
+//! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
+//! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
+//! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
+//! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
+//! | `health` | what is counted, how well each unit is reached, and what the figures most likely mean |
+//! | `owner` | who has the turn: what is known of the line and its units, and one exchange at a time |
+//! | `bus` | the bus as its callers see it: calls, errands, listening |
+//! | `poll` | what a bus asks again and again by itself |
 
-mod attempt;
-mod backoff;
+mod ask;
 mod bus;
 mod by_unit;
-mod call;
-pub mod clock;
-mod course;
-mod crew;
-mod echo;
-mod errand;
 mod error;
-mod exchange;
-mod facts;
-mod hint;
-mod hints;
-mod holder;
-mod identity;
-mod latency;
-mod link;
-mod listen;
-mod longer;
-mod lumps;
-pub mod mbap;
+mod health;
+mod line;
 #[cfg(test)]
 mod nobody;
-mod opener;
-mod order;
+mod options;
 mod owner;
 mod poll;
-mod poll_ring;
-mod poll_run;
-mod poll_samples;
-mod poll_schedule;
-mod port;
-mod process;
-mod punctual;
-mod queue;
-mod resync;
-pub mod rs485;
-mod stats;
-pub mod tcp;
-pub mod tty;
-mod units;
+mod ports;
+mod system;
+mod turns;
 
-pub use bus::{Bus, BusOptions};
-pub use call::CallOptions;
-pub use echo::AdapterEcho;
-pub use errand::{Errand, Reply, Running};
+pub use ask::Done;
+pub use bus::Bus;
+pub use bus::errand::{Errand, Reply};
+pub use bus::workers::Running;
 pub use error::{CallError, Failure};
-pub use exchange::Done;
-pub use facts::PortFacts;
-pub use hint::Hint;
-pub use identity::Places;
-pub use link::Link;
-pub use opener::Opener;
-pub use poll::{Poll, PollCounts, PollError, PollTarget};
-pub use poll_ring::{PollBatch, PollSample};
-pub use port::{Line, LineClock, PortError, PortErrorKind};
-pub use queue::Priority;
-pub use stats::{Counters, Latency, Stats};
-pub use units::UnitOptions;
+pub use health::hint::Hint;
+pub use health::link::Link;
+pub use health::stats::{Counters, Latency, Stats};
+pub use line::{Line, LineClock, PortError, PortErrorKind};
+pub use options::{AdapterEcho, BusOptions, CallOptions, UnitOptions};
+pub use owner::opener::Opener;
+pub use poll::Poll;
+pub use poll::ring::{PollBatch, PollSample};
+pub use poll::samples::PollCounts;
+pub use poll::target::{PollError, PollTarget};
+pub use ports::adapters::facts::PortFacts;
+pub use ports::adapters::identity::Places;
+pub use ports::{mbap, rs485, tcp, tty};
+pub use system::clock;
+pub use turns::order::Priority;

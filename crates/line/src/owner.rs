@@ -1,22 +1,32 @@
 //! Who has the turn: what is known of the line, its adapter and its units, and what has to go out before a request.
 
+pub(crate) mod dead_units;
+pub(crate) mod delays;
+pub(crate) mod echo;
+pub(crate) mod exchange;
+mod longer;
+mod lumps;
+pub(crate) mod opener;
+pub(crate) mod resync;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
 
-use crate::backoff::DeadUnits;
-use crate::echo::AdapterEcho;
+use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
-use crate::exchange::{Ask, Done, exchange};
-use crate::link::Links;
-use crate::longer::Longer;
-use crate::lumps::Lumps;
-use crate::opener::{LineOpener, Opener};
-use crate::resync::{FreshWords, Probe, Resync, Tried};
-use crate::stats::Stats;
-use crate::units::Delays;
-use crate::{Line, LineClock};
+use crate::health::link::Links;
+use crate::health::stats::{Asked, Stats};
+use crate::line::{Line, LineClock};
+use crate::options::AdapterEcho;
+use crate::owner::dead_units::DeadUnits;
+use crate::owner::delays::Delays;
+use crate::owner::exchange::exchange;
+use crate::owner::longer::Longer;
+use crate::owner::lumps::Lumps;
+use crate::owner::opener::{LineOpener, Opener};
+use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
 
 /// What to do next for a request.
 #[derive(Debug, Clone, Copy)]
@@ -36,9 +46,6 @@ pub(crate) enum Next {
     /// The unit may still answer something else, and everything was tried.
     GiveUp,
 }
-
-/// How many requests went to a unit, and how often the port was opened again by then.
-pub(crate) type Asked = (u64, u64);
 
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
@@ -134,8 +141,7 @@ impl Owner {
 
     /// What was asked of `unit` so far: who finds it unchanged knows that nobody else has asked it since.
     pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
-        let stats = self.stats();
-        (stats.units.get(&unit).map_or(0, |counters| counters.requests), stats.reconnects)
+        self.stats().asked(unit)
     }
 
     /// The line, if it is open.

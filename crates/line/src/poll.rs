@@ -4,100 +4,27 @@
 //! in virtual time there is no such thread, for nobody would stop it: time moves only while somebody waits, so who
 //! waits for samples does the asking, and nobody else does.
 
+pub(crate) mod ring;
+mod runner;
+pub(crate) mod samples;
+mod schedule;
+pub(crate) mod target;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::{self, JoinHandle, ThreadId};
 use std::time::Duration;
 
-use drivebus_rtu::{BeginError, SerialFormat, UnitAddress};
+use drivebus_rtu::BeginError;
 
 use crate::bus::Bus;
-use crate::clock::monotonic;
 use crate::error::Failure;
-use crate::poll_ring::PollBatch;
-use crate::poll_run::{Progress, Runner};
-use crate::poll_samples::Samples;
-use crate::process::Process;
-use crate::queue::LOOK_UP;
-
-/// What is asked of one unit in each cycle.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PollTarget {
-    /// Who is asked.
-    pub unit: UnitAddress,
-    /// Address and number of words (1..=125) of each read, in the order in which they are sent.
-    pub reads: Vec<(u16, u16)>,
-}
-
-/// What a poll did so far.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct PollCounts {
-    /// Cycles that are over: in each, every target was asked once.
-    pub cycles: u64,
-    /// Samples that have no words.
-    pub missing: u64,
-    /// Beats that were over before the line was free, or, in virtual time, before somebody asked.
-    pub late: u64,
-    /// Samples that gave way to newer ones before somebody took them.
-    pub dropped: u64,
-}
-
-/// Why a poll cannot be. Nothing was sent.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PollError {
-    /// There is nothing to ask.
-    #[error("{}", unit.map_or_else(|| "there is nobody to poll".to_owned(), |unit| format!("nothing is asked of unit {unit}")))]
-    Nothing {
-        /// Whom nothing is asked of; `None`: there is nobody.
-        unit: Option<UnitAddress>,
-    },
-    /// A read has no words, or more than a frame holds.
-    #[error("unit {unit} cannot be asked for {count} words from {address:04X}H")]
-    Read {
-        /// Who would be asked.
-        unit: UnitAddress,
-        /// The first address.
-        address: u16,
-        /// How many words.
-        count: u16,
-    },
-    /// The wire cannot carry so much so often.
-    #[error(
-        "an interval of {} s is shorter than the line can carry: at {format} one cycle of this poll ({reads} reads) takes at \
-         least {} s",
-        interval.as_secs_f64(),
-        rounded_up(*shortest)
-    )]
-    TooFast {
-        /// What was asked for.
-        interval: Duration,
-        /// The shortest there can be.
-        shortest: Duration,
-        /// How many requests a cycle has.
-        reads: usize,
-        /// Characters and silence.
-        format: SerialFormat,
-    },
-    /// The bus cannot be used.
-    #[error("{0}")]
-    Bus(Failure),
-    /// So many samples cannot be kept.
-    #[error("there is no memory for {size} samples of {words} words; keep fewer")]
-    NoRoom {
-        /// How many were to be kept.
-        size: usize,
-        /// The most words of a sample.
-        words: usize,
-    },
-    /// The system gives no thread.
-    #[error("the system gives no thread to poll in: {message}")]
-    NoThread {
-        /// What the system says.
-        message: String,
-    },
-}
+use crate::poll::ring::PollBatch;
+use crate::poll::runner::{Progress, Runner};
+use crate::poll::samples::{PollCounts, Samples};
+use crate::poll::target::{PollError, PollTarget, check, shortest_cycle};
+use crate::system::clock::{LOOK_UP, monotonic};
+use crate::system::process::Process;
 
 /// Reads that go on in cycles until the poll is closed or its bus is.
 ///
@@ -285,75 +212,5 @@ impl Poll {
 impl Drop for Poll {
     fn drop(&mut self) {
         self.stop();
-    }
-}
-
-fn check(targets: &[PollTarget]) -> Result<(), PollError> {
-    if targets.is_empty() {
-        return Err(PollError::Nothing { unit: None });
-    }
-    for &PollTarget { unit, ref reads } in targets {
-        if reads.is_empty() {
-            return Err(PollError::Nothing { unit: Some(unit) });
-        }
-        let wrong = reads.iter().find(|&&(address, count)| drivebus_rtu::Request::read(address, count).is_err());
-        if let Some(&(address, count)) = wrong {
-            return Err(PollError::Read { unit, address, count });
-        }
-    }
-    Ok(())
-}
-
-/// How long the wire is taken by one cycle, where every unit answers as soon as it may. `silence` is what must come before
-/// a request to a unit.
-fn shortest_cycle(
-    format: &SerialFormat,
-    targets: &[PollTarget],
-    silence: impl Fn(UnitAddress) -> Duration,
-) -> Duration {
-    let words = |count: u16| 5 + 2 * u32::from(count);
-    let read = |count| format.chars(8) + format.t35() + format.chars(words(count));
-    let reads = targets.iter().flat_map(|target| target.reads.iter().map(|&(_, count)| (target.unit, count)));
-    reads.fold(Duration::ZERO, |cycle, (unit, count)| cycle.saturating_add(silence(unit)).saturating_add(read(count)))
-}
-
-/// Seconds in whole microseconds, no fewer than `time` has.
-fn rounded_up(time: Duration) -> f64 {
-    let micros = u64::try_from(time.as_nanos().div_ceil(1_000)).unwrap_or(u64::MAX);
-    Duration::from_micros(micros).as_secs_f64()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn target(unit: u8, reads: &[(u16, u16)]) -> PollTarget {
-        PollTarget { unit: UnitAddress::new(unit).unwrap(), reads: reads.to_vec() }
-    }
-
-    #[test]
-    fn the_shortest_cycle_is_counted_in_characters() {
-        // At 19200 8E1 a character takes 11 bits: 8 + 3.5 + 7 + 3.5 = 22 for one word, 52 for 16 words.
-        let format = SerialFormat::DEFAULT;
-        let targets = [target(1, &[(0x3000, 1)]), target(2, &[(0, 16)])];
-        let cycle = shortest_cycle(&format, &targets, |_| format.t35());
-        let exact = 74.0 * 11.0 / 19_200.0;
-        assert!((cycle.as_secs_f64() - exact).abs() < 1e-7, "{cycle:?} is not {exact}");
-        let slow = Duration::from_millis(20);
-        let with_gap = shortest_cycle(&format, &targets, |unit| if unit.get() == 2 { slow } else { format.t35() });
-        assert_eq!(with_gap + format.t35(), cycle + slow, "a unit that needs a longer gap");
-        assert_eq!(shortest_cycle(&format, &targets, |_| Duration::MAX), Duration::MAX, "for ever");
-    }
-
-    #[test]
-    fn what_cannot_be_asked_is_refused() {
-        let unit = UnitAddress::new(2).unwrap();
-        assert_eq!(check(&[]), Err(PollError::Nothing { unit: None }));
-        assert_eq!(check(&[target(1, &[(0, 1)]), target(2, &[])]), Err(PollError::Nothing { unit: Some(unit) }));
-        for (address, count) in [(0, 0), (0, 126), (0xFFFF, 2)] {
-            let wrong = check(&[target(2, &[(0, 1), (address, count)])]);
-            assert_eq!(wrong, Err(PollError::Read { unit, address, count }));
-        }
-        assert_eq!(check(&[target(2, &[(0xFFFF, 1), (0, 125)])]), Ok(()));
     }
 }

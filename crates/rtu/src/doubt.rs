@@ -21,7 +21,8 @@
 
 use core::time::Duration;
 
-use crate::answer::{Answer, Expected};
+use crate::answer::Answer;
+use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};

@@ -4,17 +4,14 @@ use core::fmt;
 
 use crate::answer::Answer;
 use crate::crc::crc16;
-use crate::request::{MAX_PDU, Request};
+use crate::pdu::{CRC_LEN, MAX_PDU};
+use crate::request::Request;
 use crate::{Destination, UnitAddress};
 
 /// Most bytes of a frame: address, PDU and CRC.
 pub const MAX_ADU: usize = 256;
 /// Fewest bytes of a frame: address, function code and CRC.
 pub const MIN_ADU: usize = 4;
-/// Address and CRC.
-pub(crate) const AROUND_PDU: usize = 1 + CRC_LEN;
-const CRC_LEN: usize = 2;
-
 /// A frame whose CRC is good, borrowed from where it was received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {

@@ -13,7 +13,7 @@ use core::fmt;
 use core::ops::Range;
 use core::time::Duration;
 
-use crate::answer::Expected;
+use crate::expected::Expected;
 use crate::frame::{Adu, Frame, FrameError, MAX_ADU};
 use crate::{Instant, UnitAddress};
 

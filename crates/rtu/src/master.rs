@@ -13,9 +13,9 @@ mod torn;
 
 use core::time::Duration;
 
-use crate::answer::Expected;
 use crate::doubt::{Attribution, Doubts};
 use crate::event::{BeginError, Event, Tally};
+use crate::expected::Expected;
 use crate::frame::{Adu, Frame};
 use crate::framer::Framer;
 use crate::request::Request;

@@ -5,40 +5,8 @@
 use core::fmt;
 
 use crate::Words;
-use crate::answer::{Answer, AnswerError, Expected};
-use crate::frame::AROUND_PDU;
-
-/// Most bytes of a PDU: 256 of the ADU less address and CRC.
-pub const MAX_PDU: usize = 253;
-/// Most words of one 03H read.
-pub const MAX_READ: u16 = 125;
-/// Most words of one 10H write.
-pub const MAX_WRITE: u16 = 123;
-
-/// Function codes this crate knows by name.
-pub mod function {
-    /// Read holding registers.
-    pub const READ_HOLDING: u8 = 0x03;
-    /// Write one register.
-    pub const WRITE_SINGLE: u8 = 0x06;
-    /// Diagnostics; sub-function 0000 is the echo.
-    pub const DIAGNOSTICS: u8 = 0x08;
-    /// Write several registers.
-    pub const WRITE_MULTIPLE: u8 = 0x10;
-    /// Set in the function code of an exception.
-    pub const EXCEPTION_BIT: u8 = 0x80;
-}
-
-use function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
-
-/// How long the answer to a custom request is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AnswerLength {
-    /// The answer's PDU has this many bytes, function code included: 1..=253.
-    Bytes(u8),
-    /// Not known: the answer ends when the line falls silent.
-    BySilence,
-}
+use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, put_words};
 
 /// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -197,25 +165,6 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// What a right answer must look like, without borrowing from the request.
-    pub fn expected(&self) -> Expected {
-        Expected::of(self)
-    }
-
-    /// `pdu` as the answer to this request, or as the refusal of it. The answer to a custom request whose length is not
-    /// given is held to what the specification says of its function.
-    ///
-    /// # Errors
-    ///
-    /// [`AnswerError`]: it answers something else.
-    pub fn judge<'p>(&self, pdu: &'p [u8]) -> Result<Answer<'p>, AnswerError> {
-        let answer = self.expected().judge(pdu)?;
-        if let (Self::Custom { pdu: asked, .. }, Answer::Custom { .. }) = (self, answer) {
-            self.expected().check_custom(asked, pdu)?;
-        }
-        Ok(answer)
-    }
-
     /// How many bytes the request has on the wire, with address and CRC.
     pub const fn adu_len(&self) -> usize {
         let pdu = match self {
@@ -248,14 +197,6 @@ impl<'a> Request<'a> {
             }
         }
     }
-}
-
-/// A function code and two words: the shape of most PDUs.
-pub(crate) fn put_words(target: &mut [u8; MAX_PDU], function: u8, [first, second]: [u16; 2]) -> usize {
-    target[0] = function;
-    target[1..3].copy_from_slice(&first.to_be_bytes());
-    target[3..5].copy_from_slice(&second.to_be_bytes());
-    5
 }
 
 const fn check_range(address: u16, count: usize, max: u16) -> Result<usize, RequestError> {

@@ -5,7 +5,8 @@
 
 use crate::frame::Frame;
 use crate::framer::{Framer, Step};
-use crate::request::{Request, RequestError, function::EXCEPTION_BIT};
+use crate::pdu::function::EXCEPTION_BIT;
+use crate::request::{Request, RequestError};
 use crate::{Destination, FrameError, Instant, SerialFormat, UnitAddress};
 
 /// A unit's ear.

@@ -45,7 +45,6 @@ class Opening:
         low_latency: bool,
         queue: int,
     ) -> None:
-        self.shown = str(port)
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
             raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
@@ -69,6 +68,7 @@ class Opening:
             target = core_of(target) if target.transport == "process" else target.port
         self.target = target
         self.known = KnownUnits()
+        self.shown = str(port)
 
 
 def check_trust(profile: object, trust: object) -> None:

@@ -83,7 +83,7 @@ impl State {
         }
     }
 
-    /// What `call` has shown of the adapter (`Owner::learn` in `crates/line/src/echo.rs`).
+    /// What `call` has shown of the adapter (`Owner::learn` in `crates/line/src/owner/echo.rs`).
     fn learn(&mut self, step: &mut Step<'_>, call: &Call, ended: Ended) {
         let tally = self.master.take_tally();
         if tally.late > 0 {

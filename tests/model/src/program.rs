@@ -10,7 +10,7 @@ use crate::frames::{Content, Kind};
 use crate::scenario::{Adapter, Scenario};
 use crate::world::{State, Wrong, address};
 
-/// What is known of the adapter (`crates/line/src/echo.rs`).
+/// What is known of the adapter (`crates/line/src/owner/echo.rs`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Knowledge {
     /// Nothing yet.

@@ -12,11 +12,11 @@ use super::placed::Placed;
 use super::problems::Problems;
 use super::{File, inherit, rows, sense, succeed};
 use crate::entry::Entry;
-use crate::lookup::closest;
+use crate::parts::rules::{Groups, Requests, UnitKind};
+use crate::parts::setpoint::{Setpoint, SetpointRole};
 use crate::profile::Profile;
-use crate::roles::Roles;
-use crate::rules::{Groups, Requests, UnitKind};
-use crate::setpoint::{Setpoint, SetpointRole};
+use crate::profile::roles::Roles;
+use crate::text::closest;
 
 /// Reads and checks all of `files`, over `base`. What is wrong goes to `problems`; then there may be no profile.
 pub(super) fn profile(

@@ -7,9 +7,9 @@ use super::manifest::line;
 use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
-use crate::entry::{Entry, Kind};
-use crate::lookup::{closest, group, names, parse_code};
-use crate::memory::Memory;
+use crate::entry::{Entry, Kind, names};
+use crate::parts::memory::Memory;
+use crate::text::{closest, group, parse_code};
 
 /// The registers and parameters, and where each address is.
 #[derive(Debug, Default)]

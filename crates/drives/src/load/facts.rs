@@ -10,16 +10,16 @@ use super::problems::Problems;
 use super::rows::decimals;
 use super::{File, ProfileError};
 use crate::bits::BitField;
-use crate::command::Control;
 use crate::decimal::{Counts, Decimal};
-use crate::fault::Exception;
-use crate::identification::{Identification, Signature};
-use crate::lookup::parse_address;
-use crate::memory::Memory;
+use crate::parts::command::Control;
+use crate::parts::fault::Exception;
+use crate::parts::identification::{Identification, Signature};
+use crate::parts::memory::Memory;
+use crate::parts::serial::SerialDefaults;
+use crate::parts::variant::{Variant, VariantChoice};
+use crate::parts::watchdog::Watchdog;
 use crate::quantity::{Quantity, limits};
-use crate::serial::SerialDefaults;
-use crate::variant::{Variant, VariantChoice};
-use crate::watchdog::Watchdog;
+use crate::text::parse_address;
 
 /// Checks that `low` ≤ `item` ≤ `high`.
 pub(super) fn within<T>(file: &File, item: &Placed<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>

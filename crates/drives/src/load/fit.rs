@@ -7,9 +7,9 @@ use super::File;
 use super::manifest::{Manifest, line};
 use super::problems::Problems;
 use crate::entry::{Access, Entry};
-use crate::memory::Memory;
+use crate::parts::memory::Memory;
+use crate::parts::setpoint::Setpoint;
 use crate::profile::Profile;
-use crate::setpoint::Setpoint;
 
 /// Checks the whole `profile`, which is put together.
 pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {

@@ -4,9 +4,10 @@ use super::File;
 use super::manifest::{Extends, Manifest, line};
 use super::placed::Placed;
 use super::problems::Problems;
+use crate::entry::names;
 use crate::evidence::Evidence;
-use crate::lookup::{closest, names};
 use crate::profile::Profile;
+use crate::text::closest;
 
 /// Tables whose rules a sibling can confirm as a whole.
 const TABLES: [&str; 10] =

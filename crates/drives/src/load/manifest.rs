@@ -12,9 +12,9 @@ use serde::{Deserialize, Deserializer};
 
 use super::placed::Placed;
 use super::{File, ProfileError, line_of, shape};
-use crate::memory::MemoryBit;
-use crate::rules::UnitKind;
-use crate::setpoint::Setpoint;
+use crate::parts::memory::MemoryBit;
+use crate::parts::rules::UnitKind;
+use crate::parts::setpoint::Setpoint;
 
 /// The rules of a family of drives. The long tables stand beside it: registers.csv, parameters.csv, faults.csv.
 #[derive(Deserialize)]

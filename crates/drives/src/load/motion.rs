@@ -6,11 +6,12 @@ use super::facts::check;
 use super::manifest::{Manifest, States, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::command::{Command, CommandCode};
-use crate::lookup::{closest, names};
+use crate::entry::names;
+use crate::parts::command::{Command, CommandCode};
+use crate::parts::rules::UnitKind;
+use crate::parts::state::{StateRule, StateWord};
 use crate::profile::Profile;
-use crate::rules::UnitKind;
-use crate::state::{StateRule, StateWord};
+use crate::text::closest;
 
 /// The command register, its codes, and what else moves a motor.
 pub(super) fn commands(

@@ -8,9 +8,9 @@ use super::{File, Files, ProfileError};
 use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
-use crate::fault::Fault;
-use crate::lookup::{parameter_address, parse_address, parse_code};
+use crate::parts::fault::Fault;
 use crate::quantity::{Quantity, limits, to_word};
+use crate::text::{parameter_address, parse_address, parse_code};
 
 /// An item and the line it came from.
 pub(super) struct Located<T> {

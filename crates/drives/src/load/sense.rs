@@ -7,9 +7,9 @@ use super::motion::for_rectifiers;
 use super::placed::Placed;
 use super::problems::Problems;
 use crate::entry::Access;
+use crate::parts::rules::UnitKind;
+use crate::parts::setpoint::Setpoint;
 use crate::profile::Profile;
-use crate::rules::UnitKind;
-use crate::setpoint::Setpoint;
 
 /// Checks what `manifest` says of `entries`.
 pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {

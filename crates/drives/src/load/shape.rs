@@ -9,7 +9,7 @@ use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, Deserializer, Error};
 
 use super::problems::MOST;
-use crate::lookup::closest;
+use crate::text::closest;
 
 /// What each profile has, and hardly another file has both of.
 const OF_EACH: [&str; 2] = ["name", "source"];

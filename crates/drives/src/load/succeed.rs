@@ -6,9 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::entry::{Entry, Kind};
+use crate::entry::{Entry, Kind, names};
 use crate::evidence::Evidence;
-use crate::lookup::names;
 use crate::profile::Profile;
 
 /// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in

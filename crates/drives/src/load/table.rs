@@ -6,7 +6,7 @@ use csv::StringRecord;
 
 use super::problems::Problems;
 use super::{File, ProfileError};
-use crate::lookup::closest;
+use crate::text::closest;
 
 /// Most rows of one table.
 const MOST_ROWS: usize = 10_000;

@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-use super::{ExceptionCode, Head};
+use super::head::Head;
+use crate::pdu::ExceptionCode;
 
 /// Why a frame with a good CRC is not the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use super::Framer;
 use crate::UnitAddress;
 use crate::crc::{crc16, update};
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
-use crate::request::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
 
 const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
 /// Address, function code, exception code or byte count, CRC.

@@ -4,11 +4,12 @@
 use core::fmt;
 
 use crate::UnitAddress;
-use crate::answer::{AnswerError, Expected};
+use crate::answer::AnswerError;
 use crate::event::Event;
+use crate::expected::Expected;
 use crate::frame::{Frame, FrameError, MAX_ADU};
 use crate::framer::{EXCEPTION_ADU, lost_its_head};
-use crate::request::function::EXCEPTION_BIT;
+use crate::pdu::function::EXCEPTION_BIT;
 
 use super::remnant::may_be_left_of;
 

@@ -6,8 +6,9 @@ use core::time::Duration;
 use super::beside::Why;
 use super::torn::{Open, is_left_of_answer};
 use super::{Master, State};
-use crate::answer::{Answer, AnswerError, Expected};
+use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
+use crate::expected::Expected;
 use crate::framer::Step;
 use crate::{Instant, UnitAddress};
 

@@ -8,8 +8,9 @@
 
 use core::time::Duration;
 
-use crate::answer::{Answer, Expected};
+use crate::answer::Answer;
 use crate::doubt::OVERTAKING;
+use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::framer::lost_its_head;
 use crate::{Instant, UnitAddress};

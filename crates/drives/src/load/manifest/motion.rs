@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Placed, yes};
-use crate::command::Command;
-use crate::state::State;
+use crate::parts::command::Command;
+use crate::parts::state::State;
 
 /// What makes the motor move.
 #[derive(Deserialize)]

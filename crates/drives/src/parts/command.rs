@@ -1,0 +1,104 @@
+//! Commands: what a motor can be told, and what must be set before the drive listens.
+
+use serde::Deserialize;
+
+/// What a motor can be told. The codes differ from family to family; the profile owns them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Command {
+    /// Turn forward, at the setpoint.
+    RunForward,
+    /// Turn in reverse, at the setpoint.
+    RunReverse,
+    /// Turn forward, at the jog frequency.
+    JogForward,
+    /// Turn in reverse, at the jog frequency.
+    JogReverse,
+    /// Come to a stop the way the drive is set to: as a rule along the deceleration ramp.
+    Stop,
+    /// Switch the motor off and let it run out.
+    Coast,
+    /// Clear a fault.
+    ResetFault,
+    /// End a jog.
+    JogStop,
+}
+
+impl Command {
+    /// Every command.
+    pub const ALL: [Self; 8] = [
+        Self::RunForward,
+        Self::RunReverse,
+        Self::JogForward,
+        Self::JogReverse,
+        Self::Stop,
+        Self::Coast,
+        Self::ResetFault,
+        Self::JogStop,
+    ];
+
+    /// Its name in profiles and programs: `run_forward` …
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RunForward => "run_forward",
+            Self::RunReverse => "run_reverse",
+            Self::JogForward => "jog_forward",
+            Self::JogReverse => "jog_reverse",
+            Self::Stop => "stop",
+            Self::Coast => "coast",
+            Self::ResetFault => "reset_fault",
+            Self::JogStop => "jog_stop",
+        }
+    }
+}
+
+/// The word that means a command in a family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CommandCode {
+    /// The word.
+    pub code: u16,
+    /// Whether a document of the family prints it.
+    pub verified: bool,
+}
+
+impl std::str::FromStr for Command {
+    type Err = ParseCommandError;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|command| command.name() == name).ok_or_else(|| ParseCommandError {
+            name: name.to_owned(),
+            closest: crate::text::closest(name, Self::ALL.into_iter().map(Self::name)).unwrap_or_default().to_owned(),
+        })
+    }
+}
+
+/// No command has this name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("no command \"{name}\"; the closest is \"{closest}\"")]
+pub struct ParseCommandError {
+    /// The name as given.
+    pub name: String,
+    /// The name closest to it.
+    pub closest: String,
+}
+
+/// A parameter that must have a certain value before the drive obeys the bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Control {
+    /// The parameter's code: `P00.01`.
+    pub code: String,
+    /// The word it must hold.
+    pub raw: u16,
+    /// What this value means.
+    pub label: String,
+    /// Whether a document of this family prints the value; else it is assumed.
+    pub verified: bool,
+    /// What to know about it; may be empty.
+    pub note: String,
+    /// Where it is printed.
+    pub source: String,
+}

@@ -1,0 +1,109 @@
+//! Names: what a register or a parameter may be called, and what is said where nothing has a name.
+
+use crate::entry::{Entry, names};
+use crate::profile::Profile;
+use crate::text::{closest, near, parameter_address, parse_address, parse_code, parse_loose_address, parse_loose_code};
+
+/// Why a name means nothing here.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NameError {
+    /// Nothing has this name.
+    #[error("{profile} has no \"{name}\"; the closest is \"{closest}\"")]
+    Unknown {
+        /// The profile that was asked.
+        profile: String,
+        /// The name as given.
+        name: String,
+        /// The name closest to it.
+        closest: String,
+    },
+    /// The profile knows nothing at this address.
+    #[error("{profile} knows nothing at {address:04X}H; read it by its address without a profile")]
+    UnknownAddress {
+        /// The profile that was asked.
+        profile: String,
+        /// The address.
+        address: u16,
+    },
+    /// The parameter is in a group that the maker keeps closed.
+    #[error("{name} is in a group that {profile} neither reads nor writes: it is the maker's own")]
+    Closed {
+        /// The profile that was asked.
+        profile: String,
+        /// The name as given.
+        name: String,
+    },
+    /// The address is one that says where a written parameter is kept.
+    #[error("{address:04X}H only writes {name}, and says where it is kept; name it {name}")]
+    WriteForm {
+        /// The address.
+        address: u16,
+        /// The parameter behind it.
+        name: String,
+    },
+}
+
+impl Profile {
+    /// The entry with this name: the name of a register or parameter, a parameter's code in upper or lower case
+    /// (`p00.11`), or an address in hex (`0x3004`, `3004H`).
+    ///
+    /// # Errors
+    ///
+    /// [`NameError`]: there is no such entry (the closest is named), or it is closed, or the address only writes.
+    pub fn find(&self, name: &str) -> Result<&Entry, NameError> {
+        let wanted = name.trim();
+        let called = |name: &str| name.eq_ignore_ascii_case(wanted);
+        if let Some(entry) = self.entries().find(|entry| called(entry.name()) || entry.alias().is_some_and(called)) {
+            return Ok(entry);
+        }
+        if let Some((group, index)) = parse_code(wanted) {
+            let address = parameter_address(group, index);
+            if self.is_closed(address) {
+                return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
+            }
+            if let Some(entry) = self.numbered(group, index) {
+                return Ok(entry);
+            }
+        }
+        if let Some(address) = parse_address(wanted) {
+            return self.entry_at(address).ok_or_else(|| self.unknown_address(name, address));
+        }
+        Err(NameError::Unknown {
+            profile: self.name().to_owned(),
+            name: name.to_owned(),
+            closest: self.closest(wanted).to_owned(),
+        })
+    }
+
+    /// The parameter whose code has these numbers: `P0.1` is P00.01. What is at the address that others have for it says
+    /// nothing where codes tell no addresses.
+    fn numbered(&self, group: u8, index: u8) -> Option<&Entry> {
+        self.entries().find(|entry| entry.code().and_then(parse_code) == Some((group, index)))
+    }
+
+    /// The entry whose code or address somebody typed, if not as it is printed.
+    pub(crate) fn find_loosely(&self, text: &str) -> Option<&Entry> {
+        match parse_loose_code(text) {
+            Some((group, index)) => self.numbered(group, index),
+            None => self.entry_at(parse_loose_address(text)?),
+        }
+    }
+
+    /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds.
+    fn closest(&self, name: &str) -> &str {
+        let names = || self.entries().flat_map(names);
+        let found = || self.search(name, 1).first().map(|entry| entry.alias().unwrap_or(entry.name()));
+        near(name, names()).or_else(found).or_else(|| closest(name, names())).unwrap_or_default()
+    }
+
+    fn unknown_address(&self, name: &str, address: u16) -> NameError {
+        if self.is_closed(address) {
+            return NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() };
+        }
+        match self.stored_address(address).and_then(|stored| self.entry_at(stored)) {
+            Some(entry) => NameError::WriteForm { address, name: entry.name().to_owned() },
+            None => NameError::UnknownAddress { profile: self.name().to_owned(), address },
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! One call from its place in the queue to its end: dead units, attempts, and what may be repeated.
+//!
+//! | kind | after silence or a damaged answer |
+//! | --- | --- |
+//! | a read | asked again, as often as the bus is set to; a damaged answer, which took no time-out, counts half |
+//! | a write whose words can be read back | read back; written again only where the unit shows other words |
+//! | any other write, an echo, a custom request | never: the caller is told |
+//!
+//! What it takes to be sure is bounded too: a call sends eight requests at most for each time that it may ask, the questions,
+//! the probes, and what is asked again included.
+
+mod attempt;
+mod course;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
+
+use crate::ask::{Ask, Done};
+use crate::bus::call::course::{Course, is_unanswered};
+use crate::bus::errand::Errand;
+use crate::bus::shared::Shared;
+use crate::error::{CallError, Failure};
+use crate::options::CallOptions;
+use crate::owner::dead_units::Verdict;
+use crate::turns::order::Priority;
+use crate::turns::queue::{NoTurn, Turn};
+
+/// A call under way.
+pub(crate) struct Call<'b, 'r> {
+    pub(crate) bus: &'b Shared,
+    pub(crate) ask: Ask<'r>,
+    pub(crate) unit: Option<UnitAddress>,
+    pub(crate) priority: Priority,
+    retries: u32,
+    pub(crate) verify: bool,
+    pub(crate) read_back: Option<u16>,
+    pub(crate) connection: Option<u64>,
+    /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
+    wanted: Option<&'r AtomicBool>,
+}
+
+impl<'b, 'r> Call<'b, 'r> {
+    pub(crate) fn new(bus: &'b Shared, ask: Ask<'r>, options: CallOptions) -> Self {
+        let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
+        Self {
+            bus,
+            unit: match ask.destination {
+                Destination::Unit(unit) => Some(unit),
+                Destination::Broadcast => None,
+            },
+            priority: options.priority.unwrap_or(kind),
+            retries: options.retries.unwrap_or(bus.options.retries),
+            verify: options.verify,
+            read_back: options.read_back.filter(|_| ask.request.is_write()),
+            connection: options.connection,
+            wanted: None,
+            ask,
+        }
+    }
+
+    /// Ends as soon as `wanted` is false and nothing of it is on the wire.
+    pub(crate) fn while_wanted(mut self, wanted: &'r AtomicBool) -> Self {
+        self.wanted = Some(wanted);
+        self
+    }
+
+    pub(crate) fn is_wanted(&self) -> bool {
+        self.wanted.is_none_or(|wanted| wanted.load(Ordering::Acquire))
+    }
+
+    /// Asks until it is answered, refused or given up.
+    pub(crate) fn run(
+        &mut self,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let turn = self.turn(give_up)?;
+        self.run_in(turn, give_up, take)
+    }
+
+    /// As [`run`](Self::run), for who has the turn.
+    pub(crate) fn run_in(
+        &mut self,
+        mut turn: Turn<'b, Errand>,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        if let Some(unit) = self.unit
+            && self.priority != Priority::Stop
+        {
+            self.spare_the_others(&mut turn, unit, give_up)?;
+        }
+        let mut course = Course::new(self.ask.timeout, self.retries);
+        let result = match (self.ask.request, self.read_back) {
+            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
+            (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
+            _ => self.once(&mut turn, &mut course, give_up, take),
+        };
+        if let Some(unit) = self.unit {
+            let mut owner = self.bus.lock();
+            match &result {
+                Ok(done) => owner.dead.answered(unit, done.ended),
+                Err(error) => match error.ended {
+                    Some(ended) if is_silence(&error.failure) => owner.dead.silent(unit, ended),
+                    Some(ended) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, ended),
+                    _ => {}
+                },
+            }
+        }
+        result.map_err(|mut error| {
+            if error.failure == Failure::Interrupted {
+                error.failure = self.bus.given_up();
+            }
+            error.request = self.ask.frame();
+            error
+        })
+    }
+
+    fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b, Errand>, Box<CallError>> {
+        self.bus.queue.turn(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))
+    }
+
+    fn no_turn(&self, why: NoTurn) -> Box<CallError> {
+        self.ask.failed(self.bus.no_turn(why), None, self.bus.now_if_known(), &[])
+    }
+
+    /// An error of a request that was not sent.
+    pub(crate) fn failed(&self, failure: Failure) -> Box<CallError> {
+        self.ask.failed(failure, None, self.bus.now(), &[])
+    }
+
+    /// A unit that was silent lately waits off the line, while others use it, for as long as it would have been silent.
+    fn spare_the_others(
+        &mut self,
+        turn: &mut Turn<'b, Errand>,
+        unit: UnitAddress,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        let mut patience = None;
+        loop {
+            let mut owner = self.bus.lock();
+            let now = self.bus.now_of(&owner);
+            let until = match owner.dead.verdict(unit, now) {
+                Verdict::AskOnce => {
+                    self.retries = 0;
+                    return Ok(());
+                }
+                Verdict::Wait(until) if owner.line().is_some() => until,
+                Verdict::Ask | Verdict::Wait(_) => return Ok(()),
+            };
+            let patience = *patience.get_or_insert(now + self.patience());
+            if now >= patience {
+                owner.stats().count(Some(unit), |counters| counters.not_asked += 1);
+                let left = until.saturating_duration_since(now);
+                return Err(self.ask.failed(Failure::NotAsked { left }, None, now, &[]));
+            }
+            drop(owner);
+            self.stand_by(turn, until.min(patience), give_up)?;
+        }
+    }
+
+    /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who
+    /// polls has others to ask meanwhile.
+    fn patience(&self) -> Duration {
+        if self.priority == Priority::Poll {
+            return Duration::ZERO;
+        }
+        self.ask.timeout.saturating_mul(self.retries.saturating_add(1))
+    }
+
+    /// Leaves the line to others until `until`.
+    pub(crate) fn stand_by(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        until: Instant,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        turn.leave();
+        let mut ended = false;
+        self.bus.sleep(until.saturating_duration_since(self.bus.now()), &mut || {
+            ended = give_up() || !self.is_wanted();
+            ended
+        });
+        if ended || self.bus.is_shut() {
+            return Err(self.failed(self.bus.given_up()));
+        }
+        *turn = self.bus.queue.turn_again(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))?;
+        Ok(())
+    }
+
+    /// Asks what may be asked once only.
+    fn once(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        course: &mut Course,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        course.go_on_with(self.ask.timeout, 0);
+        self.repeat(turn, course, give_up, take)
+    }
+
+    /// Asks, and asks again as often as `course` says while nothing comes of it.
+    fn repeat(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        course: &mut Course,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut lost = None;
+        loop {
+            let asked = course.asked();
+            let error = match self.attempt(turn, course, give_up, take) {
+                Ok(done) => return Ok(done),
+                Err(error) => error,
+            };
+            let is_port = matches!(error.failure, Failure::Port(_));
+            if !course.goes_on(&error, asked) || !self.is_wanted() {
+                // How the port was lost tells more than that it is still not there. But where the request went out only
+                // the second time, that has to be said.
+                let lost = lost.filter(|_| is_port && error.sent.is_none());
+                return Err(lost.unwrap_or_else(|| attempted(error, course.asked())));
+            }
+            lost = is_port.then_some(error);
+            if let Some(unit) = self.unit {
+                self.bus.lock().stats().count(Some(unit), |counters| counters.retries += 1);
+            }
+        }
+    }
+
+    /// Writes words that can be read back at `address`.
+    ///
+    /// Where the confirmation is missing the unit is asked what it has. What it does not show by then it has not taken:
+    /// no request from before is open any more when it answers. All of it happens over the connection that the write went
+    /// out over: behind another one, another unit may answer.
+    fn write_value(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        course: &mut Course,
+        address: u16,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let written = match *self.ask.request {
+            Request::WriteSingle { value, .. } => vec![value],
+            Request::WriteMultiple { words, .. } => words.iter().collect(),
+            _ => return self.once(turn, course, give_up, take),
+        };
+        let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
+        let Ok(read) = Request::read(address, count) else {
+            return self.once(turn, course, give_up, take);
+        };
+        let mut writing = Call { ..*self };
+        let (mut times, mut before) = (0, None);
+        loop {
+            let outcome = writing.once(turn, course, give_up, take);
+            let is_unproven = course.take_unproven();
+            let mut error = match outcome {
+                Ok(done) if !is_unproven => return Ok(done),
+                Ok(done) => {
+                    let failure = Failure::NoAnswer { timeout: self.ask.timeout, attempts: 1 };
+                    self.ask.failed(failure, Some(done.sent), done.ended, &[])
+                }
+                Err(error) => error,
+            };
+            let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else {
+                // It may not have gone out this time, but it has before.
+                error.sent = error.sent.or(before);
+                return Err(error);
+            };
+            before = Some(sent);
+            times += 1;
+            writing.connection = Some(self.bus.lock().stats().reconnects);
+            // What is read back decides: it is never asked in doubt, not even for a write that was.
+            let ask = Ask { request: &read, in_doubt: false, ..self.ask };
+            let reading = Call { ask, read_back: None, ..writing };
+            let mut shows = Vec::new();
+            course.go_on_with(self.ask.timeout, self.retries);
+            let outcome = reading.repeat(turn, course, give_up, &mut |answer| {
+                if let Answer::Read { words, .. } = answer {
+                    shows = words.iter().collect();
+                }
+            });
+            match outcome {
+                Ok(done) if shows == written => return Ok(Done { sent, ended: done.ended }),
+                Ok(done) if times > self.retries => {
+                    return Err(self.ask.failed(Failure::NotTaken { times, shows }, Some(sent), done.ended, &[]));
+                }
+                Ok(_) => {}
+                // It is still not known whether the write was taken.
+                Err(silent) if is_unproven => return Err(Box::new(CallError { sent: Some(sent), ..*silent })),
+                Err(_) => return Err(error),
+            }
+        }
+    }
+}
+
+/// Whether a time-out was waited for in vain.
+pub(crate) fn is_silence(failure: &Failure) -> bool {
+    matches!(failure, Failure::NoAnswer { .. })
+}
+
+/// `error`, which came when it was asked for the last of so many times.
+fn attempted(mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
+    if let Failure::NoAnswer { timeout, .. } = error.failure {
+        error.failure = Failure::NoAnswer { timeout, attempts: attempts.max(1) };
+    }
+    error
+}

@@ -1,0 +1,291 @@
+//! One attempt of a call: what has to come before the question, the question, and how often it takes to be sure of the
+//! answer.
+
+use std::sync::MutexGuard;
+
+use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request};
+
+use crate::ask::{Ask, Done};
+use crate::bus::call::course::{Course, Form, Hearing};
+use crate::bus::call::{Call, is_silence};
+use crate::bus::errand::Errand;
+use crate::error::{CallError, Failure};
+use crate::owner::resync::Tried;
+use crate::owner::{Next, Owner};
+use crate::turns::order::Priority;
+use crate::turns::queue::Turn;
+
+/// How the question may be put.
+enum Question {
+    /// As it was put before: all that the unit owes is the answer to it.
+    Same(Form),
+    /// As a read of so many words, which nothing that the unit owes could pass for.
+    Apart(u16),
+    /// As it is, with what its answer will be worth.
+    New(Attribution),
+    /// As it is, although it may be another one that is confirmed: whether it was taken is looked up afterwards.
+    Unproven,
+}
+
+impl<'b> Call<'b, '_> {
+    /// Asks once, beyond doubt: with what has to come before, and as often as it takes to be sure.
+    ///
+    /// A read that only this call left open is asked again as it is: whichever of the two is answered, it is this
+    /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
+    pub(crate) fn attempt(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        course: &mut Course,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let mut tried = Tried::default();
+        // Whatever else is repeated would be done twice, and what is verified is asked as it is.
+        let mut apart = !self.verify;
+        // A question that is repeated until the answers agree counts as asked once an attempt.
+        let mut asks = true;
+        loop {
+            let (mut owner, question) = self.until_sure(turn, course, &mut tried, apart, give_up)?;
+            let attribution = match question {
+                Question::Same(Form::Plain) => {
+                    let ask = Ask { in_doubt: true, ..self.ask };
+                    return put(course, &mut owner, &ask, Form::Plain, give_up, take);
+                }
+                Question::Same(Form::Apart(count)) | Question::Apart(count) => {
+                    let again = matches!(question, Question::Same(_));
+                    match self.ask_apart(course, &mut owner, count, again, give_up, take) {
+                        Err(error) if is_refusal(&error.failure) => {
+                            // It may be meant for something else that was asked, or for the words that nobody asked for.
+                            apart = false;
+                            course.asks_otherwise();
+                            continue;
+                        }
+                        result => return result,
+                    }
+                }
+                Question::Unproven => {
+                    course.is_unproven();
+                    let result = put(course, &mut owner, &self.ask, Form::Plain, give_up, &mut |_| ());
+                    return owner.unless_echoed(&self.ask, result, give_up);
+                }
+                // What was heard goes on.
+                Question::Same(Form::Repeated) => Attribution::Certain,
+                Question::New(attribution) => attribution,
+            };
+            let again = matches!(question, Question::Same(_));
+            if !self.go_on_hearing(course, &owner, attribution) {
+                let result = put(course, &mut owner, &self.ask, Form::Plain, give_up, take);
+                return owner.unless_echoed(&self.ask, result, give_up);
+            }
+            if std::mem::take(&mut asks) {
+                course.asks(owner.now());
+            }
+            if let Some(done) = self.hear(course, &mut owner, again, give_up, take)? {
+                return Ok(done);
+            }
+        }
+    }
+
+    /// Does what has to come before the question, and comes back with the line when it may be put.
+    fn until_sure(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        course: &mut Course,
+        tried: &mut Tried,
+        apart: bool,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(MutexGuard<'b, Owner>, Question), Box<CallError>> {
+        loop {
+            if !turn.let_pass(give_up) || !self.is_wanted() {
+                return Err(self.failed(self.bus.given_up()));
+            }
+            let mut owner = self.bus.lock();
+            if self.bus.is_shut() {
+                owner.close();
+                return Err(self.ask.failed(Failure::Closed, None, self.bus.now_of(&owner), &[]));
+            }
+            if let Err(failure) = owner.prepare(give_up) {
+                return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
+            }
+            if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
+                return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
+            }
+            let in_time = course.is_in_time(self.bus.now_of(&owner));
+            if !course.sends() {
+                return Err(match &course.hearing {
+                    Some(Hearing { asked, .. }) if tried.failure.is_none() => {
+                        self.ask.failed(Failure::Disagreeing { asked: *asked }, None, self.bus.now_of(&owner), &[])
+                    }
+                    _ => self.none_settled(tried, &owner),
+                });
+            }
+            if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(|| owner.asked(unit))) {
+                return Ok((owner, Question::Same(form)));
+            }
+            match owner.next(&self.ask, tried, in_time, apart) {
+                Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
+                Next::AskApart(count) => return Ok((owner, Question::Apart(count))),
+                Next::LookForEcho => owner.look_for_echo(&self.ask, tried, give_up)?,
+                Next::Probe(unit, probe) => {
+                    owner.probe(unit, probe, &self.ask, tried, give_up)?;
+                    // Who polls comes again: the others wait for one time-out at a time.
+                    if self.priority == Priority::Poll
+                        && let Some(error) = tried.failure.take_if(|error| is_silence(&error.failure))
+                    {
+                        return Err(error);
+                    }
+                }
+                // Where the words can be read, what they are is known sooner than who was confirmed.
+                Next::Overtaken(_) if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
+                Next::Overtaken(until) => {
+                    drop(owner);
+                    self.stand_by(turn, until, give_up)?;
+                    *tried = Tried::default(); // others have asked the unit meanwhile
+                }
+                Next::Wait(until) => {
+                    drop(owner);
+                    self.stand_by(turn, until, give_up)?;
+                }
+                Next::GiveUp => return Err(self.none_settled(tried, &owner)),
+            }
+        }
+    }
+
+    /// What is said where nothing that was tried made sure of the unit.
+    fn none_settled(&self, tried: &mut Tried, owner: &Owner) -> Box<CallError> {
+        match tried.failure.take() {
+            Some(error) if !matches!(error.failure, Failure::Refused { .. }) => error,
+            _ => self.ask.failed(Failure::Doubtful, None, self.bus.now_of(owner), &[]),
+        }
+    }
+
+    /// Asks as a read of `count` words, which tells its answer apart, and gives those that were asked for to `take`.
+    fn ask_apart(
+        &self,
+        course: &mut Course,
+        owner: &mut Owner,
+        count: u16,
+        again: bool,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        let (&Request::ReadHolding { address, count: asked, .. }, Some(unit)) = (self.ask.request, self.unit) else {
+            return put(course, owner, &self.ask, Form::Plain, give_up, take);
+        };
+        let Ok(request) = Request::read(address, count) else {
+            return put(course, owner, &self.ask, Form::Plain, give_up, take);
+        };
+        if !again && owner.master.in_quarantine(owner.now(), unit) {
+            owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
+        }
+        let ask = Ask { request: &request, in_doubt: again, ..self.ask };
+        let result = put(course, owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
+        if count > asked {
+            match &result {
+                Ok(_) => owner.longer.given(unit, address),
+                Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, address, count),
+                Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, address, count),
+                Err(_) => {}
+            }
+        }
+        result
+    }
+
+    /// Whether the question has to be repeated until the answers agree. What was heard so far counts, unless somebody else
+    /// asked the unit in between: that may be open now.
+    fn go_on_hearing(&self, course: &mut Course, owner: &Owner, attribution: Attribution) -> bool {
+        // Whatever else is repeated would be done twice.
+        let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
+        if course.hearing.is_none() && attribution == Attribution::Certain && !twice {
+            return false;
+        }
+        let asked = self.unit.map(|unit| owner.asked(unit));
+        if course.hearing.as_ref().is_none_or(|hearing| hearing.known != asked) {
+            let agreement = Agreement::new(attribution, 1 + u8::from(twice));
+            let is_repeated = self.unit.is_some() && !agreement.is_immediate();
+            if let Attribution::Repeat { words, .. } = attribution {
+                course.takes_more(u32::from(words) - 1, self.ask.timeout);
+            }
+            let before = course.hearing.as_ref().map_or(0, |hearing| hearing.asked);
+            course.hearing = is_repeated.then_some(Hearing { agreement, asked: before, known: None });
+        }
+        course.hearing.is_some()
+    }
+
+    /// Asks once more, `again` where only this call left something open; `None` while the answers do not agree.
+    fn hear(
+        &self,
+        course: &mut Course,
+        owner: &mut Owner,
+        again: bool,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Option<Done>, Box<CallError>> {
+        let (Some(hearing), Some(unit)) = (course.hearing.as_mut(), self.unit) else { return Ok(None) };
+        let Hearing { agreement, asked, known } = hearing;
+        if *asked == 1 {
+            owner.stats().count(Some(unit), |counters| counters.verified += 1);
+        }
+        *asked += 1;
+        let mut agreed = false;
+        let ask = Ask { in_doubt: again, ..self.ask };
+        let result = owner.exchange(&ask, give_up, &mut |answer| {
+            agreed = agreement.hear(unit, &answer);
+            if agreed {
+                take(answer);
+            }
+        });
+        *known = Some(owner.asked(unit));
+        let is_last = *asked >= u32::from(agreement.longest());
+        let (sent, ended) = match result {
+            Ok(done) if agreed => return Ok(Some(done)),
+            Ok(done) if is_last => (Some(done.sent), Some(done.ended)),
+            Ok(_) => {
+                // What this call left open before may still come; it is an answer like this one.
+                course.repeats(again, || owner.asked(unit));
+                return Ok(None);
+            }
+            Err(error) => {
+                let Failure::Refused { function, code } = error.failure else {
+                    let result = Err(error);
+                    course.leaves_open(&self.ask, Form::Repeated, &result, |unit| owner.asked(unit));
+                    return result.map(|_: Done| None);
+                };
+                if agreement.hear(unit, &Answer::exception(function, code)) {
+                    return Err(error);
+                }
+                if !is_last {
+                    return Ok(None);
+                }
+                (error.sent, error.ended)
+            }
+        };
+        let failure = Failure::Disagreeing { asked: *asked };
+        course.hearing = None;
+        Err(self.ask.failed(failure, sent, ended, &[]))
+    }
+}
+
+/// Asks in this form, and has `course` remember whether the same may be asked again.
+fn put(
+    course: &mut Course,
+    owner: &mut Owner,
+    ask: &Ask<'_>,
+    form: Form,
+    give_up: &mut dyn FnMut() -> bool,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<Done, Box<CallError>> {
+    course.asks(owner.now());
+    let result = owner.exchange(ask, give_up, take);
+    course.leaves_open(ask, form, &result, |unit| owner.asked(unit));
+    result
+}
+
+/// Whether a refusal came, whatever it was meant for.
+fn is_refusal(failure: &Failure) -> bool {
+    matches!(failure, Failure::Refused { .. } | Failure::Wrong(AnswerError::Refusal { .. }))
+}
+
+#[cfg(test)]
+#[allow(clippy::panic, reason = "a test may panic")]
+mod tests;

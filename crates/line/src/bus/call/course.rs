@@ -1,0 +1,207 @@
+//! The attempts of one call: how long they may take, how many requests, what one leaves to the next, and after which failure
+//! there is a next. Here it is counted only; who sends is in `attempt`.
+
+use std::time::Duration;
+
+use drivebus_rtu::{Agreement, Destination, Instant, Request, UnitAddress};
+
+use crate::ask::{Ask, Done};
+use crate::error::{CallError, Failure};
+use crate::health::stats::Asked;
+use crate::line::PortErrorKind;
+
+/// How many more attempts than questions there may be: those that end with a probe.
+const PROBED_IN_VAIN: u32 = 4;
+
+/// Requests that one call may send for each time that it may ask, whatever they are for: the question, what makes sure of the
+/// unit and of the adapter before it, and what is asked again because answers do not agree.
+pub(crate) const REQUESTS: u32 = 8;
+
+/// How a question is put.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// As the caller did.
+    Plain,
+    /// As a read of so many words, which nothing that the unit owes could pass for.
+    Apart(u16),
+    /// As the caller did, until the answers agree.
+    Repeated,
+}
+
+/// A question that is put until the answers agree.
+///
+/// What this call has left open itself is no rival: whichever of its requests is answered, it is this question that was.
+pub(crate) struct Hearing {
+    pub(crate) agreement: Agreement,
+    pub(crate) asked: u32,
+    /// What was asked of the unit when the last answer came or was given up.
+    pub(crate) known: Option<Asked>,
+}
+
+/// What the attempts of one call leave to the next.
+pub(crate) struct Course {
+    /// How long the caller allowed them to take.
+    allowed: Duration,
+    /// When that is over: from the first look on, and then from the first question on.
+    until: Option<Instant>,
+    attempts: u32,
+    /// How often it was asked; a question that is repeated to be sure of its answer counts once.
+    asked: u32,
+    /// How many more questions and time-outs were granted because answers have to agree.
+    granted: u32,
+    /// What is left of the retries, in halves: a damaged answer, which took no time-out, costs one.
+    left: u32,
+    /// What was asked of the unit, if the last of it was a read of this call, which it left open; and how that was put.
+    left_open: Option<(Asked, Form)>,
+    /// What was heard of a question that is repeated until the answers agree.
+    pub(crate) hearing: Option<Hearing>,
+    /// Requests that are left.
+    requests: u32,
+    /// Whether a write was confirmed by what may have been the confirmation of another one.
+    unproven: bool,
+}
+
+impl Course {
+    /// With `retries` more questions than one, each with a wait of `timeout`.
+    ///
+    /// The time that the caller allowed, the time-out for each of these times, is allowed once for making sure of the
+    /// unit and once, from the first question on, for asking.
+    pub(crate) fn new(timeout: Duration, retries: u32) -> Self {
+        let allowed = timeout.saturating_mul(retries.saturating_add(1));
+        let left = retries.saturating_mul(2);
+        // One is kept for the look at the adapter after a request that did not wait for it.
+        let requests = retries.saturating_add(1).saturating_mul(REQUESTS) - 1;
+        Self {
+            allowed,
+            until: None,
+            attempts: 0,
+            asked: 0,
+            granted: 0,
+            left,
+            left_open: None,
+            hearing: None,
+            requests,
+            unproven: false,
+        }
+    }
+
+    /// The same call goes on with something else: with `retries` more questions than one, and what is left of the requests.
+    pub(crate) fn go_on_with(&mut self, timeout: Duration, retries: u32) {
+        *self = Self { requests: self.requests, ..Self::new(timeout, retries) };
+    }
+
+    /// Something is done that sends one request at most. False where none is left: then it must not be.
+    pub(crate) fn sends(&mut self) -> bool {
+        let may = self.requests > 0;
+        self.requests = self.requests.saturating_sub(1);
+        may
+    }
+
+    /// What confirmed the write may have been meant for another one.
+    pub(crate) fn is_unproven(&mut self) {
+        self.unproven = true;
+    }
+
+    /// Whether the write was [not proven](Self::is_unproven). Says so once.
+    pub(crate) fn take_unproven(&mut self) -> bool {
+        std::mem::take(&mut self.unproven)
+    }
+
+    /// Whether there is time left at `now`.
+    pub(crate) fn is_in_time(&mut self, now: Instant) -> bool {
+        now < *self.until.get_or_insert(now + self.allowed)
+    }
+
+    /// It is asked at `now`.
+    pub(crate) fn asks(&mut self, now: Instant) {
+        if self.asked == 0 {
+            self.until = Some(now + self.allowed);
+        }
+        self.asked += 1;
+    }
+
+    /// How often it was asked.
+    pub(crate) fn asked(&self) -> u32 {
+        self.asked
+    }
+
+    /// Remembers whether what came of `ask` in this form lets the same be asked again. `asked` tells what a unit was asked.
+    pub(crate) fn leaves_open(
+        &mut self,
+        ask: &Ask<'_>,
+        form: Form,
+        result: &Result<Done, Box<CallError>>,
+        asked: impl FnOnce(UnitAddress) -> Asked,
+    ) {
+        self.left_open = match (result, ask.destination, ask.request) {
+            (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
+                Some((asked(unit), form))
+            }
+            _ => None,
+        };
+    }
+
+    /// The question has to be put `more` times than once to be believed: that may take as many time-outs of `timeout` more, and
+    /// as many failures.
+    pub(crate) fn takes_more(&mut self, more: u32, timeout: Duration) {
+        let granted = more.saturating_sub(self.granted);
+        self.granted += granted;
+        self.left = self.left.saturating_add(granted.saturating_mul(2));
+        let longer = timeout.saturating_mul(granted);
+        self.allowed += longer;
+        self.until = self.until.map(|until| until + longer);
+    }
+
+    /// The question is repeated, `again` where all that its unit owes is the answer to it. `asked` tells what the unit was
+    /// asked.
+    pub(crate) fn repeats(&mut self, again: bool, asked: impl FnOnce() -> Asked) {
+        self.left_open = again.then(|| (asked(), Form::Repeated));
+    }
+
+    /// How the question was put, if all that its unit owes is the answer to this very one, so that it may be asked again as
+    /// it was. `asked` tells what the unit was asked. Says so once.
+    pub(crate) fn owes_only_this(&mut self, asked: impl FnOnce() -> Asked) -> Option<Form> {
+        self.left_open.take().filter(|(then, _)| *then == asked()).map(|(_, form)| form)
+    }
+
+    /// The question is put in another way the next time.
+    pub(crate) fn asks_otherwise(&mut self) {
+        self.left_open = None;
+    }
+
+    /// Whether there is another attempt after one that ended with `error`, before which it had been `asked` so often.
+    pub(crate) fn goes_on(&mut self, error: &CallError, asked: u32) -> bool {
+        self.attempts += 1;
+        let cost = match self.asked > asked {
+            true if is_damaged(&error.failure) => 1,
+            true => 2,
+            false => 0,
+        };
+        let is_over = (cost > 0 && self.left == 0) || self.attempts > self.asked.saturating_add(PROBED_IN_VAIN);
+        self.left = self.left.saturating_sub(cost);
+        let in_time = error.ended.is_some_and(|ended| self.is_in_time(ended));
+        !is_over && self.requests > 0 && is_passing(&error.failure) && in_time
+    }
+}
+
+/// Whether the same read may well succeed the next time.
+fn is_passing(failure: &Failure) -> bool {
+    match failure {
+        Failure::Busy { .. } | Failure::Doubtful | Failure::Disagreeing { .. } => true,
+        Failure::Port(error) => error.kind == PortErrorKind::Lost,
+        other => is_unanswered(other),
+    }
+}
+
+/// Whether the request went out, and no right answer came.
+pub(crate) fn is_unanswered(failure: &Failure) -> bool {
+    matches!(failure, Failure::NoAnswer { .. } | Failure::Unreached) || is_damaged(failure)
+}
+
+/// Whether an answer came that was none.
+fn is_damaged(failure: &Failure) -> bool {
+    matches!(failure, Failure::Wrong(_) | Failure::Corrupt(_))
+}
+
+#[cfg(test)]
+mod tests;

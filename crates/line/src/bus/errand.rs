@@ -1,0 +1,109 @@
+//! Requests of callers that do not wait in a thread of their own, such as those of an event loop.
+//!
+//! An [`Errand`] waits in the queue of its bus like any caller, and a thread of the bus's crew carries it out when its turn
+//! has come. Who does not want it any more takes it back: what still waits is never sent, and what is on the wire is left to
+//! end by itself, so that the line stays clean, and is not repeated.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use drivebus_rtu::{Adu, AnswerLength, Destination, Frame, Instant, Request};
+
+use crate::ask::Done;
+use crate::error::{CallError, Failure};
+use crate::options::CallOptions;
+
+/// A request, and who is told what became of it.
+pub struct Errand {
+    pub(super) destination: Destination,
+    /// The whole request frame.
+    frame: Vec<u8>,
+    /// For a request that is carried as it is.
+    answer: Option<AnswerLength>,
+    pub(super) options: CallOptions,
+    pub(super) wanted: Arc<AtomicBool>,
+    /// Taken when it is called.
+    then: Option<Then>,
+}
+
+type Then = Box<dyn FnOnce(Result<Reply, Box<CallError>>) + Send>;
+
+/// What came of an errand that went well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Reply {
+    /// The answer's PDU; empty after a broadcast.
+    pub pdu: Vec<u8>,
+    /// When it happened.
+    pub done: Done,
+}
+
+impl Errand {
+    /// `request` to `destination`; `then` is called once, by another thread, with what came of it.
+    ///
+    /// What is not carried out because the bus was closed ends with [`Failure::Closed`].
+    pub fn new(
+        destination: Destination,
+        request: &Request<'_>,
+        options: CallOptions,
+        then: impl FnOnce(Result<Reply, Box<CallError>>) + Send + 'static,
+    ) -> Self {
+        let frame = Adu::request(destination, request).as_bytes().to_vec();
+        let answer = match *request {
+            Request::Custom { answer, .. } => Some(answer),
+            _ => None,
+        };
+        let wanted = Arc::new(AtomicBool::new(true));
+        Self { destination, frame, answer, options, wanted, then: Some(Box::new(then)) }
+    }
+
+    /// What is asked. Always there: it was made of a request.
+    pub(super) fn request(&self) -> Option<Request<'_>> {
+        let pdu = Frame::parse(&self.frame).ok()?.pdu();
+        match self.answer {
+            Some(length) => Request::custom(pdu, length),
+            None => Request::parse(pdu),
+        }
+        .ok()
+    }
+
+    /// It is not carried out, for `failure`; `ended` is when that was known.
+    pub(super) fn fail(mut self, failure: Failure, ended: Option<Instant>) {
+        self.failed(failure, ended);
+    }
+
+    /// Nobody is told any more what comes of it.
+    pub(super) fn forget(mut self) {
+        self.then = None;
+    }
+
+    fn failed(&mut self, failure: Failure, ended: Option<Instant>) {
+        let (destination, request) = (self.destination, std::mem::take(&mut self.frame));
+        self.tell(Err(Box::new(CallError { failure, destination, request, raw: Vec::new(), sent: None, ended })));
+    }
+
+    pub(super) fn tell(&mut self, result: Result<Reply, Box<CallError>>) {
+        if let Some(then) = self.then.take() {
+            then(result);
+        }
+    }
+}
+
+impl Drop for Errand {
+    /// Nobody waits for ever: the thread that carried it out panicked, or its bus is gone.
+    fn drop(&mut self) {
+        if self.then.is_some() {
+            self.failed(Failure::Closed, None);
+        }
+    }
+}
+
+impl fmt::Debug for Errand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Errand")
+            .field("destination", &self.destination)
+            .field("frame", &self.frame)
+            .finish_non_exhaustive()
+    }
+}

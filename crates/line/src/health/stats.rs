@@ -1,0 +1,159 @@
+//! What happened on a bus, in numbers.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use drivebus_rtu::{Tally, UnitAddress};
+
+/// What happened on a bus since it was opened.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Stats {
+    /// Everything that can be told of the exchanges, over all units and broadcasts.
+    pub total: Counters,
+    /// The same for each unit that was asked; what came beside an answer counts for the unit that was asked then.
+    pub units: BTreeMap<UnitAddress, Counters>,
+    /// How often the port was opened again after it was lost.
+    pub reconnects: u64,
+}
+
+/// Counts of exchanges, and how long the answers took.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Counters {
+    /// Requests that went out, probes included.
+    pub requests: u64,
+    /// Right answers.
+    pub answers: u64,
+    /// Exceptions.
+    pub refusals: u64,
+    /// Requests without an answer in time.
+    pub timeouts: u64,
+    /// Answers whose CRC was wrong.
+    pub crc_errors: u64,
+    /// Whole frames that could not be the answer.
+    pub bad_answers: u64,
+    /// Requests sent once more.
+    pub retries: u64,
+    /// Reads asked twice, because the answer to another one might have been taken for theirs.
+    pub verified: u64,
+    /// Calls that were not sent, because the unit was silent before and others use the line.
+    pub not_asked: u64,
+    /// Requests that found the way back after one was left open: echoes, reads of another length, and reads of the caller's
+    /// that were put so that their answer is told apart.
+    pub resyncs: u64,
+    /// Whole frames that came before the request went out, or that the unit still owed.
+    pub late: u64,
+    /// Whole frames of others while an answer was waited for.
+    pub foreign: u64,
+    /// Bytes that belong to no frame.
+    pub noise_bytes: u64,
+    /// Those of them that are 00H or FFH.
+    pub noise_idle: u64,
+    /// Requests that the adapter sent back to us.
+    pub own_echoes: u64,
+    /// From the first bit of the request to the last byte of the answer.
+    pub round_trip: Latency,
+    /// From the last character of the request to the first of the answer, as the times of characters are computed: how
+    /// long the unit, the adapter and this machine took.
+    pub delay: Latency,
+}
+
+/// Shortest, longest and mean of a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Latency {
+    /// The shortest; zero while nothing was measured.
+    pub min: Duration,
+    /// The longest.
+    pub max: Duration,
+    sum: Duration,
+    count: u32,
+}
+
+impl Latency {
+    /// The mean; zero while nothing was measured.
+    pub fn mean(&self) -> Duration {
+        self.sum.checked_div(self.count).unwrap_or_default()
+    }
+
+    fn add(&mut self, time: Duration) {
+        self.min = if self.count == 0 { time } else { self.min.min(time) };
+        self.max = self.max.max(time);
+        self.sum = self.sum.saturating_add(time);
+        self.count = self.count.saturating_add(1);
+    }
+}
+
+/// How many requests went to a unit, and how often the port was opened again by then.
+pub(crate) type Asked = (u64, u64);
+
+impl Stats {
+    /// What `unit` was asked so far.
+    pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
+        (self.units.get(&unit).map_or(0, |counters| counters.requests), self.reconnects)
+    }
+
+    pub(crate) fn count(&mut self, unit: Option<UnitAddress>, change: impl Fn(&mut Counters)) {
+        change(&mut self.total);
+        if let Some(unit) = unit {
+            change(self.units.entry(unit).or_default());
+        }
+    }
+}
+
+impl Counters {
+    /// What was seen beside the answer.
+    pub(crate) fn add(&mut self, tally: Tally) {
+        for (count, more) in [
+            (&mut self.late, tally.late),
+            (&mut self.foreign, tally.foreign),
+            (&mut self.noise_bytes, tally.noise),
+            (&mut self.noise_idle, tally.noise_idle),
+            (&mut self.own_echoes, tally.own_echo),
+        ] {
+            *count = count.saturating_add(more.into());
+        }
+    }
+
+    pub(crate) fn answered(&mut self, round_trip: Duration, delay: Duration) {
+        self.answers = self.answers.saturating_add(1);
+        self.round_trip.add(round_trip);
+        self.delay.add(delay);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_that_are_full_stay_full() {
+        let full = Counters {
+            answers: u64::MAX,
+            late: u64::MAX,
+            foreign: u64::MAX,
+            noise_bytes: u64::MAX,
+            noise_idle: u64::MAX,
+            own_echoes: u64::MAX,
+            ..Counters::default()
+        };
+        let mut counters = full.clone();
+        counters.add(Tally { late: 1, foreign: 1, noise: 1, noise_idle: 1, own_echo: 1, own_remnant: 1 });
+        counters.answered(Duration::MAX, Duration::MAX);
+        counters.answered(Duration::MAX, Duration::MAX);
+        assert_eq!(Counters { round_trip: full.round_trip, delay: full.delay, ..counters }, full);
+        assert_eq!(counters.round_trip.max, Duration::MAX);
+    }
+
+    #[test]
+    fn latency_keeps_the_ends_and_the_mean() {
+        let mut latency = Latency::default();
+        assert_eq!(latency.mean(), Duration::ZERO);
+        for millis in [5, 2, 11] {
+            latency.add(Duration::from_millis(millis));
+        }
+        assert_eq!((latency.min, latency.max), (Duration::from_millis(2), Duration::from_millis(11)));
+        assert_eq!(latency.mean(), Duration::from_millis(6));
+    }
+}

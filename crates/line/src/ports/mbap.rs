@@ -1,0 +1,194 @@
+//! Modbus TCP: a gateway or drive that takes PDUs behind an MBAP header instead of RTU frames.
+//!
+//! To the bus this is one more line: it hands over RTU frames and gets RTU frames, so every check stays where it is.
+//! On the network, the CRC is left away and the header put in front:
+//!
+//! | bytes | what | value |
+//! | ----- | ---- | ----- |
+//! | 0, 1  | transaction | fresh for each request; the answer brings it back |
+//! | 2, 3  | protocol | 0 |
+//! | 4, 5  | length of what follows | 2..=254 |
+//! | 6     | unit | as in RTU |
+//! | 7..   | PDU | |
+//!
+//! Numbers are big-endian. Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3.
+
+use std::collections::VecDeque;
+
+use drivebus_rtu::{Duration, Instant, crc16};
+
+use crate::line::{Line, PortError, PortErrorKind};
+use crate::ports::tcp::Connection;
+use crate::system::clock::{monotonic, sleep_until};
+
+/// The port that the specification reserves for Modbus TCP.
+pub const DEFAULT_PORT: u16 = 502;
+
+/// Transaction, protocol and length: what comes before the unit.
+const PREFIX: usize = 6;
+/// Fewest and most bytes of unit and PDU.
+const MIN_BODY: usize = 2;
+const MAX_BODY: usize = 254;
+/// Transactions without an answer that are kept.
+const MAX_OPEN: usize = 32;
+/// Bytes of a CRC.
+const CRC: usize = 2;
+
+/// A connection to a Modbus TCP server, which carries RTU frames for the bus.
+#[derive(Debug)]
+pub struct ModbusTcp {
+    connection: Connection,
+    /// The transaction of the latest request.
+    transaction: u16,
+    /// Whether the answer to it is still to come.
+    waiting: bool,
+    /// Bytes from the network that are not yet a whole answer.
+    incoming: Vec<u8>,
+    /// What is left of the answer, as an RTU frame, that the bus has not taken yet.
+    frame: Vec<u8>,
+    /// Answers that came with another transaction than the latest.
+    foreign: u64,
+    /// The latest transactions that were not answered.
+    open: VecDeque<u16>,
+    /// Answers to them, as RTU frames, that nobody has taken yet.
+    late: VecDeque<Vec<u8>>,
+}
+
+impl ModbusTcp {
+    /// Connects to `host` (a name or an address) and `port`, usually [`DEFAULT_PORT`].
+    ///
+    /// Blocks for `timeout` at the longest for each address the name has, and for as long as the system takes to look
+    /// the name up.
+    ///
+    /// # Errors
+    ///
+    /// [`PortErrorKind::NotFound`]: no such host, nobody listens, or nobody answers in time.
+    pub fn connect(host: &str, port: u16, timeout: Duration) -> Result<Self, PortError> {
+        Ok(Self {
+            connection: Connection::open("tcp", host, port, timeout)?,
+            transaction: 0,
+            waiting: false,
+            incoming: Vec::with_capacity(2 * (PREFIX + MAX_BODY)),
+            frame: Vec::with_capacity(MAX_BODY + CRC),
+            foreign: 0,
+            open: VecDeque::new(),
+            late: VecDeque::new(),
+        })
+    }
+
+    /// Takes whole answers off `incoming` until the one waited for is found and put into `frame`.
+    fn unwrap_answers(&mut self) -> Result<(), PortError> {
+        while self.frame.is_empty()
+            && let [high, low, protocol_high, protocol_low, length_high, length_low, ..] = self.incoming[..]
+        {
+            let length = usize::from(u16::from_be_bytes([length_high, length_low]));
+            if [protocol_high, protocol_low] != [0, 0] || !(MIN_BODY..=MAX_BODY).contains(&length) {
+                // Nothing tells where the next header begins, so nothing after this can be trusted.
+                return Err(self.connection.lost(format_args!(
+                    "{:02X?} is no Modbus TCP header (a server that passes RTU through is opened as socket://)",
+                    &self.incoming[..PREFIX]
+                )));
+            }
+            let end = PREFIX + length;
+            if self.incoming.len() < end {
+                return Ok(());
+            }
+            let body = &self.incoming[PREFIX..end];
+            if self.waiting && u16::from_be_bytes([high, low]) == self.transaction {
+                self.waiting = false;
+                self.frame.extend_from_slice(body);
+                self.frame.extend_from_slice(&crc16(body).to_le_bytes());
+            } else {
+                self.foreign += 1;
+                // One that comes twice is late once.
+                if let Some(place) = self.open.iter().position(|&open| open.to_be_bytes() == [high, low]) {
+                    self.open.remove(place);
+                    self.late.push_back([body, &crc16(body).to_le_bytes()].concat());
+                }
+            }
+            self.incoming.drain(..end);
+        }
+        Ok(())
+    }
+}
+
+impl Line for ModbusTcp {
+    fn now(&self) -> Instant {
+        monotonic()
+    }
+
+    /// Sends `bytes`, a whole RTU frame, as a new transaction. What is left of an earlier answer is dropped.
+    fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
+        let body = bytes.len().checked_sub(CRC).filter(|length| (MIN_BODY..=MAX_BODY).contains(length));
+        let Some(body) = body.map(|length| &bytes[..length]) else {
+            let message = format!(
+                "{} bytes are no RTU frame of {}..={}; Modbus TCP carries whole frames only",
+                bytes.len(),
+                MIN_BODY + CRC,
+                MAX_BODY + CRC
+            );
+            return Err(PortError::new(PortErrorKind::Unsupported, &self.connection.name, message));
+        };
+        self.frame.clear();
+        if self.waiting {
+            if self.open.len() == MAX_OPEN {
+                self.open.pop_front();
+            }
+            self.open.push_back(self.transaction);
+        }
+        self.transaction = self.transaction.wrapping_add(1);
+        self.waiting = true;
+        let [length_high, length_low] = u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes();
+        let [high, low] = self.transaction.to_be_bytes();
+        let mut message = Vec::with_capacity(PREFIX + MAX_BODY);
+        message.extend_from_slice(&[high, low, 0, 0, length_high, length_low]);
+        message.extend_from_slice(body);
+        // In one piece: some servers take each segment for a whole message.
+        self.connection.send(&message)?;
+        Ok(monotonic())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
+        loop {
+            let foreign = self.foreign;
+            self.unwrap_answers()?;
+            if self.foreign > foreign && self.frame.is_empty() && monotonic() >= until {
+                return Ok(0); // a server that talks without end must not keep us
+            }
+            if !self.frame.is_empty() && !buffer.is_empty() {
+                let count = self.frame.len().min(buffer.len());
+                buffer[..count].copy_from_slice(&self.frame[..count]);
+                self.frame.drain(..count);
+                return Ok(count);
+            }
+            let mut bytes = [0; PREFIX + MAX_BODY];
+            match self.connection.receive(&mut bytes, until)? {
+                0 => return Ok(0),
+                count => self.incoming.extend_from_slice(&bytes[..count]),
+            }
+        }
+    }
+
+    fn sleep(&mut self, until: Instant) {
+        sleep_until(until);
+    }
+
+    fn name(&self) -> String {
+        self.connection.name.clone()
+    }
+
+    fn gapless(&self) -> bool {
+        true
+    }
+
+    fn take_late(&mut self) -> Option<Vec<u8>> {
+        self.late.pop_front()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        match self.foreign {
+            0 => Vec::new(),
+            count => vec![format!("answers with another transaction than asked, dropped: {count}")],
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! What is asked of the machine: the time, waits that end on time, and whose process this is.
+
+pub mod clock;
+pub(crate) mod process;
+pub(crate) mod punctual;
