@@ -17,16 +17,22 @@ mod echo;
 mod errand;
 mod error;
 mod exchange;
+#[cfg(feature = "serial")]
 mod facts;
 mod hint;
 mod hints;
+#[cfg(feature = "serial")]
 mod holder;
+#[cfg(feature = "serial")]
 mod identity;
+mod kind;
+#[cfg(feature = "serial")]
 mod latency;
 mod link;
 mod listen;
 mod longer;
 mod lumps;
+#[cfg(feature = "tcp")]
 pub mod mbap;
 #[cfg(test)]
 mod nobody;
@@ -39,15 +45,20 @@ mod poll_run;
 mod poll_samples;
 mod poll_schedule;
 mod port;
+mod ports;
 mod process;
 mod punctual;
 mod queue;
 mod resync;
+#[cfg(feature = "serial")]
 pub mod rs485;
 mod stats;
+#[cfg(feature = "tcp")]
 pub mod tcp;
+#[cfg(feature = "serial")]
 pub mod tty;
 mod units;
+mod words;
 
 pub use bus::{Bus, BusOptions};
 pub use call::CallOptions;
@@ -55,14 +66,19 @@ pub use echo::AdapterEcho;
 pub use errand::{Errand, Reply, Running};
 pub use error::{CallError, Failure};
 pub use exchange::Done;
+#[cfg(feature = "serial")]
 pub use facts::PortFacts;
 pub use hint::Hint;
+#[cfg(feature = "serial")]
 pub use identity::Places;
+pub use kind::ErrorKind;
 pub use link::Link;
 pub use opener::Opener;
 pub use poll::{Poll, PollCounts, PollError, PollTarget};
 pub use poll_ring::{PollBatch, PollSample};
 pub use port::{Line, LineClock, PortError, PortErrorKind};
+pub use ports::url;
 pub use queue::Priority;
 pub use stats::{Counters, Latency, Stats};
 pub use units::UnitOptions;
+pub use words::WordError;

@@ -22,7 +22,7 @@ use crate::tcp::Connection;
 use crate::{Line, PortError, PortErrorKind};
 
 /// The port that the specification reserves for Modbus TCP.
-pub const DEFAULT_PORT: u16 = 502;
+pub const DEFAULT_PORT: u16 = crate::url::MODBUS_TCP_PORT;
 
 /// Transaction, protocol and length: what comes before the unit.
 const PREFIX: usize = 6;

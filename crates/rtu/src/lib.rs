@@ -10,6 +10,7 @@ mod event;
 mod frame;
 mod framer;
 mod master;
+mod raw;
 mod request;
 mod serial;
 mod slave;

@@ -1,0 +1,3 @@
+//! The kinds of line that a machine has, and the text by which people name one of them.
+
+pub mod url;
