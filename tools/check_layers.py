@@ -1,4 +1,4 @@
-"""Checks that imports point down only: rtu ← drives, line ← sim ← the extension module ← the Python package.
+"""Checks that imports point down only: rtu ← drives, line ← sim ← the door for Rust, and the extension module ← Python.
 
 `check_layers.py` checks the work tree. `check_layers.py --self-test` breaks each rule once in a copy and expects
 to be told so: a check that cannot fail checks nothing.
@@ -24,6 +24,7 @@ CRATES: dict[str, set[str]] = {
     "drives": set(),
     "line": {"rtu"},
     "sim": {"rtu", "drives", "line"},
+    "drivebus": {"rtu", "drives", "line", "sim"},
     "python": {"rtu", "drives", "line", "sim"},
 }
 
@@ -55,6 +56,7 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "line": re.compile(r"\bunsafe\b"),
     "python": re.compile(r"\bunsafe\b"),
     "sim": re.compile(r"\bunsafe\b"),
+    "drivebus": re.compile(r"\bunsafe\b"),
 }
 
 # The one file with `unsafe`, which says why: two ioctls that no crate offers.
@@ -122,9 +124,14 @@ def code_of(path: Path) -> str:
     return text.partition("#[cfg(test)]")[0]
 
 
+def package(crate: str) -> str:
+    """What the crate in the folder *crate* is called."""
+    return crate if crate == "drivebus" else f"drivebus-{crate}"
+
+
 def tree(root: Path, crate: str) -> list[str]:
     """What `cargo tree` prints for *crate*: itself, and what it is built from."""
-    command = ["cargo", "tree", "-p", f"drivebus-{crate}", "-e", "normal,build", "--prefix", "none"]
+    command = ["cargo", "tree", "-p", package(crate), "-e", "normal,build", "--prefix", "none"]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise SystemExit(f"check_layers: {' '.join(command)} failed:\n{done.stderr}")
@@ -137,9 +144,9 @@ def crate_findings(root: Path) -> Iterator[str]:
         lines = tree(root, crate)
         if crate == "rtu" and len(lines) != 1:
             yield f"crates/rtu: depends on nothing, but cargo tree prints {len(lines)} lines: {', '.join(lines[1:4])}"
-        used = {match[1] for line in lines[1:] if (match := re.match(r"drivebus-(\w+) ", line))}
+        used = {match[1] or match[2] for line in lines[1:] if (match := re.match(r"drivebus-(\w+) |(drivebus) ", line))}
         for wrong in sorted(used - allowed - {crate}):
-            yield f"crates/{crate}: must not use drivebus-{wrong}"
+            yield f"crates/{crate}: must not use {package(wrong)}"
 
     for crate, pattern in FORBIDDEN_IN_CRATE.items():
         for path in sorted((root / "crates" / crate / "src").rglob("*.rs")):
@@ -345,6 +352,13 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
         f"{HEAD}\ndrivebus-drives.workspace = true",
         "crates/line: must not use drivebus-drives",
     ),
+    (
+        "crates/drivebus/Cargo.toml",
+        HEAD,
+        f'{HEAD}\ndrivebus-python = {{ path = "../python" }}',
+        "crates/drivebus: must not use drivebus-python",
+    ),
+    ("crates/drivebus/src/lib.rs", "//!", "unsafe fn f() {}\n//!", "drivebus/src/lib.rs: must not use `unsafe`"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line::{Line, Bus};\n//!", "takes `Bus` of drivebus_line"),
     ("crates/sim/src/lib.rs", "//!", "use drivebus_line as line;\n//!", "takes `*` of drivebus_line"),
     ("crates/line/src/turns/queue.rs", "use crate::", "use crate::bus::Bus;\nuse crate::", "turns must not use bus"),

@@ -10,13 +10,18 @@ ROOT = Path(__file__).resolve().parent.parent
 SECONDS = 120
 
 
+def package(folder: str) -> str:
+    """What the crate in *folder* is called."""
+    return folder if folder == "drivebus" else f"drivebus-{folder}"
+
+
 def commands() -> list[list[str]]:
     """One command for each example."""
     python = [
         [sys.executable, "-W", "error", str(path.relative_to(ROOT))] for path in sorted(ROOT.glob("examples/*.py"))
     ]
     rust = [
-        ["cargo", "run", "--quiet", "--locked", "-p", f"drivebus-{path.parent.parent.name}", "--example", path.stem]
+        ["cargo", "run", "--quiet", "--locked", "-p", package(path.parent.parent.name), "--example", path.stem]
         for path in sorted(ROOT.glob("crates/*/examples/*.rs"))
     ]
     return python + rust

@@ -28,6 +28,7 @@ __all__ = [
     "Simulator",
     "__version__",
     "begin_of_child",
+    "check_port_options",
     "crc16",
     "decode",
     "decode_answer",
@@ -38,6 +39,7 @@ __all__ = [
     "fault_kinds",
     "open_bus",
     "port_facts",
+    "port_url",
 ]
 
 def crc16(data: Buffer, /) -> int:
@@ -81,6 +83,23 @@ def port_facts(
     `driver`, `adapter`, `latency_timer_ms`, `latency_rule` (each may be None), `holders`. *by_id* and *tty_class* are
     other folders than this machine's.
     """
+
+def port_url(
+    port: str,
+    /,
+    *,
+    schemes: Sequence[str],
+    families: Sequence[str],
+    faults: Sequence[str],
+) -> tuple[str, dict[str, Any]]:
+    """What *port* is, before anything is opened: its scheme (`""` of a path), and of `sim://` what `Simulator` takes.
+
+    *schemes* are those that the caller opens itself, *families* and *faults* what a simulated line can have. NotAllowed
+    names the part that is wrong and what is allowed there.
+    """
+
+def check_port_options(port: str | None, rs485: bool, echo: str, /) -> None:
+    """Raises NotAllowed for what cannot be meant of *port*, which is None where it has no name."""
 
 @final
 class SerialFormat:

@@ -54,6 +54,8 @@
 //! * A bound that is another parameter (`P00.03` for frequencies) is checked at its own limit here, because this crate
 //!   knows no drive's settings, and named, so that a caller who read the parameter can check further.
 
+#![forbid(unsafe_code)]
+
 mod bits;
 mod decimal;
 mod entry;

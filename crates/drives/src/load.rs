@@ -43,11 +43,11 @@ const MOST_LEVELS: usize = 3;
 #[non_exhaustive]
 pub enum ProfileError {
     /// No shipped profile has this name.
-    #[error("no profile \"{name}\" is shipped; the closest is \"{closest}\"")]
+    #[error("no profile \"{name}\" is shipped{}", nearest(closest))]
     Unknown {
         /// The name as given.
         name: String,
-        /// The name closest to it.
+        /// The name closest to it; empty where none is shipped with this build.
         closest: String,
     },
     /// A file of the profile cannot be read.
@@ -80,6 +80,13 @@ impl ProfileError {
         };
         (FILES.iter().position(|name| file.ends_with(name)).unwrap_or_default(), line)
     }
+}
+
+fn nearest(closest: &str) -> String {
+    if closest.is_empty() {
+        return String::from(" with this build, which is without the feature \"builtin-profiles\"");
+    }
+    format!("; the closest is \"{closest}\"")
 }
 
 /// One file of a profile, in memory.
@@ -118,6 +125,7 @@ struct Builtin {
 }
 
 /// A shipped profile by its folder, with those of its tables that it has.
+#[cfg(feature = "builtin-profiles")]
 macro_rules! builtin {
     ($name:literal: $($table:literal)*) => {
         Builtin {
@@ -129,6 +137,7 @@ macro_rules! builtin {
     };
 }
 
+#[cfg(feature = "builtin-profiles")]
 static BUILTINS: [Builtin; 11] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
@@ -142,6 +151,9 @@ static BUILTINS: [Builtin; 11] = [
     builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
 ];
+
+#[cfg(not(feature = "builtin-profiles"))]
+static BUILTINS: [Builtin; 0] = [];
 
 impl Builtin {
     fn files(&self) -> Files {

@@ -26,8 +26,8 @@ use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
+use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
-use crate::owner::opener::Opener;
 
 /// One line and its owner.
 ///

@@ -1,5 +1,7 @@
 //! What can become of a call, and whether the unit may have acted.
 
+pub(crate) mod kind;
+
 use std::fmt;
 use std::time::Duration;
 

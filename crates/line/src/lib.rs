@@ -3,7 +3,31 @@
 //! [`Bus`] drives the state machines of `drivebus-rtu` over any [`Line`]: a serial port, a serial server, a Modbus TCP
 //! gateway, or the simulated line of `drivebus-sim`. It is safe from any thread. One caller at a time owns the line; the
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
-//! over at its last byte. The documentation of `drivebus-sim` opens one and asks something.
+//! over at its last byte.
+//!
+//! Ports are opened by what people call them ([`url`]), or by an [`Opener`] of one's own, here of a simulated line. The crate
+//! `drivebus` puts plain numbers around it, and futures.
+//!
+//! ```
+//! use drivebus_line::{Bus, BusOptions, CallOptions};
+//! use drivebus_rtu::{Answer, Destination, Request, SerialFormat, UnitAddress};
+//! use drivebus_sim::{Options, Simulator};
+//!
+//! let simulator = Simulator::new([(1, "gd350")], Options::default())?;
+//! let opener = move || Ok(Box::new(simulator.open_line()?) as _);
+//! let bus = Bus::open(Box::new(opener), BusOptions::new(SerialFormat::default()), &mut || false)?;
+//!
+//! let unit = Destination::Unit(UnitAddress::new(1)?);
+//! let mut word = None;
+//! let mut take = |answer: Answer<'_>| {
+//!     if let Answer::Read { words, .. } = answer {
+//!         word = words.get(0);
+//!     }
+//! };
+//! bus.call(unit, &Request::read(0x2103, 1)?, CallOptions::default(), &mut || false, &mut take)?;
+//! assert_eq!(word, Some(0x01A0)); // a Goodrive350
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! The rooms, each on those before it:
 //!
@@ -39,19 +63,26 @@ pub use ask::Done;
 pub use bus::Bus;
 pub use bus::errand::{Errand, Reply};
 pub use bus::workers::Running;
+pub use error::kind::ErrorKind;
 pub use error::{CallError, Failure};
 pub use health::hint::Hint;
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Stats};
-pub use line::{Line, LineClock, PortError, PortErrorKind};
+pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};
 pub use options::{AdapterEcho, BusOptions, CallOptions, UnitOptions};
-pub use owner::opener::Opener;
 pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
 pub use poll::samples::PollCounts;
 pub use poll::target::{PollError, PollTarget};
+#[cfg(feature = "serial")]
 pub use ports::adapters::facts::PortFacts;
+#[cfg(feature = "serial")]
 pub use ports::adapters::identity::Places;
-pub use ports::{mbap, rs485, tcp, tty};
+pub use ports::url;
+pub use ports::words::WordError;
+#[cfg(feature = "tcp")]
+pub use ports::{mbap, tcp};
+#[cfg(feature = "serial")]
+pub use ports::{rs485, tty};
 pub use system::clock;
 pub use turns::order::Priority;

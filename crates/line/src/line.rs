@@ -11,6 +11,9 @@ use drivebus_rtu::Instant;
 /// What tells the time of a line, from any thread and without waiting.
 pub type LineClock = Arc<dyn Fn() -> Instant + Send + Sync>;
 
+/// Opens the line, at first and again after it was lost.
+pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Line>, PortError> + Send>;
+
 /// A way for bytes to reach units and to come back, with a clock of its own.
 ///
 /// A line knows nothing about frames. It is used by one owner at a time, and no call blocks beyond the moment it is

@@ -2,8 +2,8 @@
 
 use drivebus_rtu::{Duration, Instant};
 
+use crate::line::Opener;
 use crate::line::{Line, PortError};
-use crate::owner::opener::Opener;
 
 /// What the line says of itself.
 #[derive(Debug, Default)]

@@ -18,6 +18,7 @@ use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::health::link::Links;
 use crate::health::stats::{Asked, Stats};
+use crate::line::Opener;
 use crate::line::{Line, LineClock};
 use crate::options::AdapterEcho;
 use crate::owner::dead_units::DeadUnits;
@@ -25,7 +26,7 @@ use crate::owner::delays::Delays;
 use crate::owner::exchange::exchange;
 use crate::owner::longer::Longer;
 use crate::owner::lumps::Lumps;
-use crate::owner::opener::{LineOpener, Opener};
+use crate::owner::opener::LineOpener;
 use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
 
 /// What to do next for a request.

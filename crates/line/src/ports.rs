@@ -1,7 +1,14 @@
-//! The kinds of line that a machine has: serial ports and their adapters, serial servers, Modbus TCP.
+//! The kinds of line that a machine has, and the words by which people name one and say how it shall behave.
 
+#[cfg(feature = "serial")]
 pub(crate) mod adapters;
+#[cfg(feature = "tcp")]
 pub mod mbap;
+#[cfg(feature = "serial")]
 pub mod rs485;
+#[cfg(feature = "tcp")]
 pub mod tcp;
+#[cfg(feature = "serial")]
 pub mod tty;
+pub mod url;
+pub(crate) mod words;

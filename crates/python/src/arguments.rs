@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drivebus_line::{AdapterEcho, BusOptions, CallOptions, Failure, Opener, Priority};
-use drivebus_rtu::{AnswerLength, Request};
+use drivebus_line::{AdapterEcho, BusOptions, CallOptions, Failure, Opener};
+use drivebus_rtu::Request;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -27,12 +27,7 @@ pub(crate) fn to_open(
     low_latency: bool,
     queue: usize,
 ) -> PyResult<(Opener, BusOptions)> {
-    let echo = match echo {
-        "auto" => AdapterEcho::Auto,
-        "yes" => AdapterEcho::Present,
-        "no" => AdapterEcho::Absent,
-        other => return Err(not_allowed(format!("echo {other:?} is not \"auto\", \"yes\" or \"no\""))),
-    };
+    let echo: AdapterEcho = echo.parse().map_err(refuse)?;
     let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
     let timeout = duration("timeout", timeout)?;
     let turnaround = duration("turnaround", turnaround)?;
@@ -51,38 +46,27 @@ pub(crate) fn read_request(address: &Bound<'_, PyAny>, count: &Bound<'_, PyAny>)
     Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)
 }
 
-pub(crate) fn read_options(
-    timeout: Option<f64>,
-    retries: Option<u32>,
-    urgent: bool,
-    verify: bool,
-) -> PyResult<CallOptions> {
-    let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
-    Ok(CallOptions { timeout, retries, verify, priority: stop_if(urgent), ..CallOptions::default() })
-}
-
-pub(crate) fn write_options(
-    urgent: bool,
-    read_back: Option<&Bound<'_, PyAny>>,
-    connection: Option<u64>,
-) -> PyResult<CallOptions> {
-    let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-    let priority = stop_if(urgent);
-    Ok(CallOptions { in_doubt: urgent, priority, read_back, connection, ..CallOptions::default() })
-}
-
-/// A request that is known by name is checked as one; anything else is carried as it is.
-pub(crate) fn any_request(pdu: &[u8], reply_length: Option<u8>) -> PyResult<Request<'_>> {
-    let length = reply_length.map_or(AnswerLength::BySilence, AnswerLength::Bytes);
-    match Request::parse(pdu) {
-        Ok(request) if reply_length.is_none() && !matches!(request, Request::Custom { .. }) => Ok(request),
-        _ => Request::custom(pdu, length).map_err(refuse),
+/// `words`: a sequence of them, or else one.
+pub(crate) fn write_request(address: u16, words: &Result<Vec<u16>, u16>) -> PyResult<Request<'_>> {
+    match words {
+        Err(word) => Ok(Request::write(address, *word)),
+        Ok(words) => Request::write_many(address, words).map_err(refuse),
     }
 }
 
-/// The turn of a stop.
-fn stop_if(urgent: bool) -> Option<Priority> {
-    urgent.then_some(Priority::Stop)
+pub(crate) fn read_options(timeout: Option<f64>, retries: Option<u32>, verify: bool) -> PyResult<CallOptions> {
+    let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
+    Ok(CallOptions { timeout, retries, verify, ..CallOptions::default() })
+}
+
+pub(crate) fn write_options(read_back: Option<&Bound<'_, PyAny>>, connection: Option<u64>) -> PyResult<CallOptions> {
+    let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
+    Ok(CallOptions { read_back, connection, ..CallOptions::default() })
+}
+
+/// `options` for `request`, which may be urgent.
+pub(crate) fn options_for(request: &Request<'_>, options: CallOptions, urgent: bool) -> CallOptions {
+    if urgent { options.urgent(request) } else { options }
 }
 
 pub(crate) fn duration(what: &str, given: f64) -> PyResult<Duration> {

@@ -10,7 +10,9 @@ use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::arguments::{any_request, duration, open_failed, read_options, read_request, to_open, write_options};
+use crate::arguments::{
+    duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
+};
 use crate::convert::{bytes_of, one_word, unit_address, words_of};
 use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
@@ -115,8 +117,8 @@ impl Bus {
         urgent: bool,
         verify: bool,
     ) -> PyResult<Bound<'py, PyList>> {
-        let options = read_options(timeout, retries, urgent, verify)?;
-        Ok(self.read_words(unit, address, count, options)?.0)
+        let options = read_options(timeout, retries, verify)?;
+        Ok(self.read_words(unit, address, count, options, urgent)?.0)
     }
 
     #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
@@ -128,8 +130,8 @@ impl Bus {
         urgent: bool,
         verify: bool,
     ) -> PyResult<(Bound<'py, PyList>, f64, f64)> {
-        let options = read_options(None, None, urgent, verify)?;
-        let (words, done) = self.read_words(unit, address, count, options)?;
+        let options = read_options(None, None, verify)?;
+        let (words, done) = self.read_words(unit, address, count, options, urgent)?;
         let clock = self.unix_clock(unit.py());
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
@@ -144,13 +146,13 @@ impl Bus {
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
     ) -> PyResult<()> {
-        let options = write_options(urgent, read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), address, value, options)
+        let options = write_options(read_back, connection)?;
+        self.write_to(unit_address(unit)?.into(), address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.write_to(Destination::Broadcast, address, value, CallOptions::default())
+        self.write_to(Destination::Broadcast, address, value, CallOptions::default(), false)
     }
 
     #[pyo3(signature = (unit, word = None, /, *, timeout = None))]
@@ -181,7 +183,7 @@ impl Bus {
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
         let pdu = pdu.as_bytes();
-        let request = any_request(pdu, reply_length)?;
+        let request = Request::raw(pdu, reply_length).map_err(refuse)?;
         let mut reply = Vec::new();
         self.call(
             py,
@@ -245,9 +247,11 @@ impl Bus {
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
         options: CallOptions,
+        urgent: bool,
     ) -> PyResult<(Bound<'py, PyList>, Done)> {
         let py = unit.py();
         let request = read_request(address, count)?;
+        let options = options_for(&request, options, urgent);
         // Kept here while the interpreter is let go of, so that only the list is made.
         let (mut read, mut count) = ([0; MAX_READ as usize], 0);
         let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
@@ -265,16 +269,13 @@ impl Bus {
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
         options: CallOptions,
+        urgent: bool,
     ) -> PyResult<()> {
         let py = address.py();
         let address = one_word("address", address)?;
-        match words_of(value)? {
-            Err(value) => self.call(py, to, &Request::write(address, value), options, &mut |_| ())?,
-            Ok(words) => {
-                let request = Request::write_many(address, &words).map_err(refuse)?;
-                self.call(py, to, &request, options, &mut |_| ())?
-            }
-        };
+        let words = words_of(value)?;
+        let request = write_request(address, &words)?;
+        self.call(py, to, &request, options_for(&request, options, urgent), &mut |_| ())?;
         Ok(())
     }
 

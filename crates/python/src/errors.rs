@@ -1,7 +1,7 @@
 //! Rust's errors as the exceptions of `drivebus.errors`, which are written in Python so that they have docs and two
 //! bases where it helps.
 
-use drivebus_line::{CallError, Failure, PortError};
+use drivebus_line::{CallError, ErrorKind, Failure, PortError};
 use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError, Instant};
 use pyo3::exceptions::PySystemExit;
 use pyo3::prelude::*;
@@ -119,17 +119,16 @@ pub(crate) fn call_error(error: &CallError, clock: UnixClock) -> PyErr {
         keywords.set_item("ended", ended)
     };
     let message = error.to_string();
+    let class = match error.kind() {
+        ErrorKind::Port => Class::Port,
+        ErrorKind::NoAnswer => Class::NoAnswer,
+        ErrorKind::Crc => Class::Crc,
+        ErrorKind::Unconfirmed => Class::Unconfirmed,
+        ErrorKind::NotAllowed => Class::NotAllowed,
+        _ => Class::BadAnswer,
+    };
     match error.failure {
-        Failure::Port(_) | Failure::Reopened | Failure::Forked | Failure::Closed => Class::Port.raise(message, details),
-        Failure::NotBegun(_) | Failure::ReadOnly { .. } | Failure::QueueFull { .. } => {
-            Class::NotAllowed.raise(message, details)
-        }
-        Failure::Doubtful | Failure::NotAsked { .. } | Failure::Unreached => Class::NoAnswer.raise(message, details),
-        Failure::NotTaken { .. } => Class::Unconfirmed.raise(message, details),
-        Failure::NoAnswer { .. } if error.raw.is_empty() => Class::NoAnswer.raise(message, details),
-        Failure::Corrupt(FrameError::Crc { .. }) => Class::Crc.raise(message, details),
         Failure::Refused { code, .. } => refused(&message, code, details),
-        // A line that is never silent is full of bytes that are no answer.
-        _ => Class::BadAnswer.raise(message, details),
+        _ => class.raise(message, details),
     }
 }

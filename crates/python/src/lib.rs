@@ -40,7 +40,7 @@ mod _native {
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]
-    use crate::open::port_facts;
+    use crate::open::{check_port_options, port_facts, port_url};
     #[pymodule_export]
     use crate::plan::Plan;
     #[pymodule_export]

@@ -1,24 +1,20 @@
 //! From what the Python package hands over as a port to a line of the core.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
-use drivebus_line::mbap::{DEFAULT_PORT, ModbusTcp};
-use drivebus_line::rs485::{MAX_DELAY_MS, RTS_MARGIN_MS, Rs485, Switch};
-use drivebus_line::tcp::RtuOverTcp;
-use drivebus_line::tty::{Adapter, TtyOptions};
-use drivebus_line::{Line, Opener, Places};
+use drivebus_line::rs485::{MAX_DELAY_MS, Rs485};
+use drivebus_line::tty::TtyOptions;
+use drivebus_line::url::{self, Known, PortOptions, PortUrl, SimulatorUrl};
+use drivebus_line::{AdapterEcho, Line, Opener, Places, WordError};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
 use crate::bus::gone;
-use crate::errors::{not_allowed, port_error};
+use crate::convert::shown;
+use crate::errors::{not_allowed, port_error, refuse};
 use crate::pyserial::PySerialLine;
 use crate::sim::Simulator;
-
-/// How long a server may take to accept a connection.
-const CONNECT: Duration = Duration::from_secs(3);
 
 /// What opens `port`, and the format its characters have.
 pub(crate) fn opener(
@@ -32,9 +28,7 @@ pub(crate) fn opener(
         let options = TtyOptions { rs485, low_latency, ..TtyOptions::default() };
         return Ok((named(text.to_str()?, format, options)?, format));
     }
-    if rs485.is_some() {
-        return Err(no_rs485());
-    }
+    url::check_together(None, rs485.is_some(), AdapterEcho::Auto).map_err(refuse)?;
     if let Ok(simulator) = port.cast::<Simulator>() {
         let simulator = simulator.clone().unbind();
         let opener = move || simulator.get().sim_line();
@@ -50,64 +44,74 @@ pub(crate) fn opener(
     Ok((Box::new(opener), format))
 }
 
-fn named(port: &str, format: SerialFormat, options: TtyOptions) -> PyResult<Opener> {
-    let port = port.to_owned();
-    let (scheme, rest) = port.split_once("://").unwrap_or(("", &port));
-    if !scheme.is_empty() && options.rs485.is_some() {
-        return Err(no_rs485());
-    }
-    match scheme {
-        "" => {
-            let mut adapter = Adapter::new(port, format, options);
-            Ok(Box::new(move || Ok(Box::new(adapter.open()?))))
-        }
-        "socket" => {
-            let (host, number) = host_and_port(&port, rest, None)?;
-            Ok(Box::new(move || Ok(Box::new(RtuOverTcp::connect(&host, number, &format, CONNECT)?))))
-        }
-        "tcp" => {
-            let (host, number) = host_and_port(&port, rest, Some(DEFAULT_PORT))?;
-            Ok(Box::new(move || Ok(Box::new(ModbusTcp::connect(&host, number, CONNECT)?))))
-        }
-        other => Err(not_allowed(format!("port {port:?}: {other}:// is not socket:// or tcp://"))),
-    }
+/// What the core opens by its name.
+fn named(port: &str, format: SerialFormat, tty: TtyOptions) -> PyResult<Opener> {
+    url::check_together(Some(port), tty.rs485.is_some(), AdapterEcho::Auto).map_err(refuse)?;
+    let parsed = PortUrl::parse(port, &Known::default()).map_err(refuse)?;
+    parsed
+        .opener(&PortOptions::new(format).tty(tty))
+        .ok_or_else(|| not_allowed(format!("port {port:?} is not opened by its name here")))
 }
 
-/// Nobody would move an RTS there.
-fn no_rs485() -> PyErr {
-    not_allowed(String::from("rs485 is for a serial port given by its path"))
-}
-
-/// `host:port`, `[ipv6]:port`, or only the host where the scheme has a usual port.
-fn host_and_port(url: &str, rest: &str, usual: Option<u16>) -> PyResult<(String, u16)> {
-    let rest = rest.trim_end_matches('/');
-    let (host, number) = match rest.rsplit_once(':') {
-        Some((host, number)) if !number.contains(']') => (host, number.parse().ok()),
-        _ => (rest, usual),
+/// What `port` is, before anything is opened: its scheme, which a path has not, and for `sim://` the arguments of a
+/// simulator.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "what a function of Python is given, it owns")]
+#[pyo3(signature = (port, /, *, schemes, families, faults))]
+pub(crate) fn port_url<'py>(
+    py: Python<'py>,
+    port: &str,
+    schemes: Vec<String>,
+    families: Vec<String>,
+    faults: Vec<String>,
+) -> PyResult<(String, Bound<'py, PyDict>)> {
+    fn texts(names: &[String]) -> Vec<&str> {
+        names.iter().map(String::as_str).collect()
+    }
+    let (schemes, families, faults) = (texts(&schemes), texts(&families), texts(&faults));
+    let known = Known { schemes: &schemes, families: &families, faults: &faults };
+    let (scheme, simulator) = match PortUrl::parse(port, &known).map_err(refuse)? {
+        PortUrl::Simulator(simulator) => ("sim".to_owned(), simulator_arguments(py, &simulator)?),
+        PortUrl::Foreign { scheme } => (scheme, PyDict::new(py)),
+        PortUrl::RtuOverTcp(_) => ("socket".to_owned(), PyDict::new(py)),
+        PortUrl::ModbusTcp(_) => ("tcp".to_owned(), PyDict::new(py)),
+        _ => (String::new(), PyDict::new(py)),
     };
-    let host = host.trim_start_matches('[').trim_end_matches(']');
-    match number {
-        Some(number) if !host.is_empty() => Ok((host.to_owned(), number)),
-        _ => Err(not_allowed(format!("port {url:?} is not scheme://host:port with a port in 0..65535"))),
+    Ok((scheme, simulator))
+}
+
+fn simulator_arguments<'py>(py: Python<'py>, simulator: &SimulatorUrl) -> PyResult<Bound<'py, PyDict>> {
+    let (all, units, faults) = (PyDict::new(py), PyDict::new(py), PyDict::new(py));
+    for (unit, family) in &simulator.units {
+        units.set_item(unit.get(), family)?;
     }
+    for (kind, rate) in &simulator.faults {
+        faults.set_item(kind, rate)?;
+    }
+    all.set_item("units", units)?;
+    all.set_item("clock", if simulator.is_virtual { "virtual" } else { "real" })?;
+    all.set_item("seed", simulator.seed)?;
+    all.set_item("strict_silence", simulator.strict_silence)?;
+    all.set_item("echo", simulator.echo)?;
+    all.set_item("faults", faults)?;
+    Ok(all)
+}
+
+/// Refuses what cannot be meant of a port, which may have no name.
+#[pyfunction]
+#[pyo3(signature = (port, rs485, echo, /))]
+pub(crate) fn check_port_options(port: Option<&Bound<'_, PyString>>, rs485: bool, echo: &str) -> PyResult<()> {
+    // What is not UTF-8 has no scheme that anybody knows.
+    let port = port.map(|port| port.to_string_lossy());
+    url::check_together(port.as_deref(), rs485, echo.parse().map_err(refuse)?).map_err(refuse)
 }
 
 fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
     let mut options = Rs485::default();
     // First, because what is not given depends on it.
     if let Some(mode) = given.get_item("mode")? {
-        options.switch = match mode.extract::<String>().as_deref() {
-            Ok("kernel") => Switch::Driver,
-            Ok("rts") => Switch::Program,
-            Ok("auto") => Switch::Either,
-            _ => {
-                let mode = mode.repr()?;
-                return Err(not_allowed(format!("rs485: mode {mode} is not \"kernel\", \"rts\" or \"auto\"")));
-            }
-        };
-        if options.switch == Switch::Program {
-            options.delay_after_ms = RTS_MARGIN_MS;
-        }
+        let known = mode.extract::<String>().ok().and_then(|word| word.parse().ok());
+        options = known.ok_or_else(|| refuse(WordError::Switch { word: shown(&mode) }))?;
     }
     for (key, value) in given {
         let key: String = key.extract().map_err(|_| not_allowed(format!("rs485: {key} is not known")))?;

@@ -11,7 +11,9 @@ use drivebus_rtu::{Answer, Destination, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arguments::{any_request, duration, open_failed, read_options, read_request, to_open, write_options};
+use crate::arguments::{
+    duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
+};
 use crate::bus::{Bus, Heard, UnixClock};
 use crate::convert::{one_word, unit_address, words_of};
 use crate::errors::{call_error, refuse};
@@ -110,8 +112,8 @@ impl Requests {
         urgent: bool,
         verify: bool,
     ) -> PyResult<Asked> {
-        let options = read_options(timeout, retries, urgent, verify)?;
         let request = read_request(address, count)?;
+        let options = options_for(&request, read_options(timeout, retries, verify)?, urgent);
         Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| words(&reply).into_pyobject(py)))
     }
 
@@ -124,8 +126,8 @@ impl Requests {
         urgent: bool,
         verify: bool,
     ) -> PyResult<Asked> {
-        let options = read_options(None, None, urgent, verify)?;
         let request = read_request(address, count)?;
+        let options = options_for(&request, read_options(None, None, verify)?, urgent);
         Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, clock| {
             let stamped = (words(&reply), clock.at(reply.done.sent), clock.at(reply.done.ended));
             Ok(stamped.into_pyobject(py)?.into_any())
@@ -142,13 +144,13 @@ impl Requests {
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
     ) -> PyResult<Asked> {
-        let options = write_options(urgent, read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), address, value, options)
+        let options = write_options(read_back, connection)?;
+        self.write_to(unit_address(unit)?.into(), address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        self.write_to(Destination::Broadcast, address, value, CallOptions::default())
+        self.write_to(Destination::Broadcast, address, value, CallOptions::default(), false)
     }
 
     #[pyo3(signature = (unit, word = None, /))]
@@ -162,7 +164,7 @@ impl Requests {
 
     #[pyo3(signature = (unit, pdu, reply_length = None, /))]
     fn transact(&self, unit: &Bound<'_, PyAny>, pdu: &Bound<'_, PyBytes>, reply_length: Option<u8>) -> PyResult<Asked> {
-        let request = any_request(pdu.as_bytes(), reply_length)?;
+        let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
         let options = CallOptions { retries: Some(0), ..CallOptions::default() };
         Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| {
             Ok(PyBytes::new(py, &reply.pdu).into_any())
@@ -210,15 +212,12 @@ impl Requests {
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
         options: CallOptions,
+        urgent: bool,
     ) -> PyResult<Asked> {
         let address = one_word("address", address)?;
-        match words_of(value)? {
-            Err(value) => Ok(self.ask(to, &Request::write(address, value), options, confirmed)),
-            Ok(words) => {
-                let request = Request::write_many(address, &words).map_err(refuse)?;
-                Ok(self.ask(to, &request, options, confirmed))
-            }
-        }
+        let words = words_of(value)?;
+        let request = write_request(address, &words)?;
+        Ok(self.ask(to, &request, options_for(&request, options, urgent), confirmed))
     }
 
     /// Leaves the request with the bus. `make` makes of the reply what the program gets.

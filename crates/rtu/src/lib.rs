@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
+#![forbid(unsafe_code)]
 
 mod address;
 mod agreement;
@@ -12,6 +13,7 @@ mod frame;
 mod framer;
 mod master;
 mod pdu;
+mod raw;
 mod request;
 mod serial;
 mod slave;

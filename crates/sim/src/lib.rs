@@ -71,6 +71,8 @@
 //! - Bits, parity and noise levels are not simulated: a character arrives, or it arrives spoilt.
 //! - What a drive does that its manual does not say is marked "Assumption:" in the source, beside the code that does it.
 
+#![forbid(unsafe_code)]
+
 mod clock;
 mod drive;
 mod error;

@@ -1,15 +1,15 @@
 """From what a person types as a port to what the core opens.
 
-Paths and COM names, `socket://` and `tcp://` go to the core as they are. `sim://` makes a simulator. pyserial's other
-URLs are opened by pyserial. What is already open is taken as it is.
+The core knows the grammar of ports. Paths and COM names, `socket://` and `tcp://` it opens itself. `sim://` makes a
+simulator. pyserial's other URLs are opened by pyserial. What is already open is taken as it is.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import parse_qsl
 
 import serial
 
@@ -19,11 +19,9 @@ from drivebus.errors import NotAllowed, PortError
 from drivebus.profile import profiles
 from drivebus.sim import FAULT_KINDS, Simulator
 
-__all__ = ["PortFacts", "facts", "format_of", "open_simulator", "resolve"]
+__all__ = ["PortFacts", "facts", "format_of", "resolve"]
 
-_CORE_SCHEMES = ("socket", "tcp")
 _PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
-_SIMULATOR_OPTIONS = ("clock", "seed", "strict_silence", "echo", "faults")
 
 
 @dataclass(frozen=True)
@@ -98,22 +96,14 @@ def format_of(port: object, asked: SerialFormat) -> SerialFormat:
 
 
 def _resolve_text(port: str, line: SerialFormat) -> Any:
-    if not port.strip() or "\0" in port:
-        raise NotAllowed(f"port {port!r} is no port; give a path such as /dev/ttyUSB0 or COM3, or a URL")
     try:
         port.encode()
     except UnicodeError:
         raise NotAllowed(f"port {port!r} is not in UTF-8, and no port can be called that") from None
-    scheme, separator, _ = port.partition("://")
-    if not separator or scheme in _CORE_SCHEMES:
-        return port
+    scheme, simulator = _native.port_url(port, schemes=_PYSERIAL_SCHEMES, families=profiles(), faults=FAULT_KINDS)
     if scheme == "sim":
-        return open_simulator(port, line)
-    if scheme in _PYSERIAL_SCHEMES:
-        return _open_pyserial(port, line)
-    known = (*_CORE_SCHEMES, "sim", *_PYSERIAL_SCHEMES)
-    names = ", ".join(f"{name}://" for name in known)
-    raise NotAllowed(f"port {port!r} has an unknown scheme; known are {names}{checks.closest(scheme, known)}")
+        return _simulator(simulator, line)
+    return _open_pyserial(port, line) if scheme in _PYSERIAL_SCHEMES else port
 
 
 def _open_pyserial(url: str, line: SerialFormat) -> Any:
@@ -131,59 +121,14 @@ def _open_pyserial(url: str, line: SerialFormat) -> Any:
         raise PortError(f"{url} could not be opened: {error}") from error
 
 
-def open_simulator(url: str, line: SerialFormat) -> Simulator:
-    """`sim://gd350` or `sim://1=gd350,2=gd350`, with `?clock=virtual&seed=1`, as a simulator in this process.
-
-    `faults=0.02` is the share of answers that each kind of fault hits, `late=0.1` that of one kind, `echo=1` an adapter
-    that echoes.
-    """
-    body, _, query = url.removeprefix("sim://").partition("?")
-    units: dict[int, str] = {}
-    for part in body.strip("/").split(","):
-        left, equals, right = part.partition("=")
-        unit, family = (left, right) if equals else ("1", left)
-        number = checks.digits(unit)
-        if number is None:
-            raise NotAllowed(f"unit {unit!r} in {url!r} is not a whole number; allowed is 1..247, as in sim://1=gd350")
-        if number in units:
-            raise NotAllowed(f"unit {unit} stands twice in {url!r}; give each unit once, as in sim://1=gd350,2=gd350")
-        units[checks.unit(number)] = checks.one_of("profile", family, profiles())
-    options = {"clock": "real", "seed": "0", "strict_silence": "0", "echo": "0"}
-    faults: dict[str, float] = {}
-    given = parse_qsl(query, keep_blank_values=True)
-    for key, value in given:
-        checks.one_of("simulator option", key, (*_SIMULATOR_OPTIONS, *FAULT_KINDS))
-        if [other for other, _ in given].count(key) > 1:
-            raise NotAllowed(f"simulator option {key!r} stands twice in {url!r}; give it once")
-        if key == "faults" or key in FAULT_KINDS:
-            faults["all" if key == "faults" else key] = _share(key, value, url)
-        else:
-            options[key] = value
-    seed = checks.digits(options["seed"])
-    if seed is None:
-        raise NotAllowed(f"seed {options['seed']!r} in {url!r} is not a whole number; allowed is 0 or more")
+def _simulator(arguments: Mapping[str, Any], line: SerialFormat) -> Simulator:
+    """The simulator that a URL asks for, in this process."""
     return Simulator(
-        units,
+        **arguments,
         baudrate=line.baudrate,
         parity=line.parity,
         stopbits=line.stopbits,
         bytesize=line.bytesize,
         silence=line.silence,
-        seed=seed,
         transport="process",
-        clock=options["clock"],
-        strict_silence=_is_on("strict_silence", options["strict_silence"]),
-        faults=faults,
-        echo=_is_on("echo", options["echo"]),
     )
-
-
-def _is_on(option: str, text: str) -> bool:
-    return checks.one_of(option, text.lower(), ("0", "1", "false", "true")) in ("1", "true")
-
-
-def _share(kind: str, text: str, url: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise NotAllowed(f"rate {text!r} of {kind} in {url!r} is not a number; allowed is 0..1") from None

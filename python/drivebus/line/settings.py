@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
 from drivebus.line import ports
@@ -80,11 +80,8 @@ def check_trust(profile: object, trust: object) -> None:
 def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
     """Refuses what cannot be meant of *port*, before it is resolved: that opens URLs of pyserial and simulators."""
     named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
-    scheme = named.partition("://")[0] if isinstance(named, str) and "://" in named else ""
-    if keywords["rs485"] is not None and (not isinstance(named, str) or scheme):
-        raise NotAllowed("rs485 is for a serial port given by its path: nobody would move an RTS here")
-    if keywords["echo"] == "yes" and scheme == "tcp":
-        raise NotAllowed('echo "yes" is for an adapter that hands back what it sends, and tcp:// has none: Modbus TCP')
+    name = named if isinstance(named, str) else None
+    _native.check_port_options(name, keywords["rs485"] is not None, keywords["echo"])
 
 
 class _Native(Protocol):

@@ -1,1 +1,5 @@
-//! Nothing of its own: the tests stand in `tests/`.
+//! Nothing of its own: the tests stand in `tests/`, and the examples of docs/rust.md are tests here.
+
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/rust.md")]
+struct RustPage;

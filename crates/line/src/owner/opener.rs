@@ -10,11 +10,8 @@ use std::time::Duration;
 use drivebus_rtu::Instant;
 
 use crate::error::Failure;
-use crate::line::{Line, PortError, PortErrorKind};
+use crate::line::{Line, Opener, PortError, PortErrorKind};
 use crate::system::clock::{LOOK_UP, monotonic};
-
-/// Opens the line, at first and again after it was lost.
-pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Line>, PortError> + Send>;
 
 type Opened = Result<Box<dyn Line>, PortError>;
 

@@ -22,7 +22,7 @@ use crate::ports::tcp::Connection;
 use crate::system::clock::{monotonic, sleep_until};
 
 /// The port that the specification reserves for Modbus TCP.
-pub const DEFAULT_PORT: u16 = 502;
+pub const DEFAULT_PORT: u16 = crate::ports::url::MODBUS_TCP_PORT;
 
 /// Transaction, protocol and length: what comes before the unit.
 const PREFIX: usize = 6;

@@ -1,0 +1,163 @@
+//! The bus whose calls are futures.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
+use drivebus_rtu::{Destination, Request};
+
+use super::asked::Asked;
+use super::poll::Poll;
+use crate::asking;
+use crate::builder::Builder;
+use crate::bus::once;
+use crate::checks;
+use crate::error::Error;
+use crate::options::CallOptions;
+use crate::payload::Payload;
+use crate::poll::Target;
+use crate::reading::{Reading, Values};
+
+/// One line with drives on it, whose calls are futures. The calls are those of [`drivebus::Bus`](crate::Bus), and so is
+/// what they say of errors.
+#[derive(Debug, Clone)]
+pub struct Bus(crate::Bus);
+
+impl From<crate::Bus> for Bus {
+    fn from(bus: crate::Bus) -> Self {
+        Self(bus)
+    }
+}
+
+impl Bus {
+    /// Opens `port` as it is usual; what is different says a [`Builder`] in [`open_as`](Self::open_as).
+    pub fn open(port: &str) -> Asked<Self> {
+        Self::open_as(Builder::default(), port)
+    }
+
+    /// Opens `port` as `builder` says.
+    pub fn open_as(builder: Builder, port: &str) -> Asked<Self> {
+        let port = port.to_owned();
+        Asked::apart(move |wanted| builder.open_while(&port, &mut || wanted.load(Ordering::Acquire)).map(Self))
+    }
+
+    /// The same bus for who waits in a thread: what it tells at once is asked there.
+    pub fn blocking(&self) -> &crate::Bus {
+        &self.0
+    }
+
+    /// Reads `count` words: as [`Bus::read`](crate::Bus::read).
+    pub fn read(&self, unit: u8, address: u16, count: u16) -> Asked<Vec<u16>> {
+        self.read_with(unit, address, count, CallOptions::new())
+    }
+
+    /// As [`Bus::read_with`](crate::Bus::read_with).
+    pub fn read_with(&self, unit: u8, address: u16, count: u16, options: CallOptions) -> Asked<Vec<u16>> {
+        let checked = || {
+            let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
+            Ok((unit.into(), request, options.of(&request)?))
+        };
+        self.ask(checked(), |reply| asking::words_of(&reply))
+    }
+
+    /// Writes a word or a sequence of words: as [`Bus::write`](crate::Bus::write).
+    pub fn write<'a>(&self, unit: u8, address: u16, value: impl Into<Payload<'a>>) -> Asked<()> {
+        self.write_with(unit, address, value, CallOptions::new())
+    }
+
+    /// As [`Bus::write_with`](crate::Bus::write_with).
+    pub fn write_with<'a>(
+        &self,
+        unit: u8,
+        address: u16,
+        value: impl Into<Payload<'a>>,
+        options: CallOptions,
+    ) -> Asked<()> {
+        let payload = value.into();
+        let checked = || {
+            let (unit, request) = (checks::unit(unit)?, checks::write(address, &payload)?);
+            Ok((unit.into(), request, options.of(&request)?))
+        };
+        self.ask(checked(), drop)
+    }
+
+    /// Writes to every unit at once: as [`Bus::broadcast`](crate::Bus::broadcast).
+    pub fn broadcast<'a>(&self, address: u16, value: impl Into<Payload<'a>>) -> Asked<()> {
+        let payload = value.into();
+        let checked = || Ok((Destination::Broadcast, checks::write(address, &payload)?, LineOptions::default()));
+        self.ask(checked(), drop)
+    }
+
+    /// How long `unit` takes to send a word back: as [`Bus::echo`](crate::Bus::echo).
+    pub fn echo(&self, unit: u8) -> Asked<Duration> {
+        let request = Request::echo(self.0.core.fresh_word());
+        let checked = checks::unit(unit).map(|unit| (unit.into(), request, LineOptions::default()));
+        self.ask(checked, |reply| reply.done.ended.saturating_duration_since(reply.done.sent))
+    }
+
+    /// Sends any PDU: as [`Bus::transact`](crate::Bus::transact).
+    pub fn transact(&self, unit: u8, pdu: &[u8], reply_length: Option<u8>) -> Asked<Vec<u8>> {
+        let checked = || Ok((checks::unit(unit)?.into(), Request::raw(pdu, reply_length)?, once()));
+        self.ask(checked(), |reply| reply.pdu)
+    }
+
+    /// The values of `reading`: as [`Bus::values`](crate::Bus::values).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::values`](crate::Bus::values).
+    pub async fn values(&self, unit: u8, reading: &Reading) -> Result<Values, Error> {
+        let mut words = Vec::with_capacity(reading.words());
+        for (address, count) in reading.reads() {
+            words.extend(self.read(unit, address, count).await?);
+        }
+        Ok(reading.values(&words))
+    }
+
+    /// Asks `targets` again and again: as [`Bus::poll`](crate::Bus::poll).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::poll`](crate::Bus::poll).
+    pub fn poll(
+        &self,
+        targets: impl IntoIterator<Item = Target>,
+        interval: impl Into<Option<Duration>>,
+    ) -> Result<Poll, Error> {
+        self.0.poll(targets, interval).map(Poll::new)
+    }
+
+    /// Waits on the line's clock, which in virtual time moves only so.
+    pub fn sleep(&self, time: Duration) -> Asked<()> {
+        let bus = self.0.clone();
+        Asked::apart(move |wanted| {
+            bus.core.sleep(time, &mut || !wanted.load(Ordering::Acquire));
+            Ok(())
+        })
+    }
+
+    /// Closes the line for all handles. What waits ends with an error.
+    pub fn close(&self) -> Asked<()> {
+        let bus = self.0.clone();
+        Asked::apart(move |_| {
+            bus.close();
+            Ok(())
+        })
+    }
+
+    /// Counters and latencies since the bus was opened.
+    pub fn stats(&self) -> Stats {
+        self.0.stats()
+    }
+
+    fn ask<T: Send + 'static>(
+        &self,
+        checked: Result<(Destination, Request<'_>, LineOptions), Error>,
+        make: impl FnOnce(Reply) -> T + Send + 'static,
+    ) -> Asked<T> {
+        match checked {
+            Ok((to, request, options)) => Asked::errand(&self.0.core, to, &request, options, make),
+            Err(error) => Asked::refused(error),
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! What is asked, and what is made of the answer: the same for who waits and for a future.
+
+use drivebus_line::Reply;
+use drivebus_rtu::{Adu, Answer, Frame, UnitAddress};
+
+/// The words of an answer to a read.
+pub(crate) fn words(answer: &Answer<'_>) -> Vec<u16> {
+    match answer {
+        Answer::Read { words, .. } => words.iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The words of a reply to a read.
+pub(crate) fn words_of(reply: &Reply) -> Vec<u16> {
+    Answer::parse(&reply.pdu).map(|answer| words(&answer)).unwrap_or_default()
+}
+
+/// The answer's PDU as it came.
+pub(crate) fn pdu(unit: UnitAddress, answer: &Answer<'_>) -> Vec<u8> {
+    let frame = Adu::answer(unit, answer);
+    Frame::parse(frame.as_bytes()).map(|frame| frame.pdu().to_vec()).unwrap_or_default()
+}

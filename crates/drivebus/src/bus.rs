@@ -1,0 +1,277 @@
+//! The bus as a program uses it: plain numbers in, words out, one thread that waits.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions};
+use drivebus_rtu::{Answer, Destination, Instant, Request};
+
+use crate::asking;
+use crate::builder::Builder;
+use crate::checks;
+use crate::error::Error;
+use crate::options::CallOptions;
+use crate::payload::Payload;
+use crate::poll::{Poll, Target};
+use crate::reading::{Reading, Values};
+
+/// One line with drives on it. Clones are handles to the same line, and it is safe from any thread.
+///
+/// Each call waits for its turn, a stop before all others, and returns when it is answered. Units are plain numbers,
+/// 1..=247. What cannot be sent is refused before anything is.
+#[derive(Debug, Clone)]
+pub struct Bus {
+    pub(crate) core: Arc<Core>,
+    #[cfg(feature = "sim")]
+    simulator: Option<drivebus_sim::Simulator>,
+}
+
+impl Bus {
+    /// Opens `port` as it is usual: a path, or one of the URLs in the [crate's documentation](crate#ports).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Builder::open`].
+    pub fn open(port: &str) -> Result<Self, Error> {
+        Self::builder().open(port)
+    }
+
+    /// Sets what is different, and then opens.
+    pub fn builder() -> Builder {
+        Builder::default()
+    }
+
+    pub(crate) fn around(core: Core) -> Self {
+        Self {
+            core: Arc::new(core),
+            #[cfg(feature = "sim")]
+            simulator: None,
+        }
+    }
+
+    #[cfg(feature = "sim")]
+    pub(crate) fn simulated(core: Core, simulator: drivebus_sim::Simulator) -> Self {
+        Self { core: Arc::new(core), simulator: Some(simulator) }
+    }
+
+    /// The simulator behind a `sim://` port: its wire and its drives, seen from the shaft.
+    #[cfg(feature = "sim")]
+    pub fn simulator(&self) -> Option<&drivebus_sim::Simulator> {
+        self.simulator.as_ref()
+    }
+
+    /// What was opened, for people.
+    pub fn port(&self) -> &str {
+        self.core.name()
+    }
+
+    /// Whether it was closed, or belongs to the parent of this process.
+    pub fn is_closed(&self) -> bool {
+        self.core.is_closed()
+    }
+
+    /// Closes the line for all handles. What waits ends with an error. Closing again does nothing.
+    ///
+    /// It is closed by itself when the last handle is gone.
+    pub fn close(&self) {
+        self.core.close();
+    }
+
+    /// Reads `count` words (1..=125) of `unit` from `address`: function 03H.
+    ///
+    /// Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves. A read that brings nothing is
+    /// asked again, as often as the bus is set to.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: a read changes nothing in a drive, whatever became of it.
+    pub fn read(&self, unit: u8, address: u16, count: u16) -> Result<Vec<u16>, Error> {
+        self.read_with(unit, address, count, CallOptions::new())
+    }
+
+    /// As [`read`](Self::read), with what this call wants otherwise.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`read`](Self::read).
+    pub fn read_with(&self, unit: u8, address: u16, count: u16, options: CallOptions) -> Result<Vec<u16>, Error> {
+        let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
+        let mut words = Vec::new();
+        self.call(unit.into(), &request, options.of(&request)?, &mut |answer| words = asking::words(&answer))?;
+        Ok(words)
+    }
+
+    /// Writes a word (06H) or a sequence of words (10H) to `unit`. Sent once, never repeated.
+    ///
+    /// A word in a command register moves the motor. A unit that may still owe another answer is first asked for an echo,
+    /// or for a read that cannot be mistaken; if it answers neither, the write is not sent.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: unless [`may_have_acted`](Error::may_have_acted) says so, the unit has not taken it.
+    pub fn write<'a>(&self, unit: u8, address: u16, value: impl Into<Payload<'a>>) -> Result<(), Error> {
+        self.write_with(unit, address, value, CallOptions::new())
+    }
+
+    /// As [`write`](Self::write), with what this call wants otherwise.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`write`](Self::write).
+    pub fn write_with<'a>(
+        &self,
+        unit: u8,
+        address: u16,
+        value: impl Into<Payload<'a>>,
+        options: CallOptions,
+    ) -> Result<(), Error> {
+        let (unit, payload) = (checks::unit(unit)?, value.into());
+        let request = checks::write(address, &payload)?;
+        self.call(unit.into(), &request, options.of(&request)?, &mut |_| ())?;
+        Ok(())
+    }
+
+    /// Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: the units may have taken it where [`may_have_acted`](Error::may_have_acted) says so.
+    pub fn broadcast<'a>(&self, address: u16, value: impl Into<Payload<'a>>) -> Result<(), Error> {
+        let payload = value.into();
+        let request = checks::write(address, &payload)?;
+        self.call(Destination::Broadcast, &request, LineOptions::default(), &mut |_| ())?;
+        Ok(())
+    }
+
+    /// Asks `unit` to send a fresh word back (08H/0000), and tells how long that took.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: an echo changes nothing in a drive.
+    pub fn echo(&self, unit: u8) -> Result<Duration, Error> {
+        let (unit, request) = (checks::unit(unit)?, Request::echo(self.core.fresh_word()));
+        let done = self.call(unit.into(), &request, LineOptions::default(), &mut |_| ())?;
+        Ok(done.ended.saturating_duration_since(done.sent))
+    }
+
+    /// Sends any PDU (1..=253 bytes, the function code first) and returns the answer's PDU. Sent once.
+    ///
+    /// Unit and CRC are added and checked. `reply_length` is the length of the answer's PDU; without it the end is found by
+    /// the function or by silence.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: the unit may have acted where [`may_have_acted`](Error::may_have_acted) says so.
+    pub fn transact(&self, unit: u8, pdu: &[u8], reply_length: Option<u8>) -> Result<Vec<u8>, Error> {
+        let (unit, request) = (checks::unit(unit)?, Request::raw(pdu, reply_length)?);
+        let mut reply = Vec::new();
+        self.call(unit.into(), &request, once(), &mut |answer| reply = asking::pdu(unit, &answer))?;
+        Ok(reply)
+    }
+
+    /// The values of `reading` from `unit`, in the fewest reads.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`read`](Self::read).
+    pub fn values(&self, unit: u8, reading: &Reading) -> Result<Values, Error> {
+        let unit = checks::unit(unit)?;
+        let mut words = Vec::with_capacity(reading.words());
+        for (address, count) in reading.reads() {
+            let request = checks::read(address, count)?;
+            let mut take = |answer: Answer<'_>| words.extend(asking::words(&answer));
+            self.call(unit.into(), &request, LineOptions::default(), &mut take)?;
+        }
+        Ok(reading.values(&words))
+    }
+
+    /// Asks `targets` again and again, and keeps what comes as samples until they are taken.
+    ///
+    /// In each cycle every target is asked once; a cycle begins at every beat of `interval`, or right after the one
+    /// before. Whatever else wants the line goes before the next request. What is not answered is not repeated: the
+    /// sample says so, and the next cycle asks again. On a real line a thread of the poll's own does the asking; in virtual
+    /// time it is done by who waits for samples.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: there is nobody to ask, or the wire cannot carry so much so often; the message has the shortest interval.
+    pub fn poll(
+        &self,
+        targets: impl IntoIterator<Item = Target>,
+        interval: impl Into<Option<Duration>>,
+    ) -> Result<Poll, Error> {
+        Poll::start(&self.core, targets.into_iter().collect(), interval.into())
+    }
+
+    /// What comes within `time` while nothing is asked: pieces, each with its moment on the line's clock.
+    ///
+    /// # Errors
+    ///
+    /// [`Port`](crate::ErrorKind::Port): the line was lost or closed.
+    pub fn listen(&self, time: Duration) -> Result<Vec<(Instant, Vec<u8>)>, Error> {
+        let mut heard = Vec::new();
+        self.core.listen(time, &mut || false, &mut |moment, bytes| heard.push((moment, bytes.to_vec())))?;
+        Ok(heard)
+    }
+
+    /// Waits on the line's clock, which in virtual time moves only so.
+    pub fn sleep(&self, time: Duration) {
+        self.core.sleep(time, &mut || false);
+    }
+
+    /// Now, on the line's clock.
+    pub fn now(&self) -> Instant {
+        self.core.now()
+    }
+
+    /// Sets what `unit` needs otherwise than the bus, for every call from now on.
+    ///
+    /// # Errors
+    ///
+    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit, or a time that cannot be.
+    pub fn configure(&self, unit: u8, options: UnitOptions) -> Result<(), Error> {
+        options.timeout.map_or(Ok(()), checks::timeout)?;
+        options.gap.map_or(Ok(()), |gap| checks::time("gap", gap))?;
+        self.core.configure(checks::unit(unit)?, options);
+        Ok(())
+    }
+
+    /// Of the last ten exchanges with `unit`, how many brought an answer.
+    ///
+    /// # Errors
+    ///
+    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
+    pub fn link(&self, unit: u8) -> Result<Link, Error> {
+        Ok(self.core.link(checks::unit(unit)?))
+    }
+
+    /// Counters and latencies since the bus was opened, for the line and for each unit.
+    pub fn stats(&self) -> Stats {
+        self.core.stats()
+    }
+
+    /// What the user should know about the line, such as a setting that did not reach the wire.
+    pub fn notes(&self) -> Vec<String> {
+        self.core.notes()
+    }
+
+    /// The same bus for who does not wait in a thread.
+    pub fn aio(&self) -> crate::aio::Bus {
+        crate::aio::Bus::from(self.clone())
+    }
+
+    fn call(
+        &self,
+        to: Destination,
+        request: &Request<'_>,
+        options: LineOptions,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Error> {
+        Ok(self.core.call(to, request, options, &mut || false, take)?)
+    }
+}
+
+/// What is carried as it is may do anything, so it is never repeated.
+pub(crate) fn once() -> LineOptions {
+    LineOptions { retries: Some(0), ..LineOptions::default() }
+}

@@ -1,0 +1,58 @@
+//! Errors by whose fault they are: the names that every language has for them, and whether the unit may have acted.
+
+use drivebus_rtu::FrameError;
+
+use crate::error::{CallError, Failure};
+
+/// Whose fault an error is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The port: not found, busy, not permitted, lost or closed. It is opened again by itself at the next call.
+    Port,
+    /// The unit stayed silent.
+    NoAnswer,
+    /// Bytes came, but no valid answer to what was asked.
+    BadAnswer,
+    /// The bytes that came do not match their own CRC: a [`BadAnswer`](Self::BadAnswer) too.
+    Crc,
+    /// The unit said no. What it was doing before, it still does.
+    Refused,
+    /// What was asked was sent, and its effect is not known.
+    Unconfirmed,
+    /// Nothing was sent: out of range, read-only, an unknown name, no room in the queue.
+    NotAllowed,
+}
+
+impl Failure {
+    /// Whose fault it is, where no bytes came.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind_of(false)
+    }
+
+    fn kind_of(&self, came: bool) -> ErrorKind {
+        match self {
+            Self::Port(_) | Self::Reopened | Self::Forked | Self::Closed => ErrorKind::Port,
+            Self::NotBegun(_) | Self::ReadOnly { .. } | Self::QueueFull { .. } => ErrorKind::NotAllowed,
+            Self::Doubtful | Self::NotAsked { .. } | Self::Unreached => ErrorKind::NoAnswer,
+            Self::NotTaken { .. } => ErrorKind::Unconfirmed,
+            Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,
+            Self::Corrupt(FrameError::Crc { .. }) => ErrorKind::Crc,
+            Self::Refused { .. } => ErrorKind::Refused,
+            // A line that is never silent is full of bytes that are no answer.
+            _ => ErrorKind::BadAnswer,
+        }
+    }
+}
+
+impl CallError {
+    /// Whose fault it is.
+    pub fn kind(&self) -> ErrorKind {
+        self.failure.kind_of(!self.raw.is_empty())
+    }
+
+    /// Whether the unit may have done what was asked: the request went out, and the unit did not refuse it.
+    pub fn may_have_acted(&self) -> bool {
+        self.sent.is_some() && !matches!(self.failure, Failure::Refused { .. })
+    }
+}

@@ -1,0 +1,30 @@
+//! PDUs that somebody gives as they are.
+
+use crate::pdu::AnswerLength;
+use crate::request::{Request, RequestError};
+
+impl<'a> Request<'a> {
+    /// The request that `pdu` is: one that is known by name is checked as one, anything else is carried as it is.
+    ///
+    /// With `reply_length`, how many bytes the answer's PDU has, it is carried in any case.
+    ///
+    /// ```
+    /// use drivebus_rtu::{AnswerLength, Request};
+    ///
+    /// assert_eq!(Request::raw(&[0x06, 0x20, 0x00, 0x00, 0x05], None)?, Request::write(0x2000, 5));
+    /// let coils = [0x01, 0x00, 0x13, 0x00, 0x13];
+    /// assert_eq!(Request::raw(&coils, None)?, Request::custom(&coils, AnswerLength::BySilence)?);
+    /// # Ok::<(), drivebus_rtu::RequestError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`custom`](Self::custom).
+    pub fn raw(pdu: &'a [u8], reply_length: Option<u8>) -> Result<Self, RequestError> {
+        let length = reply_length.map_or(AnswerLength::BySilence, AnswerLength::Bytes);
+        match Self::parse(pdu) {
+            Ok(request) if reply_length.is_none() && !matches!(request, Self::Custom { .. }) => Ok(request),
+            _ => Self::custom(pdu, length),
+        }
+    }
+}
