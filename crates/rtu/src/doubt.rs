@@ -124,9 +124,6 @@ pub(crate) struct Doubts {
     forgotten_until: Instant,
     /// The frame that was heard last since a request went out, by unit and CRC, and when: a line may bring it twice at once.
     heard: Option<(u8, [u8; 2], Instant)>,
-    /// The open answer that was seen since a request of the same function went out to the same unit: so long as that one is
-    /// not answered, what was seen may have been its answer, with another number of words than it was asked for.
-    sight: Option<Open>,
 }
 
 impl Doubts {
@@ -140,7 +137,6 @@ impl Doubts {
         forgotten: UnitSet::EMPTY,
         forgotten_until: Instant::ZERO,
         heard: None,
-        sight: None,
     };
 
     /// The line was opened at `now`: anybody may have asked anything before.
@@ -151,7 +147,6 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.was_not_seen(now);
         self.enter(now, unit, expected, window(timeout), now);
         self.open.insert(unit);
     }
@@ -159,7 +154,6 @@ impl Doubts {
     /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
-        self.was_not_seen(now);
         self.enter(now, unit, expected, window, now);
     }
 
@@ -180,12 +174,8 @@ impl Doubts {
             }
             return;
         }
-        self.keep(now, Open { unit, expected, count: 1, given_up: since, last, window });
-    }
-
-    /// Takes one of a kind into the ledger of which there is none.
-    fn keep(&mut self, now: Instant, open: Open) {
-        self.listed.insert(open.unit);
+        self.listed.insert(unit);
+        let open = Open { unit, expected, count: 1, given_up: since, last, window };
         let over = |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && open.is_past(now));
         if let Some(place) = self.ledger.iter().position(over) {
             self.ledger[place] = Some(open);
@@ -248,18 +238,6 @@ impl Doubts {
     /// A request goes out: what is heard from here on is not the same frame twice.
     pub(crate) fn goes_out(&mut self) {
         self.heard = None;
-        self.sight = None;
-    }
-
-    /// What was seen since a request went out may have been its answer: what it was taken for is open as before.
-    fn was_not_seen(&mut self, now: Instant) {
-        let Some(seen) = self.sight.take() else { return };
-        self.open.insert(seen.unit);
-        let alike = |open: &&mut Open| open.unit == seen.unit && open.expected == seen.expected;
-        match self.ledger.iter_mut().flatten().find(alike) {
-            Some(open) => open.count = open.count.saturating_add(1),
-            None => self.keep(now, seen),
-        }
     }
 
     /// A whole frame came that answers nothing in flight. Where it can only be an answer that is open, that one is not any
@@ -267,8 +245,7 @@ impl Doubts {
     ///
     /// Not so an answer that looks like its request, which an adapter may have sent back; nor one of the first second, which
     /// another program may have asked for; nor the same frame again within `at_once`, which the line may have brought twice.
-    /// Nor a second one of the unit and the function that are `awaited`: see [`was_not_seen`](Self::was_not_seen).
-    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration, awaited: bool) {
+    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) {
         let is_new = self.hear(now, frame, at_once);
         let Ok(unit) = UnitAddress::new(frame.address()) else { return };
         if !is_new || self.is_strange(now, unit) {
@@ -280,12 +257,6 @@ impl Doubts {
         };
         let mut fitting = self.ledger.iter_mut().filter(|open| open.as_ref().is_some_and(answers));
         let (Some(place), None) = (fitting.next(), fitting.next()) else { return };
-        if awaited {
-            if self.sight.is_some() {
-                return;
-            }
-            self.sight = place.map(|open| Open { count: 1, ..open }).filter(|open| !open.expected.may_repeat_request());
-        }
         match place {
             Some(open) if open.expected.may_repeat_request() => return,
             Some(open) if open.count > 1 => open.count -= 1,

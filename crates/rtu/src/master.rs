@@ -336,7 +336,7 @@ impl Master {
     /// What it answers is owed no more. Bytes that are no frame change nothing.
     pub fn saw_late(&mut self, now: Instant, frame: &[u8]) {
         if let Ok(frame) = Frame::parse(frame) {
-            self.doubts.seen(now, &frame, Duration::ZERO, false);
+            self.doubts.seen(now, &frame, Duration::ZERO);
         }
     }
 

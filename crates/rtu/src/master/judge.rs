@@ -50,13 +50,13 @@ impl Master {
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
                             self.beside.cut();
-                            self.see(now, range.clone(), false);
+                            self.see(now, range.clone());
                             self.count_other(range, unit, doubted);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
                             self.beside.cut();
-                            self.see(now, range, true);
+                            self.see(now, range);
                             self.tally.add_late();
                         }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
@@ -165,11 +165,11 @@ impl Master {
         Ok(answer)
     }
 
-    /// A frame came that answers nothing in flight, although it has the unit and the function that are `awaited`, or has not.
-    fn see(&mut self, now: Instant, range: Range<usize>, awaited: bool) {
+    /// A frame came that answers nothing in flight.
+    fn see(&mut self, now: Instant, range: Range<usize>) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
         self.torn.see(&frame);
-        self.doubts.seen(now, &frame, at_once, awaited);
+        self.doubts.seen(now, &frame, at_once);
     }
 
     /// A frame came that answers what is in flight.
@@ -237,7 +237,7 @@ impl Master {
                     self.tally.add_own_echo();
                 }
                 Step::Frame(range) => {
-                    self.see(now, range, false);
+                    self.see(now, range);
                     self.tally.add_late();
                 }
                 Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),

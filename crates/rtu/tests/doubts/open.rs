@@ -272,27 +272,3 @@ fn what_is_known_to_be_late_is_owed_no_more() {
     asker.master.saw_late(ms(1_020), &[1, 3]);
     assert_eq!(after(&asker), Attribution::Certain);
 }
-
-/// A unit that answers with another number of words than it was asked for answers the request in flight, and not an open one.
-/// Which of the two it was shows when the right one comes.
-#[test]
-fn what_is_seen_while_a_request_waits_in_vain_stays_open() {
-    let after = |end: &dyn Fn(&mut Asker)| {
-        let mut asker = Asker::of_a_unit_that_echoes();
-        asker.leaves_open(1_000, unit(1), &read(1));
-        asker.echoes(1_000, unit(1));
-        asker.sends(1_500, unit(1), &read(2), TIMEOUT);
-        assert_eq!(asker.hears(1_500, &words(unit(1), 1, 7)), Came::Nothing);
-        end(&mut asker);
-        asker.echoes(1_600, unit(1));
-        asker
-    };
-    let answered = after(&|asker| assert_eq!(asker.hears(1_510, &words(unit(1), 2, 7)), Came::Answer));
-    assert_eq!(answered.attribution(ms(1_600), &read(1)), Attribution::Certain);
-    let in_vain = after(&|asker| assert!(matches!(asker.master.poll(ms(1_550)), Some(Event::NoAnswer { .. }))));
-    let aborted = after(&|asker| assert!(asker.master.abort(ms(1_550))));
-    for asker in [in_vain, aborted] {
-        assert_eq!(asker.attribution(before(ms(4_000)), &read(1)), repeat(2, 3));
-        assert_eq!(asker.attribution(ms(4_000), &read(1)), repeat(1, 2), "only that of two words is left");
-    }
-}
