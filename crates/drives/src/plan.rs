@@ -68,9 +68,11 @@ pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl F
                 break;
             }
             let (before, reads, _) = best[start];
-            let total = before + u64::from(rules.cost.request) + u64::from(rules.cost.word) * words;
-            let candidate = (total, reads + 1, start);
-            cheapest = Some(cheapest.map_or(candidate, |known| candidate.min(known)));
+            let total = before + (u64::from(rules.cost.request) + u64::from(rules.cost.word) * words);
+            // Of two equal ones the last found is taken: its last read begins earlier.
+            if cheapest.is_none_or(|(least, fewest, _)| (total, reads + 1) <= (least, fewest)) {
+                cheapest = Some((total, reads + 1, start));
+            }
         }
         // One value alone always fits, so there is a cheapest one.
         best.extend(cheapest);

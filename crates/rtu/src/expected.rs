@@ -50,20 +50,28 @@ impl Expected {
     }
 
     /// How long the answer's PDU is, unless the unit refuses with two bytes.
+    #[expect(clippy::cast_possible_truncation, reason = "at most 253 bytes")]
     pub const fn length(&self) -> AnswerLength {
-        match self.0 {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 125 words")]
-            Kind::Read { count } => AnswerLength::Bytes(2 + 2 * count as u8),
-            Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => AnswerLength::Bytes(5),
-            Kind::Custom { answer, .. } => answer,
+        match self.pdu_len() {
+            Some(pdu) => AnswerLength::Bytes(pdu as u8),
+            None => AnswerLength::BySilence,
         }
     }
 
     /// How many bytes the answer has on the wire, unless the unit refuses; `None` where only silence tells.
     pub const fn adu_len(&self) -> Option<usize> {
-        match self.length() {
-            AnswerLength::Bytes(pdu) => Some(AROUND_PDU + pdu as usize),
-            AnswerLength::BySilence => None,
+        match self.pdu_len() {
+            Some(pdu) => Some(AROUND_PDU + pdu),
+            None => None,
+        }
+    }
+
+    const fn pdu_len(self) -> Option<usize> {
+        match self.0 {
+            Kind::Read { count } => Some(2 + 2 * count as usize),
+            Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => Some(5),
+            Kind::Custom { answer: AnswerLength::Bytes(pdu), .. } => Some(pdu as usize),
+            Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
         }
     }
 

@@ -162,6 +162,10 @@ impl Adu {
         self.len = body + CRC_LEN;
     }
 
+    pub(crate) const fn clear(&mut self) {
+        self.len = 0;
+    }
+
     /// The bytes in the order of the wire.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {

@@ -47,7 +47,7 @@ pub struct Framer {
     ended: usize,
     silence: Duration,
     last: Option<Instant>,
-    expect: Option<(UnitAddress, Expected)>,
+    expect: Option<Awaited>,
     /// How long after its last byte the rest of an answer that has begun is waited for, and until when at least; `None`:
     /// for ever.
     patience: Option<(Duration, Instant)>,
@@ -55,6 +55,15 @@ pub struct Framer {
     own: Adu,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
     overrun: bool,
+}
+
+/// What is hunted for, worked out once.
+#[derive(Debug, Clone, Copy)]
+struct Awaited {
+    unit: u8,
+    function: u8,
+    /// Unless the unit refuses; `None` where only silence tells.
+    len: Option<usize>,
 }
 
 /// One step of the framer, without borrowing from it.
@@ -87,9 +96,9 @@ impl Framer {
     /// they may be, [`wait_for_the_rest`](Self::wait_for_the_rest) says.
     pub fn expect(&mut self, unit: UnitAddress, expected: Expected) {
         self.clear();
-        self.expect = Some((unit, expected));
+        self.expect = Some(Awaited { unit: unit.get(), function: expected.function(), len: expected.adu_len() });
         self.patience = None;
-        self.own = Adu::new();
+        self.own.clear();
     }
 
     /// After [`expect`](Self::expect): the rest of an answer that has begun is waited for until `pause` after its last byte,
@@ -107,7 +116,7 @@ impl Framer {
 
     /// The request has come back, or will not any more.
     pub(crate) fn forget_own(&mut self) {
-        self.own = Adu::new();
+        self.own.clear();
     }
 
     /// From now on takes frames of any unit and both directions; what is held is dropped.

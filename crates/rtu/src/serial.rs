@@ -152,7 +152,8 @@ impl SerialFormat {
         1 + data + parity + stop
     }
 
-    /// How long `count` characters take without a gap, rounded up to a whole nanosecond.
+    /// How long `count` characters take without a gap, rounded up to a whole nanosecond; of more than 768 million at least
+    /// what those take.
     pub const fn chars(&self, count: u32) -> Duration {
         self.half_chars(count as u64 * 2)
     }
@@ -196,7 +197,7 @@ impl SerialFormat {
 
     const fn half_chars(&self, count: u64) -> Duration {
         let bits = count * self.bits_per_char() as u64;
-        Duration::from_nanos((bits * NANOS_PER_SECOND).div_ceil(2 * self.baud_rate as u64))
+        Duration::from_nanos(bits.saturating_mul(NANOS_PER_SECOND).div_ceil(2 * self.baud_rate as u64))
     }
 }
 
@@ -295,6 +296,13 @@ mod tests {
     fn many_characters_are_rounded_once() {
         // 256 × 11 bits / 115 200 bit/s = 24.444444… ms
         assert_eq!(format(115_200, Parity::Even, Silence::Spec).chars(256), Duration::from_nanos(24_444_445));
+    }
+
+    #[test]
+    fn no_count_of_characters_overflows() {
+        let longest = SerialFormat::new(50, DataBits::Eight, Parity::Odd, StopBits::Two, Silence::Spec).unwrap();
+        assert_eq!(longest.chars(768_000_000), Duration::from_secs(184_320_000)); // × 12 bits / 50 bit/s
+        assert!(longest.chars(u32::MAX) >= longest.chars(768_000_000));
     }
 
     #[test]

@@ -147,7 +147,7 @@ impl Framer {
 
     /// How long the answer looked for is; `None` where only silence tells, or none is looked for.
     fn answer_len(&self) -> Option<usize> {
-        self.expect?.1.adu_len()
+        self.expect?.len
     }
 
     /// Whether `here`, which begins as the answer looked for, only lacks its end.
@@ -162,12 +162,11 @@ impl Framer {
 
     /// Whether the answer that is waited for may begin at `start`.
     pub(super) fn is_expected(&self, start: usize) -> bool {
-        match (self.expect, &self.bytes[start..self.len]) {
-            (Some((unit, _)), [address]) => *address == unit.get(),
-            (Some((unit, expected)), [address, function, ..]) => {
-                *address == unit.get() && function & !EXCEPTION_BIT == expected.function()
-            }
-            _ => false,
+        let Some(awaited) = self.expect else { return false };
+        match self.bytes[start..self.len] {
+            [address] => address == awaited.unit,
+            [address, function, ..] => address == awaited.unit && function & !EXCEPTION_BIT == awaited.function,
+            [] => false,
         }
     }
 
