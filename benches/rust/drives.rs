@@ -49,7 +49,7 @@ impl Polled {
             }
         }
         let mut line: Option<Box<dyn Line>> = Some(Box::new(simulator.line()));
-        let options = BusOptions { echo: AdapterEcho::Absent, ..BusOptions::new(SerialFormat::DEFAULT) };
+        let options = BusOptions::new(SerialFormat::DEFAULT).echo(AdapterEcho::Absent);
         let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
         bus.sleep(FIRST_CONTACT, &mut || false);
         let units = (1..=units).map(|unit| UnitAddress::new(unit).unwrap()).collect();

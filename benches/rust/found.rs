@@ -189,7 +189,7 @@ fn measure(trouble: Trouble, echo: Echo, fresh: bool, retries: u32) -> String {
     let wire = Arc::new(Mutex::new(wire));
     let line = Troubled(Arc::clone(&wire));
     let opener = move || Ok(Box::new(line.clone()) as Box<dyn Line>);
-    let options = BusOptions { retries, ..BusOptions::new(FORMAT) };
+    let options = BusOptions::new(FORMAT).retries(retries);
     let bus = Bus::open(Box::new(opener), options, &mut || false).unwrap();
     if !fresh {
         wire.lock().unwrap().now = Instant::from_nanos(2_000_000_000);

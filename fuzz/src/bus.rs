@@ -48,7 +48,7 @@ pub fn bus(data: &[u8]) {
         lock(&line.0).opened += 1;
         Ok(Box::new(line.clone()) as Box<dyn Line>)
     });
-    let options = BusOptions { timeout: TIMEOUT, ..BusOptions::new(FORMAT) };
+    let options = BusOptions::new(FORMAT).timeout(TIMEOUT);
     let Ok(bus) = Bus::open(opener, options, &mut || false) else {
         unreachable!("this port always opens");
     };
@@ -79,8 +79,7 @@ fn ask(bus: &Bus, wire: &Mutex<Wire>, [kind, unit, a1, a0, v1, v0]: [u8; 6]) {
     let twice = kind & 8 != 0 && destination != Destination::Broadcast;
     let is_read = kind & 7 < 3;
     let read_back = (twice && matches!(kind & 7, 3 | 4)).then_some(address);
-    let options =
-        CallOptions { in_doubt: kind & 0xF0 == 0xE0, verify: twice && is_read, read_back, ..CallOptions::default() };
+    let options = CallOptions::new().in_doubt(kind & 0xF0 == 0xE0).verify(twice && is_read).read_back(read_back);
     let length = match kind & 7 {
         6 => Length::Any,
         7 => Length::Given(2),

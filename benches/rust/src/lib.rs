@@ -7,7 +7,7 @@ use drivebus_rtu::{Adu, Answer, FIRST_CONTACT, Instant, SerialFormat, UnitAddres
 /// A bus that was open for long enough to trust its unit.
 pub fn bus_on(line: impl Line + 'static) -> Bus {
     let mut line: Option<Box<dyn Line>> = Some(Box::new(line));
-    let options = BusOptions { echo: AdapterEcho::Absent, ..BusOptions::new(SerialFormat::DEFAULT) };
+    let options = BusOptions::new(SerialFormat::DEFAULT).echo(AdapterEcho::Absent);
     let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
     bus.sleep(FIRST_CONTACT, &mut || false);
     bus

@@ -212,7 +212,7 @@ impl Builder {
         checks::within("retries", self.options.retries, 0, 100)?;
         checks::time("turnaround", self.options.turnaround)?;
         checks::within("queue", self.options.queue, 1, 1_000_000)?;
-        Ok(BusOptions { format, ..self.options })
+        Ok(self.options.format(format))
     }
 
     #[cfg(feature = "serial")]

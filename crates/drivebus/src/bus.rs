@@ -273,5 +273,5 @@ impl Bus {
 
 /// What is carried as it is may do anything, so it is never repeated.
 pub(crate) fn once() -> LineOptions {
-    LineOptions { retries: Some(0), ..LineOptions::default() }
+    LineOptions::default().retries(0)
 }

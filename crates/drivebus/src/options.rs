@@ -83,14 +83,8 @@ impl CallOptions {
     pub(crate) fn of(self, request: &Request<'_>) -> Result<LineOptions, Error> {
         self.timeout.map_or(Ok(()), checks::timeout)?;
         self.retries.map_or(Ok(()), |retries| checks::within("retries", retries, 0, 100))?;
-        let options = LineOptions {
-            timeout: self.timeout,
-            retries: self.retries,
-            verify: self.verify,
-            read_back: self.read_back,
-            connection: self.connection,
-            ..LineOptions::default()
-        };
+        let options = LineOptions::new().timeout(self.timeout).retries(self.retries).verify(self.verify);
+        let options = options.read_back(self.read_back).connection(self.connection);
         Ok(if self.urgent { options.urgent(request) } else { options })
     }
 }

@@ -62,7 +62,7 @@ impl Poll {
     pub(crate) fn start(bus: &Arc<Core>, targets: Vec<Target>, interval: Option<Duration>) -> Result<Self, Error> {
         let asked = targets.iter().map(|target| {
             let unit: UnitAddress = checks::unit(target.unit)?;
-            Ok(PollTarget { unit, reads: target.reads() })
+            Ok(PollTarget::new(unit, target.reads()))
         });
         let core = Polled::start(Arc::clone(bus), asked.collect::<Result<_, Error>>()?, interval, KEPT)?;
         let with_length = |target: Target| {

@@ -110,7 +110,7 @@ fn what_cannot_be_asked_is_refused_before_anything_is_sent() {
     let never = CallOptions::new().timeout(Duration::ZERO);
     refused(bus.read_with(1, 0, 1, never).unwrap_err(), "timeout 0 is out of range; allowed is more than 0..3600");
     refused(
-        bus.configure(1, UnitOptions { gap: Some(Duration::from_secs(3601)), ..UnitOptions::default() }).unwrap_err(),
+        bus.configure(1, UnitOptions::new().gap(Duration::from_secs(3601))).unwrap_err(),
         "gap 3601 is out of range; allowed is 0..3600",
     );
     assert_eq!(bus.stats().total.requests, 0);

@@ -45,6 +45,7 @@ impl fmt::Display for Value {
 /// A float counts by its shortest decimal form: `0.57` is 57 hundredths, exactly. Text is the label of a choice in upper
 /// or lower case, a decimal number (`"12.50"`, `"1e2"`), or, for what is not measured, hex (`"0x3F"`).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Input<'a> {
     /// A whole number of units.
     Integer(i64),

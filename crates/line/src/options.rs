@@ -9,6 +9,7 @@ use crate::turns::queue::DEFAULT_QUEUE;
 
 /// How a bus behaves.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct BusOptions {
     /// Characters and silence.
     pub format: SerialFormat,
@@ -46,6 +47,54 @@ impl BusOptions {
             queue: DEFAULT_QUEUE,
         }
     }
+
+    /// Sets [`format`](Self#structfield.format).
+    #[must_use]
+    pub const fn format(self, format: SerialFormat) -> Self {
+        Self { format, ..self }
+    }
+
+    /// Sets [`timeout`](Self#structfield.timeout).
+    #[must_use]
+    pub const fn timeout(self, timeout: Duration) -> Self {
+        Self { timeout, ..self }
+    }
+
+    /// Sets [`retries`](Self#structfield.retries).
+    #[must_use]
+    pub const fn retries(self, retries: u32) -> Self {
+        Self { retries, ..self }
+    }
+
+    /// Sets [`read_only`](Self#structfield.read_only).
+    #[must_use]
+    pub const fn read_only(self, read_only: bool) -> Self {
+        Self { read_only, ..self }
+    }
+
+    /// Sets [`echo`](Self#structfield.echo).
+    #[must_use]
+    pub const fn echo(self, echo: AdapterEcho) -> Self {
+        Self { echo, ..self }
+    }
+
+    /// Sets [`turnaround`](Self#structfield.turnaround).
+    #[must_use]
+    pub const fn turnaround(self, turnaround: Duration) -> Self {
+        Self { turnaround, ..self }
+    }
+
+    /// Sets [`learn_timeout`](Self#structfield.learn_timeout).
+    #[must_use]
+    pub const fn learn_timeout(self, learn_timeout: bool) -> Self {
+        Self { learn_timeout, ..self }
+    }
+
+    /// Sets [`queue`](Self#structfield.queue).
+    #[must_use]
+    pub const fn queue(self, queue: usize) -> Self {
+        Self { queue, ..self }
+    }
 }
 
 /// What is known about the adapter sending our own bytes back.
@@ -61,6 +110,7 @@ pub enum AdapterEcho {
 
 /// What one unit needs otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct UnitOptions {
     /// The longest wait from the end of a request to the end of its answer.
     pub timeout: Option<Duration>,
@@ -68,8 +118,28 @@ pub struct UnitOptions {
     pub gap: Option<Duration>,
 }
 
+impl UnitOptions {
+    /// As the bus has it.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Sets [`timeout`](Self#structfield.timeout).
+    #[must_use]
+    pub fn timeout(self, timeout: impl Into<Option<Duration>>) -> Self {
+        Self { timeout: timeout.into(), ..self }
+    }
+
+    /// Sets [`gap`](Self#structfield.gap).
+    #[must_use]
+    pub fn gap(self, gap: impl Into<Option<Duration>>) -> Self {
+        Self { gap: gap.into(), ..self }
+    }
+}
+
 /// What one call wants otherwise than the bus; `None` keeps what the bus has.
 #[derive(Debug, Clone, Copy, Default)]
+#[non_exhaustive]
 pub struct CallOptions {
     /// The longest wait for the answer.
     pub timeout: Option<Duration>,
@@ -89,4 +159,53 @@ pub struct CallOptions {
     /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
     /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
     pub connection: Option<u64>,
+}
+
+impl CallOptions {
+    /// As the bus has it.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Sets [`timeout`](Self#structfield.timeout).
+    #[must_use]
+    pub fn timeout(self, timeout: impl Into<Option<Duration>>) -> Self {
+        Self { timeout: timeout.into(), ..self }
+    }
+
+    /// Sets [`retries`](Self#structfield.retries).
+    #[must_use]
+    pub fn retries(self, retries: impl Into<Option<u32>>) -> Self {
+        Self { retries: retries.into(), ..self }
+    }
+
+    /// Sets [`priority`](Self#structfield.priority).
+    #[must_use]
+    pub fn priority(self, priority: impl Into<Option<Priority>>) -> Self {
+        Self { priority: priority.into(), ..self }
+    }
+
+    /// Sets [`in_doubt`](Self#structfield.in_doubt).
+    #[must_use]
+    pub const fn in_doubt(self, in_doubt: bool) -> Self {
+        Self { in_doubt, ..self }
+    }
+
+    /// Sets [`verify`](Self#structfield.verify).
+    #[must_use]
+    pub const fn verify(self, verify: bool) -> Self {
+        Self { verify, ..self }
+    }
+
+    /// Sets [`read_back`](Self#structfield.read_back).
+    #[must_use]
+    pub fn read_back(self, read_back: impl Into<Option<u16>>) -> Self {
+        Self { read_back: read_back.into(), ..self }
+    }
+
+    /// Sets [`connection`](Self#structfield.connection).
+    #[must_use]
+    pub fn connection(self, connection: impl Into<Option<u64>>) -> Self {
+        Self { connection: connection.into(), ..self }
+    }
 }

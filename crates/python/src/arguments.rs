@@ -31,7 +31,8 @@ pub(crate) fn to_open(
     let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
     let timeout = duration("timeout", timeout)?;
     let turnaround = duration("turnaround", turnaround)?;
-    Ok((opener, BusOptions { format, timeout, retries, read_only, echo, turnaround, learn_timeout, queue }))
+    let options = BusOptions::new(format).timeout(timeout).retries(retries).read_only(read_only).echo(echo);
+    Ok((opener, options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue)))
 }
 
 /// Why a bus could not be opened.
@@ -56,12 +57,12 @@ pub(crate) fn write_request(address: u16, words: &Result<Vec<u16>, u16>) -> PyRe
 
 pub(crate) fn read_options(timeout: Option<f64>, retries: Option<u32>, verify: bool) -> PyResult<CallOptions> {
     let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
-    Ok(CallOptions { timeout, retries, verify, ..CallOptions::default() })
+    Ok(CallOptions::new().timeout(timeout).retries(retries).verify(verify))
 }
 
 pub(crate) fn write_options(read_back: Option<&Bound<'_, PyAny>>, connection: Option<u64>) -> PyResult<CallOptions> {
     let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-    Ok(CallOptions { read_back, connection, ..CallOptions::default() })
+    Ok(CallOptions::new().read_back(read_back).connection(connection))
 }
 
 /// `options` for `request`, which may be urgent.

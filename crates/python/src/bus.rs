@@ -168,7 +168,7 @@ impl Bus {
             Some(word) => one_word("word", word)?,
             None => py.detach(|| self.core.fresh_word()),
         };
-        let options = CallOptions { timeout, ..CallOptions::default() };
+        let options = CallOptions::new().timeout(timeout);
         let done = self.call(py, unit_address(unit)?.into(), &Request::echo(word), options, &mut |_| ())?;
         Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
     }
@@ -185,18 +185,12 @@ impl Bus {
         let pdu = pdu.as_bytes();
         let request = Request::raw(pdu, reply_length).map_err(refuse)?;
         let mut reply = Vec::new();
-        self.call(
-            py,
-            unit.into(),
-            &request,
-            CallOptions { retries: Some(0), ..CallOptions::default() },
-            &mut |answer| {
-                let frame = Adu::answer(unit, &answer);
-                if let Ok(frame) = Frame::parse(frame.as_bytes()) {
-                    reply = frame.pdu().to_vec();
-                }
-            },
-        )?;
+        self.call(py, unit.into(), &request, CallOptions::new().retries(0), &mut |answer| {
+            let frame = Adu::answer(unit, &answer);
+            if let Ok(frame) = Frame::parse(frame.as_bytes()) {
+                reply = frame.pdu().to_vec();
+            }
+        })?;
         Ok(PyBytes::new(py, &reply))
     }
 
@@ -204,7 +198,7 @@ impl Bus {
     fn configure(&self, unit: &Bound<'_, PyAny>, timeout: Option<f64>, gap: Option<f64>) -> PyResult<()> {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         let gap = gap.map(|time| duration("gap", time)).transpose()?;
-        self.core.configure(unit_address(unit)?, UnitOptions { timeout, gap });
+        self.core.configure(unit_address(unit)?, UnitOptions::new().timeout(timeout).gap(gap));
         Ok(())
     }
 

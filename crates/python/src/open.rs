@@ -25,7 +25,7 @@ pub(crate) fn opener(
 ) -> PyResult<(Opener, SerialFormat)> {
     let rs485 = rs485.map(rs485_options).transpose()?;
     if let Ok(text) = port.cast::<PyString>() {
-        let options = TtyOptions { rs485, low_latency, ..TtyOptions::default() };
+        let options = TtyOptions::default().rs485(rs485).low_latency(low_latency);
         return Ok((named(text.to_str()?, format, options)?, format));
     }
     url::check_together(None, rs485.is_some(), AdapterEcho::Auto).map_err(refuse)?;

@@ -48,12 +48,12 @@ impl Poller {
             if let Ok(plan) = what.cast::<Plan>() {
                 let plan = plan.get().core();
                 let reads = plan.reads().iter().map(|read| (read.address, read.count)).collect();
-                asked.push(PollTarget { unit, reads });
+                asked.push(PollTarget::new(unit, reads));
                 meanings.push(Meaning::Values(plan));
             } else {
                 let reads = what.try_iter()?.map(|read| one_read(&read?)).collect::<PyResult<Vec<_>>>()?;
                 meanings.push(Meaning::Words(reads.iter().map(|&(_, count)| usize::from(count)).sum()));
-                asked.push(PollTarget { unit, reads });
+                asked.push(PollTarget::new(unit, reads));
             }
         }
         let core = Arc::clone(&bus.get().core);

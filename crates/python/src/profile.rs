@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Input, ProfileError, Setpoint, Store, UnitKind};
+use drivebus_drives::{self as drives, Command, Entry, Input, ProfileError, Setpoint, Store};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
@@ -63,10 +63,7 @@ impl Profile {
 
     #[getter]
     fn kind(&self) -> &'static str {
-        match self.0.kind() {
-            UnitKind::Inverter => "inverter",
-            UnitKind::Rectifier => "rectifier",
-        }
+        self.0.kind().name()
     }
 
     #[getter]

@@ -165,7 +165,7 @@ impl Requests {
     #[pyo3(signature = (unit, pdu, reply_length = None, /))]
     fn transact(&self, unit: &Bound<'_, PyAny>, pdu: &Bound<'_, PyBytes>, reply_length: Option<u8>) -> PyResult<Asked> {
         let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
-        let options = CallOptions { retries: Some(0), ..CallOptions::default() };
+        let options = CallOptions::new().retries(0);
         Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| {
             Ok(PyBytes::new(py, &reply.pdu).into_any())
         }))

@@ -27,7 +27,7 @@ fn fresh_bus(simulator: &Simulator, options: BusOptions) -> Bus {
 
 /// A bus that was open for long enough that no other program's answer can come any more, and whose adapter is known.
 fn bus(simulator: &Simulator, options: BusOptions) -> Bus {
-    let bus = fresh_bus(simulator, BusOptions { echo: AdapterEcho::Absent, ..options });
+    let bus = fresh_bus(simulator, options.echo(AdapterEcho::Absent));
     bus.sleep(FIRST_CONTACT, &mut || false);
     bus
 }
@@ -76,7 +76,7 @@ fn a_damaged_answer_is_asked_for_twice_as_often_as_a_missing_one() {
         let asked = |spoil: &dyn Fn(&Simulator)| {
             let (simulator, bus) = pair();
             spoil(&simulator);
-            let options = CallOptions { retries: Some(retries), ..CallOptions::default() };
+            let options = CallOptions::new().retries(retries);
             let request = Request::read(STATE, 1).unwrap();
             bus.call(unit(1).into(), &request, options, &mut || false, &mut |_| ()).unwrap_err();
             simulator.wire().requests()
@@ -92,7 +92,7 @@ fn a_damaged_answer_is_asked_for_twice_as_often_as_a_missing_one() {
 fn a_reply_that_comes_during_the_next_request_is_never_its_answer() {
     let (simulator, bus) = pair();
     simulator.wire().delay_answers(Duration::from_millis(515), 1);
-    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let once = CallOptions::new().retries(0);
     let late = bus.call(unit(1).into(), &Request::read(0x2103, 1).unwrap(), once, &mut || false, &mut |_| ());
     assert!(matches!(late.unwrap_err().failure, Failure::NoAnswer { .. }));
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3], "not 01A0H, the identification asked for before");
@@ -107,7 +107,7 @@ fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
     simulator.wire().drop_answers(100); // it hears, and is not heard
     assert!(read(&bus, STATE, 1).is_err());
     let stop = Request::write(0x2000, 5);
-    let urgent = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
+    let urgent = CallOptions::new().priority(Priority::Stop).in_doubt(true);
     let error = bus.call(unit(1).into(), &stop, urgent, &mut || false, &mut |_| ()).unwrap_err();
     assert!(error.sent.is_some(), "{error}");
     let writes = simulator.drive(1).unwrap().writes();
@@ -120,7 +120,7 @@ fn a_stop_is_sent_to_a_unit_that_seems_deaf() {
 /// A stop does not wait until it is known whether the adapter echoes; its confirmation does.
 #[test]
 fn the_echo_of_an_adapter_confirms_no_stop() {
-    let urgent = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
+    let urgent = CallOptions::new().priority(Priority::Stop).in_doubt(true);
     let stop = Request::write(0x2000, 5);
     for (echo, deaf) in [(false, false), (true, false), (true, true)] {
         let simulator = simulator(SerialFormat::DEFAULT);
@@ -145,7 +145,7 @@ fn the_echo_of_an_adapter_confirms_no_stop() {
 #[test]
 fn an_answer_that_comes_after_the_echo_was_given_up_is_never_the_next_ones() {
     let (simulator, bus) = pair();
-    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let once = CallOptions::new().retries(0);
     let identify = Request::read(0x2103, 1).unwrap();
     simulator.wire().delay_answers(Duration::from_millis(1_200), 1);
     bus.call(unit(1).into(), &identify, once, &mut || false, &mut |_| ()).unwrap_err();
@@ -187,7 +187,7 @@ fn a_damaged_answer_is_told_with_both_crcs_and_its_bytes() {
     let (simulator, bus) = pair();
     let bad = [0x01, 0x03, 0x02, 0x00, 0x03, 0xF8, 0x46];
     simulator.wire().answer_with(&bad);
-    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let once = CallOptions::new().retries(0);
     let request = Request::read(STATE, 1).unwrap();
     let error = bus.call(unit(1).into(), &request, once, &mut || false, &mut |_| ()).unwrap_err();
     assert_eq!(error.raw, bad);
@@ -200,7 +200,7 @@ fn a_damaged_answer_is_told_with_both_crcs_and_its_bytes() {
 #[test]
 fn a_read_only_bus_sends_no_write() {
     let simulator = simulator(SerialFormat::DEFAULT);
-    let options = BusOptions { read_only: true, ..BusOptions::new(SerialFormat::DEFAULT) };
+    let options = BusOptions::new(SerialFormat::DEFAULT).read_only(true);
     let bus = bus(&simulator, options);
     assert_eq!(read(&bus, STATE, 1).unwrap(), [3]);
     for (destination, request) in [
@@ -270,7 +270,7 @@ fn threads_take_turns_and_each_gets_its_own_answer() {
 #[test]
 fn a_dead_unit_leaves_the_line_to_the_others() {
     let (simulator, bus) = pair();
-    let once = CallOptions { retries: Some(0), ..CallOptions::default() };
+    let once = CallOptions::new().retries(0);
     let state = Request::read(STATE, 1).unwrap();
     let asked = |unit| {
         simulator.wire().trace().iter().filter(|sent| sent.side == Side::Master && sent.bytes[0] == unit).count()
@@ -289,7 +289,7 @@ fn a_dead_unit_leaves_the_line_to_the_others() {
     assert_eq!(asked(9), before + 1, "once, without retries");
     assert_eq!(bus.stats().units[&unit(9)].not_asked, 1);
     // A stop is sent whatever was heard.
-    let stop = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..once };
+    let stop = once.priority(Priority::Stop).in_doubt(true);
     bus.call(unit(9).into(), &Request::write(0x2000, 5), stop, &mut || false, &mut |_| ()).unwrap_err();
     assert_eq!(asked(9), before + 2);
 }

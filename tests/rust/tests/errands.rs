@@ -27,7 +27,7 @@ fn simulator() -> Simulator {
 
 fn open(line: impl Line + 'static, read_only: bool) -> Arc<Bus> {
     let mut line = Some(line);
-    let options = BusOptions { echo: AdapterEcho::Absent, read_only, ..BusOptions::new(SerialFormat::DEFAULT) };
+    let options = BusOptions::new(SerialFormat::DEFAULT).echo(AdapterEcho::Absent).read_only(read_only);
     Arc::new(Bus::open(Box::new(move || Ok(Box::new(line.take().unwrap()))), options, &mut || false).unwrap())
 }
 
@@ -109,8 +109,8 @@ fn errands_keep_the_order_of_the_queue() {
     let (_simulator, bus) = pair();
     let (to, outcomes) = channel();
     let (let_go, holder) = hold(&bus);
-    let urgent = CallOptions { priority: Some(Priority::Stop), ..CallOptions::default() };
-    let polled = CallOptions { priority: Some(Priority::Poll), ..CallOptions::default() };
+    let urgent = CallOptions::new().priority(Priority::Stop);
+    let polled = CallOptions::new().priority(Priority::Poll);
     send(&bus, 1, &identify(), polled, &to);
     send(&bus, 2, &identify(), CallOptions::default(), &to);
     send(&bus, 3, &Request::write(ACCELERATION, 20), CallOptions::default(), &to);
@@ -190,7 +190,7 @@ fn what_is_abandoned_on_the_wire_ends_and_is_not_repeated() {
     let ((met, it_is_met), (go_on, may_go_on)) = (channel(), channel());
     *meeting.lock().unwrap() = Some((met, may_go_on));
     let (to, outcomes) = channel();
-    let options = CallOptions { retries: Some(50), ..CallOptions::default() };
+    let options = CallOptions::new().retries(50);
     let running = send(&bus, 1, &identify(), options, &to).unwrap();
     it_is_met.recv().unwrap();
     running.abandon();
@@ -213,7 +213,7 @@ fn a_slow_callback_holds_up_nobodys_errands() {
     it_is_called.recv().unwrap();
 
     let (to, outcomes) = channel();
-    let stop = CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() };
+    let stop = CallOptions::new().priority(Priority::Stop).in_doubt(true);
     send(&bus, 1, &Request::write(0x2000, 5), stop, &to);
     send(&bus, 2, &identify(), CallOptions::default(), &to);
     assert_eq!(names(&outcomes, 2), [1, 2]);

@@ -70,7 +70,7 @@ fn bench(speed: &Speed) -> (Simulator, Bus) {
         simulator.drive(unit).unwrap().set_parameter(RESPONSE_DELAY, 0).unwrap();
     }
     let mut line: Option<Box<dyn Line>> = Some(Box::new(simulator.line()));
-    let options = BusOptions { echo: AdapterEcho::Absent, ..BusOptions::new(format) };
+    let options = BusOptions::new(format).echo(AdapterEcho::Absent);
     let bus = Bus::open(Box::new(move || Ok(line.take().unwrap())), options, &mut || false).unwrap();
     bus.sleep(FIRST_CONTACT, &mut || false);
     for unit in [1, 2] {

@@ -87,7 +87,7 @@ fn an_answer_is_there_at_its_last_character_after_few_looks() {
             looks: Arc::clone(&looks),
             last: Arc::clone(&last),
         });
-        let options = BusOptions { echo: AdapterEcho::Absent, ..BusOptions::new(format) };
+        let options = BusOptions::new(format).echo(AdapterEcho::Absent);
         let opener = Box::new(move || Ok(Box::new(line.take().unwrap()) as Box<dyn Line>));
         let bus = Bus::open(opener, options, &mut || false).unwrap();
         // Past first contact, which would ask for an echo that this unit does not know.

@@ -27,7 +27,7 @@ fn unit(raw: u8) -> UnitAddress {
 }
 
 fn target(raw: u8, reads: &[(u16, u16)]) -> PollTarget {
-    PollTarget { unit: unit(raw), reads: reads.to_vec() }
+    PollTarget::new(unit(raw), reads.to_vec())
 }
 
 /// A line on which one unit does not hear what is sent to it: its wire is cut.
@@ -90,7 +90,7 @@ fn line_with_cut(format: SerialFormat, cut: &Arc<AtomicU8>) -> (Simulator, Arc<B
         let line = first.take().map_or_else(|| again.open_line(), Ok)?;
         Ok(Box::new(Cut { line, unit: Arc::clone(&unit) }))
     };
-    let options = BusOptions { echo: AdapterEcho::Absent, timeout: TIMEOUT, ..BusOptions::new(format) };
+    let options = BusOptions::new(format).echo(AdapterEcho::Absent).timeout(TIMEOUT);
     let bus = Bus::open(Box::new(opener), options, &mut || false).unwrap();
     bus.sleep(FIRST_CONTACT, &mut || false);
     (simulator, Arc::new(bus))
@@ -188,7 +188,7 @@ fn a_unit_that_needs_a_longer_silence_makes_the_shortest_cycle_longer() {
     let (t35, gap) = (bus.options().format.t35(), millis(20));
     let targets = || vec![target(1, &[(STATE, 1)]), target(2, &[(STATE, 1)])];
     let usual = poll(&bus, targets(), None).shortest();
-    bus.configure(unit(1), UnitOptions { gap: Some(gap), ..UnitOptions::default() });
+    bus.configure(unit(1), UnitOptions::new().gap(gap));
     let (poll, cycle) = (poll(&bus, targets(), None), usual.saturating_sub(t35) + gap);
     assert_eq!(poll.shortest(), cycle);
     for pair in sent(&samples(&poll, Duration::from_secs(1)), 0).windows(2) {

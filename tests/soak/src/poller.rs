@@ -46,7 +46,7 @@ impl Poller {
         let units: Vec<u8> = (0..count).filter_map(|_| self.chance.one_of(&UNITS)).collect();
         let targets: Vec<PollTarget> = units
             .iter()
-            .filter_map(|&unit| Some(PollTarget { unit: UnitAddress::new(unit).ok()?, reads: BLOCKS.to_vec() }))
+            .filter_map(|&unit| Some(PollTarget::new(UnitAddress::new(unit).ok()?, BLOCKS.to_vec())))
             .collect();
         let interval = (self.chance.below(2) == 0).then_some(Duration::from_millis(50));
         let poll = Poll::start(Arc::clone(&rig.bus), targets, interval, KEPT).map_err(|error| error.to_string())?;

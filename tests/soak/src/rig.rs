@@ -67,7 +67,7 @@ impl Rig {
             .map_err(|error| error.to_string())?;
         let plugged = simulator.clone();
         let opener = Box::new(move || Ok(Box::new(plugged.open_line()?) as Box<dyn Line>));
-        let options = BusOptions { timeout: TIMEOUT, ..BusOptions::new(format) };
+        let options = BusOptions::new(format).timeout(TIMEOUT);
         let bus = Bus::open(opener, options, &mut || false).map_err(|error| error.to_string())?;
         let drives = UNITS.iter().filter_map(|&unit| simulator.drive(unit).ok()).collect();
         let wire = simulator.wire();

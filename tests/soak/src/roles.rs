@@ -85,7 +85,7 @@ fn words(
 ) -> Option<Vec<u16>> {
     let request = Request::read(address, u16::try_from(count).ok()?).ok()?;
     let mut came = Vec::with_capacity(count);
-    let result = rig.ask(unit, &request, CallOptions { retries, ..CallOptions::default() }, &mut |answer| {
+    let result = rig.ask(unit, &request, CallOptions::new().retries(retries), &mut |answer| {
         came.clear();
         if let Answer::Read { words, .. } = answer {
             came.extend(words.iter());
@@ -244,7 +244,7 @@ impl Writer {
         };
         // Half of them are cleared up by reading back, and repeated only where the drive shows the value before.
         let read_back = (self.chance.below(2) == 0).then_some(address);
-        let result = rig.ask(unit, &request, CallOptions { read_back, ..CallOptions::default() }, &mut |_| ());
+        let result = rig.ask(unit, &request, CallOptions::new().read_back(read_back), &mut |_| ());
         conclude(rig, account, unit, address, value, &result, verdict);
         if address == PAIR {
             let second = rig.journal.taken(unit, PAIR + 1);
@@ -386,7 +386,7 @@ impl Commander {
 
 /// As a stop is sent.
 fn at_once() -> CallOptions {
-    CallOptions { priority: Some(Priority::Stop), in_doubt: true, ..CallOptions::default() }
+    CallOptions::new().priority(Priority::Stop).in_doubt(true)
 }
 
 impl Role for Commander {

@@ -4,11 +4,22 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum UnitKind {
     /// It turns a motor.
     Inverter,
     /// It makes the direct voltage from which inverters turn motors.
     Rectifier,
+}
+
+impl UnitKind {
+    /// Its name in profiles and programs: `inverter`, `rectifier`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Inverter => "inverter",
+            Self::Rectifier => "rectifier",
+        }
+    }
 }
 
 /// What a drive takes as a request.

@@ -8,11 +8,19 @@ use crate::error::Failure;
 
 /// What is asked of one unit in each cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PollTarget {
     /// Who is asked.
     pub unit: UnitAddress,
     /// Address and number of words (1..=125) of each read, in the order in which they are sent.
     pub reads: Vec<(u16, u16)>,
+}
+
+impl PollTarget {
+    /// `reads` of `unit`.
+    pub fn new(unit: UnitAddress, reads: Vec<(u16, u16)>) -> Self {
+        Self { unit, reads }
+    }
 }
 
 /// Why a poll cannot be. Nothing was sent.

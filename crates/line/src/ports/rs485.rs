@@ -20,6 +20,7 @@ pub const RTS_MARGIN_MS: u32 = 1;
 
 /// Who moves RTS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Switch {
     /// The driver, at the right bit; an error where it cannot.
     #[default]
@@ -32,6 +33,7 @@ pub enum Switch {
 
 /// How RTS moves around each transmission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Rs485 {
     /// Whether the direction is switched at all; `false` turns off what another program turned on.
     pub enabled: bool,
@@ -49,6 +51,38 @@ impl Default for Rs485 {
     /// By the driver, RTS high while sending, no delays.
     fn default() -> Self {
         Self { enabled: true, switch: Switch::Driver, rts_on_send: true, delay_before_ms: 0, delay_after_ms: 0 }
+    }
+}
+
+impl Rs485 {
+    /// Sets [`enabled`](Self#structfield.enabled).
+    #[must_use]
+    pub fn enabled(self, enabled: bool) -> Self {
+        Self { enabled, ..self }
+    }
+
+    /// Sets [`switch`](Self#structfield.switch).
+    #[must_use]
+    pub fn switch(self, switch: Switch) -> Self {
+        Self { switch, ..self }
+    }
+
+    /// Sets [`rts_on_send`](Self#structfield.rts_on_send).
+    #[must_use]
+    pub fn rts_on_send(self, rts_on_send: bool) -> Self {
+        Self { rts_on_send, ..self }
+    }
+
+    /// Sets [`delay_before_ms`](Self#structfield.delay_before_ms).
+    #[must_use]
+    pub fn delay_before_ms(self, delay_before_ms: u32) -> Self {
+        Self { delay_before_ms, ..self }
+    }
+
+    /// Sets [`delay_after_ms`](Self#structfield.delay_after_ms).
+    #[must_use]
+    pub fn delay_after_ms(self, delay_after_ms: u32) -> Self {
+        Self { delay_after_ms, ..self }
     }
 }
 

@@ -43,6 +43,7 @@ const STALL: Duration = Duration::from_millis(80);
 
 /// What can be asked of a serial port beside its format.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TtyOptions {
     /// Direction control by the driver; `None` leaves the driver as it is.
     pub rs485: Option<Rs485>,
@@ -57,6 +58,26 @@ impl Default for TtyOptions {
     /// No direction control, the port to ourselves, and as little delay as can be had.
     fn default() -> Self {
         Self { rs485: None, exclusive: true, low_latency: true }
+    }
+}
+
+impl TtyOptions {
+    /// Sets [`rs485`](Self#structfield.rs485).
+    #[must_use]
+    pub fn rs485(self, rs485: impl Into<Option<Rs485>>) -> Self {
+        Self { rs485: rs485.into(), ..self }
+    }
+
+    /// Sets [`exclusive`](Self#structfield.exclusive).
+    #[must_use]
+    pub fn exclusive(self, exclusive: bool) -> Self {
+        Self { exclusive, ..self }
+    }
+
+    /// Sets [`low_latency`](Self#structfield.low_latency).
+    #[must_use]
+    pub fn low_latency(self, low_latency: bool) -> Self {
+        Self { low_latency, ..self }
     }
 }
 

@@ -20,6 +20,7 @@ const CLASSES: usize = 4;
 /// order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
 /// of several such the one that came first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[non_exhaustive]
 pub enum Priority {
     /// What makes a motor stop, and the reads that confirm it: before all who wait.
     Stop,

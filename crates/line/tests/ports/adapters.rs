@@ -208,7 +208,7 @@ fn its_latency_timer_is_short_while_it_is_open() {
     drop(line);
     assert_eq!(shown(), "16");
 
-    let options = TtyOptions { low_latency: false, ..TtyOptions::default() };
+    let options = TtyOptions::default().low_latency(false);
     let line = Tty::open_within(&port, &format(Parity::None), &options, &machine.places()).unwrap();
     assert_eq!((shown().as_str(), line.notes().len()), ("16", 0));
     drop(line);

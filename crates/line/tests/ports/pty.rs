@@ -164,7 +164,7 @@ fn a_second_opening_is_refused_until_the_first_is_closed() {
         let holder = format!("this program has it open already: {} (process {})", program(), std::process::id());
         assert!(error.to_string().contains(&holder), "{error}");
     }
-    let shared = TtyOptions { exclusive: false, ..TtyOptions::default() };
+    let shared = TtyOptions::default().exclusive(false);
     assert!(Tty::open(&path, &format(Parity::Even), &shared).is_ok());
     drop(first);
     open(&path, Parity::Even);
@@ -219,21 +219,21 @@ fn a_far_side_that_takes_nothing_is_a_lost_port_in_the_end() {
 fn rs485_mode_is_refused_where_there_is_none() {
     let (_far, path) = pair();
     let refused = |rs485| {
-        let options = TtyOptions { rs485: Some(rs485), ..TtyOptions::default() };
+        let options = TtyOptions::default().rs485(rs485);
         Tty::open(&path, &format(Parity::Even), &options).unwrap_err()
     };
     let error = refused(Rs485::default());
     assert_eq!(error.kind, PortErrorKind::Unsupported);
     assert!(error.to_string().contains("RS-485"), "{error}");
-    let error = refused(Rs485 { delay_after_ms: 101, ..Rs485::default() });
+    let error = refused(Rs485::default().delay_after_ms(101));
     assert!(error.to_string().contains("101 ms") && error.to_string().contains("0..=100 ms"), "{error}");
     // A pseudo-terminal has no modem lines either.
     for switch in [Switch::Program, Switch::Either] {
-        let error = refused(Rs485 { switch, ..Rs485::default() });
+        let error = refused(Rs485::default().switch(switch));
         assert_eq!(error.kind, PortErrorKind::Unsupported);
         assert!(error.to_string().contains("RTS cannot be moved"), "{error}");
     }
     open(&path, Parity::Even); // the refusals left nothing locked
-    let off = TtyOptions { rs485: Some(Rs485 { enabled: false, ..Rs485::default() }), ..TtyOptions::default() };
+    let off = TtyOptions::default().rs485(Rs485::default().enabled(false));
     Tty::open(&path, &format(Parity::Even), &off).unwrap(); // a driver without the mode has it off
 }

@@ -74,7 +74,7 @@ fn whatever_comes_before_each_answer_all_is_answered() {
                     rig.pass(millis(2_000));
                 }
                 let case = format!("{count} bytes of {what}, fresh {fresh}, 08H {echo:?}");
-                let stop = CallOptions { in_doubt: true, ..CallOptions::default() };
+                let stop = CallOptions::new().in_doubt(true);
                 rig.call(unit(1).into(), &Request::write(0x3000, 5), stop, &mut || false, &mut |_| ())
                     .unwrap_or_else(|error| panic!("stop, {case}: {error}"));
                 for address in [0x3000, 0x3001] {

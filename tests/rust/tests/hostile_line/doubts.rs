@@ -76,7 +76,7 @@ fn a_unit_without_an_echo_is_right_again_with_the_next_call() {
                 }
             },
         );
-        let options = CallOptions { retries: Some(retries), timeout: Some(timeout), ..CallOptions::default() };
+        let options = CallOptions::new().retries(retries).timeout(timeout);
         let mut failed = Vec::new();
         for address in 100..120 {
             let (read, mut came) = (Request::read(address, 1).unwrap(), Vec::new());
@@ -204,7 +204,7 @@ fn a_write_waits_until_no_earlier_one_can_confirm_it() {
 
 #[test]
 fn a_read_can_be_verified() {
-    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    let verify = CallOptions::new().verify(true);
     let read = Request::read(100, 1).unwrap();
     let answer = |word: u16| {
         let mut answer = right(&[1, 3, 0, 0, 0, 1, 0x84, 0x0A]);
@@ -290,7 +290,7 @@ fn a_stop_in_doubt_is_not_refused_by_the_late_refusal_of_another_write() {
     });
     rig.read(7, 1).unwrap();
     rig.ask(&Request::write(0x0100, 1)).unwrap_err();
-    let stop = CallOptions { in_doubt: true, ..CallOptions::default() };
+    let stop = CallOptions::new().in_doubt(true);
     rig.call(unit(1).into(), &Request::write(0x2000, 5), stop, &mut || false, &mut |_| ()).unwrap();
 }
 
@@ -327,7 +327,7 @@ fn a_caller_that_panics_leaves_a_bus_that_works() {
 /// To be sure of an answer is no reason to ask more often than the caller allows while there is none.
 #[test]
 fn a_verified_read_is_not_repeated_more_often_than_allowed() {
-    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    let verify = CallOptions::new().verify(true);
     let read = Request::read(100, 1).unwrap();
     let rig = Rig::new(|_, request| {
         let mut answer = right(request);
@@ -352,7 +352,7 @@ fn a_read_that_a_stop_overtook_is_repeated_beyond_doubt() {
     let (waits, it_waits) = std::sync::mpsc::channel();
     std::thread::scope(|scope| {
         let stop = || {
-            let urgent = CallOptions { priority: Some(Priority::Stop), ..CallOptions::default() };
+            let urgent = CallOptions::new().priority(Priority::Stop);
             let mut give_up = || waits.send(()).is_err();
             let read = Request::read(300, 1).unwrap();
             rig.call(unit(1).into(), &read, urgent, &mut give_up, &mut |_| ()).unwrap_err();
@@ -365,7 +365,7 @@ fn a_read_that_a_stop_overtook_is_repeated_beyond_doubt() {
             }
             false
         };
-        let twice = CallOptions { retries: Some(1), ..CallOptions::default() };
+        let twice = CallOptions::new().retries(1);
         let read = Request::read(100, 1).unwrap();
         rig.call(unit(1).into(), &read, twice, &mut give_up, &mut |answer| {
             if let Answer::Read { words, .. } = answer {

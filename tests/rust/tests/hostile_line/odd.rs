@@ -56,7 +56,7 @@ fn what_was_asked_before_a_port_was_lost_is_remembered() {
 fn a_read_goes_on_over_a_port_that_comes_back() {
     let rig = Rig::new(|_, request| at_once(&right(request)));
     rig.wire.lock().unwrap().vanish_after_sending = true;
-    let again = CallOptions { retries: Some(1), ..CallOptions::default() };
+    let again = CallOptions::new().retries(1);
     let request = Request::read(100, 1).unwrap();
     rig.call(unit(1).into(), &request, again, &mut || false, &mut |_| ()).unwrap();
     assert_eq!(rig.wire.lock().unwrap().opened, 2);

@@ -15,7 +15,7 @@ fn a_unit_that_never_answered_and_is_silent_on_08h_is_settled_by_a_read_of_anoth
     let script =
         |number, request: &[u8]| if number == 0 || request[1] == 8 { Vec::new() } else { at_once(&right(request)) };
     let rig = Rig::new(script);
-    let (read, verify) = (Request::read(200, 1).unwrap(), CallOptions { verify: true, ..CallOptions::default() });
+    let (read, verify) = (Request::read(200, 1).unwrap(), CallOptions::new().verify(true));
     call(&rig, &read, verify).expect_err("it was not heard");
     call(&rig, &read, verify).expect_err("silence on an echo is all that is known");
     call(&rig, &read, verify).unwrap();

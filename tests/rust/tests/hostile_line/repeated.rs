@@ -43,7 +43,7 @@ fn leave_open(rig: &Rig, rivals: u16) {
 
 /// A read that is put as it is, and not answered.
 fn lose(rig: &Rig, read: &Request<'_>) {
-    let in_doubt = CallOptions { in_doubt: true, ..CallOptions::default() };
+    let in_doubt = CallOptions::new().in_doubt(true);
     rig.call(unit(1).into(), read, in_doubt, &mut || false, &mut |_| ()).unwrap_err();
 }
 
@@ -52,7 +52,7 @@ fn read_200() -> Request<'static> {
 }
 
 fn retried(rig: &Rig, request: &Request<'_>, retries: u32) -> Result<Vec<u16>, Box<CallError>> {
-    let (options, mut came) = (CallOptions { retries: Some(retries), ..CallOptions::default() }, Vec::new());
+    let (options, mut came) = (CallOptions::new().retries(retries), Vec::new());
     rig.call(unit(1).into(), request, options, &mut || false, &mut |answer| {
         if let Answer::Read { words, .. } = answer {
             came = words.iter().collect();

@@ -207,7 +207,7 @@ impl Rig {
             line.0.lock().unwrap().opened += 1;
             Ok(Box::new(line.clone()) as Box<dyn Line>)
         };
-        let options = BusOptions { retries: 0, ..BusOptions::new(FORMAT) };
+        let options = BusOptions::new(FORMAT).retries(0);
         let bus = Bus::open(Box::new(opener), options, &mut || false).unwrap();
         Self { bus: Arc::new(bus), wire, opening }
     }

@@ -60,8 +60,7 @@ fn a_caller_waits_for_a_dead_unit_as_long_as_for_a_silent_one() {
     {
         let rig = dead(|_, _| Vec::new());
         let (before, counted) = (rig.now(), rig.bus.stats().units[&unit(1)].not_asked);
-        let options =
-            CallOptions { timeout: Some(millis(timeout)), retries: Some(retries), priority, ..CallOptions::default() };
+        let options = CallOptions::new().timeout(millis(timeout)).retries(retries).priority(priority);
         let (sent, result) = ask(&rig, 2, options, false);
         assert!(!sent && is_not_asked(&result), "{result:?}");
         assert_eq!(rig.since(before), millis(waits), "{timeout} ms, {retries} retries, {priority:?}");
@@ -74,7 +73,7 @@ fn a_caller_waits_for_a_dead_unit_as_long_as_for_a_silent_one() {
 fn who_waits_long_enough_asks_a_dead_unit_again() {
     let rig = dead(|number, request| if number < 2 { Vec::new() } else { at_once(&right(request)) });
     let before = rig.now();
-    let options = CallOptions { retries: Some(3), ..CallOptions::default() };
+    let options = CallOptions::new().retries(3);
     let (_, result) = ask(&rig, 2, options, false);
     result.unwrap();
     let waited = rig.since(before);
@@ -138,9 +137,9 @@ fn a_unit_that_is_heard_between_two_silences_is_not_dead() {
 fn giving_up_between_two_silences_is_no_sign_of_life() {
     let rig = rig(|_, _| Vec::new());
     once(&rig, 0).1.unwrap_err();
-    let (sent, result) = ask(&rig, 1, CallOptions { in_doubt: true, ..CallOptions::default() }, true);
+    let (sent, result) = ask(&rig, 1, CallOptions::new().in_doubt(true), true);
     assert_eq!((sent, result.unwrap_err().failure), (true, Failure::Interrupted));
     once(&rig, 2).1.unwrap_err();
-    let (sent, result) = ask(&rig, 3, CallOptions { timeout: Some(Duration::ZERO), ..CallOptions::default() }, false);
+    let (sent, result) = ask(&rig, 3, CallOptions::new().timeout(Duration::ZERO), false);
     assert!(!sent && is_not_asked(&result), "{result:?}");
 }

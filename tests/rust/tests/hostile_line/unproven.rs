@@ -39,7 +39,7 @@ fn late(read_back: impl Fn() -> Pieces + Send + 'static) -> Rig {
 }
 
 fn write(rig: &Rig, word: u16, read_back: Option<u16>) -> Result<Done, Box<CallError>> {
-    let options = CallOptions { read_back, ..CallOptions::default() };
+    let options = CallOptions::new().read_back(read_back);
     rig.call(unit(1).into(), &Request::write(100, word), options, &mut || false, &mut |_| ())
 }
 
@@ -115,13 +115,13 @@ fn what_is_read_back_waits_until_no_earlier_read_can_answer_it() {
     });
     rig.read(7, 1).unwrap();
     // More than can be outvoted, of a length that no longer form helps.
-    let in_doubt = CallOptions { in_doubt: true, ..CallOptions::default() };
+    let in_doubt = CallOptions::new().in_doubt(true);
     for address in 0x1000..0x1004 {
         let read = Request::read(address, 16).unwrap();
         rig.call(unit(1).into(), &read, in_doubt, &mut || false, &mut |_| ()).unwrap_err();
     }
     let given_up = rig.now();
-    let options = CallOptions { read_back: Some(100), ..CallOptions::default() };
+    let options = CallOptions::new().read_back(100);
     let write = Request::write_many(100, &words).unwrap();
     rig.call(unit(1).into(), &write, options, &mut || false, &mut |_| ()).unwrap();
     assert_eq!(rig.sent(&Request::read(100, 16).unwrap()), 1);
@@ -195,7 +195,7 @@ fn a_request_that_went_out_before_the_port_was_lost_again_is_said_to_be_sent() {
     let rig = Rig::new(|_, request| at_once(&right(request)));
     rig.wire.lock().unwrap().vanish_before_sending = true;
     rig.wire.lock().unwrap().vanish_after_sending = true;
-    let options = CallOptions { retries: Some(1), in_doubt: true, ..CallOptions::default() };
+    let options = CallOptions::new().retries(1).in_doubt(true);
     let read = Request::read(100, 1).unwrap();
     let error = rig.call(unit(1).into(), &read, options, &mut || false, &mut |_| ()).unwrap_err();
     assert!(matches!(&error.failure, Failure::Port(port) if port.kind == PortErrorKind::Lost), "{error}");

@@ -79,7 +79,7 @@ fn rig(fates: &'static [Fate]) -> (Rig, Arc<Mutex<Unit>>) {
 }
 
 fn write(rig: &Rig, request: &Request<'_>, read_back: Option<u16>) -> Result<(), Box<CallError>> {
-    let options = CallOptions { read_back, retries: Some(2), ..CallOptions::default() };
+    let options = CallOptions::new().read_back(read_back).retries(2);
     rig.call(unit(1).into(), request, options, &mut || false, &mut |_| ()).map(|_| ())
 }
 
@@ -121,7 +121,7 @@ fn without_a_place_to_read_it_back_a_write_is_sent_once() {
 /// Only what is read can be compared; sent twice, a command would be obeyed twice.
 #[test]
 fn to_verify_never_sends_a_write_or_an_echo_twice() {
-    let verify = CallOptions { verify: true, ..CallOptions::default() };
+    let verify = CallOptions::new().verify(true);
     for request in [Request::write(0x2000, 1), Request::write_many(0x2000, &[1, 5]).unwrap(), Request::echo(7)] {
         let rig = Rig::new(|_, request| at_once(&right(request)));
         rig.call(unit(1).into(), &request, verify, &mut || false, &mut |_| ()).unwrap();
@@ -142,7 +142,7 @@ fn a_write_in_doubt_is_not_confirmed_by_the_late_answer_to_an_earlier_read() {
     rig.read(7, 1).unwrap();
     rig.read(5, 1).unwrap_err();
     // Register 100 shows 100, whatever is written to it.
-    let options = CallOptions { in_doubt: true, read_back: Some(100), ..CallOptions::default() };
+    let options = CallOptions::new().in_doubt(true).read_back(100);
     let error = rig.call(unit(1).into(), &Request::write(100, 5), options, &mut || false, &mut |_| ()).unwrap_err();
     assert_eq!(error.failure, Failure::NotTaken { times: 1, shows: vec![100] });
 }
@@ -151,12 +151,12 @@ fn a_write_in_doubt_is_not_confirmed_by_the_late_answer_to_an_earlier_read() {
 fn nothing_is_written_over_another_connection_than_the_caller_knows() {
     let rig = Rig::new(|_, request| at_once(&right(request)));
     let write = Request::write(100, 5);
-    let known = CallOptions { connection: Some(rig.bus.stats().reconnects), ..CallOptions::default() };
+    let known = CallOptions::new().connection(rig.bus.stats().reconnects);
     let call = |options| rig.call(unit(1).into(), &write, options, &mut || false, &mut |_| ());
     call(known).unwrap();
     rig.wire.lock().unwrap().vanish_after_sending = true;
     rig.read(7, 1).unwrap_err();
     let error = call(known).unwrap_err();
     assert_eq!((error.failure, error.sent, rig.sent(&write)), (Failure::Reopened, None, 1));
-    call(CallOptions { connection: Some(1), ..known }).unwrap();
+    call(known.connection(1)).unwrap();
 }
