@@ -44,7 +44,8 @@ def rust_files() -> dict[str, set[str]]:
     places = {"::".join(path.relative_to(LINE).with_suffix("").parts).removesuffix("::mod"): path for path in paths}
     found: dict[str, set[str]] = {}
     for name, path in places.items():
-        code = re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8")).partition("#[cfg(test)]")[0]
+        code = re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+        code = re.split(r"#\[cfg\((?:test|all\(test)\b", code)[0]
         used: set[str] = set()
         for match in re.finditer(r"\b(?:crate|super)::((?:\w+::)*)", code):
             parts = match[1].strip(":").split("::")
