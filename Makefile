@@ -23,7 +23,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest soak soak-virtual soak-realtime wheel clean \
         machine format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -35,6 +35,7 @@ help: ## what can be made
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
+	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -209,6 +210,10 @@ THREADS ?= 2
 model: $(VENV)/.created ## some minutes; see tests/model/README.md
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-model -- --deep --threads $(THREADS)
 	$(BIN)/python tools/check_model.py
+
+# After a bound in Cargo.toml was lowered, or something newer was used.
+oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions
+	$(BIN)/python tools/oldest_versions.py
 
 # Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
 SEED  ?= $(shell date +%s)
