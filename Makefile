@@ -23,7 +23,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
         machine format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
@@ -35,6 +35,7 @@ help: ## what can be made
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
+	@echo "make packages   the published crates' tests, from their packages alone"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
@@ -210,6 +211,9 @@ THREADS ?= 2
 model: $(VENV)/.created ## some minutes; see tests/model/README.md
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-model -- --deep --threads $(THREADS)
 	$(BIN)/python tools/check_model.py
+
+packages: $(VENV)/.dev ## what a package leaves out shows here
+	$(BIN)/python tools/check_packages.py
 
 # After a bound in Cargo.toml was lowered, or something newer was used.
 oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions

@@ -13,7 +13,7 @@ import drivebus
 from drivebus import Bus, NotAllowed, PortError, Simulator
 from drivebus.doctor import Finding, Severity, examine
 from drivebus.doctor.frames import frames_in
-from drivebus.doctor.settings import Settings, candidates
+from drivebus.doctor.search_order import Settings, candidates
 from drivebus.line import ports
 
 READ = bytes.fromhex("01 03 00 04 00 02 85 CA")  # GD350 manual, chapter 9.4.1, request and answer

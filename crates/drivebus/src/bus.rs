@@ -6,7 +6,6 @@ use std::time::Duration;
 use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions};
 use drivebus_rtu::{Answer, Destination, Instant, Request};
 
-use crate::asking;
 use crate::builder::Builder;
 use crate::checks;
 use crate::error::Error;
@@ -14,6 +13,7 @@ use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::poll::{Poll, Target};
 use crate::reading::{Reading, Values};
+use crate::replies;
 
 /// One line with drives on it. Clones are handles to the same line, and it is safe from any thread.
 ///
@@ -97,7 +97,7 @@ impl Bus {
     pub fn read_with(&self, unit: u8, address: u16, count: u16, options: CallOptions) -> Result<Vec<u16>, Error> {
         let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
         let mut words = Vec::new();
-        self.call(unit.into(), &request, options.of(&request)?, &mut |answer| words = asking::words(&answer))?;
+        self.call(unit.into(), &request, options.of(&request)?, &mut |answer| words = replies::words(&answer))?;
         Ok(words)
     }
 
@@ -165,7 +165,7 @@ impl Bus {
     pub fn transact(&self, unit: u8, pdu: &[u8], reply_length: Option<u8>) -> Result<Vec<u8>, Error> {
         let (unit, request) = (checks::unit(unit)?, Request::raw(pdu, reply_length)?);
         let mut reply = Vec::new();
-        self.call(unit.into(), &request, once(), &mut |answer| reply = asking::pdu(unit, &answer))?;
+        self.call(unit.into(), &request, once(), &mut |answer| reply = replies::pdu(unit, &answer))?;
         Ok(reply)
     }
 
@@ -179,7 +179,7 @@ impl Bus {
         let mut words = Vec::with_capacity(reading.words());
         for (address, count) in reading.reads() {
             let request = checks::read(address, count)?;
-            let mut take = |answer: Answer<'_>| words.extend(asking::words(&answer));
+            let mut take = |answer: Answer<'_>| words.extend(replies::words(&answer));
             self.call(unit.into(), &request, LineOptions::default(), &mut take)?;
         }
         Ok(reading.values(&words))

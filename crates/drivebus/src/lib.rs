@@ -46,7 +46,6 @@
 #![forbid(unsafe_code)]
 
 pub mod aio;
-mod asking;
 mod builder;
 mod bus;
 mod checks;
@@ -55,6 +54,7 @@ mod options;
 mod payload;
 mod poll;
 mod reading;
+mod replies;
 #[cfg(feature = "sim")]
 mod simulated;
 

@@ -1,11 +1,11 @@
 //! Who has the turn: what is known of the line, its adapter and its units, and what has to go out before a request.
 
+mod arrival_pauses;
 pub(crate) mod dead_units;
 pub(crate) mod delays;
 pub(crate) mod echo;
 pub(crate) mod exchange;
-mod longer;
-mod lumps;
+mod longer_reads;
 pub(crate) mod opener;
 pub(crate) mod resync;
 
@@ -21,11 +21,11 @@ use crate::health::stats::{Asked, Stats};
 use crate::line::Opener;
 use crate::line::{Line, LineClock};
 use crate::options::AdapterEcho;
+use crate::owner::arrival_pauses::Lumps;
 use crate::owner::dead_units::DeadUnits;
 use crate::owner::delays::Delays;
 use crate::owner::exchange::exchange;
-use crate::owner::longer::Longer;
-use crate::owner::lumps::Lumps;
+use crate::owner::longer_reads::Longer;
 use crate::owner::opener::LineOpener;
 use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
 

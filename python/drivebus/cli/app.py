@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus.cli import backup, doctor, explain, frames, look, move, profiles, tools, watch
+from drivebus.cli import backup, doctor, explain, frames, monitor, move, profiles, reading, tools
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
@@ -205,7 +205,7 @@ def cli(
     )
 
 
-for module in (look, watch, explain, doctor, move, backup, frames, profiles, tools):
+for module in (reading, monitor, explain, doctor, move, backup, frames, profiles, tools):
     for command in module.COMMANDS:
         cli.add_command(command)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.settings import Settings
+from drivebus.doctor.search_order import Settings
 from drivebus.errors import PortError
 from drivebus.line import ports
 

@@ -16,7 +16,7 @@ from drivebus.doctor.adapter import adapter_findings, port_finding
 from drivebus.doctor.findings import Finding
 from drivebus.doctor.hints import hint_findings
 from drivebus.doctor.presence import found_elsewhere, look, nobody, units_to_ask, whole
-from drivebus.doctor.settings import Settings, candidates
+from drivebus.doctor.search_order import Settings, candidates
 from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard, overheard
 from drivebus.doctor.unit import UnitExamination
 from drivebus.errors import PortError

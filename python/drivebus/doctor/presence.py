@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.settings import Settings
+from drivebus.doctor.search_order import Settings
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify.results import Found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.doctor.frames import frames_in, in_words
-from drivebus.doctor.settings import Settings
+from drivebus.doctor.search_order import Settings
 from drivebus.errors import BadAnswer
 
 __all__ = ["OTHER_MASTER", "UNKNOWN", "heard", "overheard"]

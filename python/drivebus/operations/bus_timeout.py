@@ -12,7 +12,7 @@ from drivebus import checks
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
-from drivebus.operations.ramp import PATIENCE
+from drivebus.operations.stop_proof import PATIENCE
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Value

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.operations import setpoints, state, words
-from drivebus.operations.ramp import Fall
 from drivebus.operations.state import Seen
+from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 

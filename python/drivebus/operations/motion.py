@@ -10,8 +10,8 @@ from drivebus import checks
 from drivebus.errors import NotAllowed
 from drivebus.operations import commands, control, setpoints, speed, start_checks, state
 from drivebus.operations.program_end import before_start
-from drivebus.operations.ramp import Fall
 from drivebus.operations.state import Seen
+from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource, State
 

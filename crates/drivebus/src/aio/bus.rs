@@ -8,7 +8,6 @@ use drivebus_rtu::{Destination, Request};
 
 use super::asked::Asked;
 use super::poll::Poll;
-use crate::asking;
 use crate::builder::Builder;
 use crate::bus::once;
 use crate::checks;
@@ -17,6 +16,7 @@ use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::poll::Target;
 use crate::reading::{Reading, Values};
+use crate::replies;
 
 /// One line with drives on it, whose calls are futures. The calls are those of [`drivebus::Bus`](crate::Bus), and so is
 /// what they say of errors.
@@ -57,7 +57,7 @@ impl Bus {
             let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
             Ok((unit.into(), request, options.of(&request)?))
         };
-        self.ask(checked(), |reply| asking::words_of(&reply))
+        self.ask(checked(), |reply| replies::words_of(&reply))
     }
 
     /// Writes a word or a sequence of words: as [`Bus::write`](crate::Bus::write).

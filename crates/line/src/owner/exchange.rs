@@ -9,7 +9,7 @@ use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Mast
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::line::Line;
-use crate::owner::lumps::{Arrivals, Ended, Lumps};
+use crate::owner::arrival_pauses::{Arrivals, Ended, Lumps};
 use crate::system::clock::LOOK_UP;
 use crate::turns::queue::Stops;
 
