@@ -168,7 +168,7 @@ class Bus:
         """
     @property
     def port(self) -> str:
-        """What was opened, for people."""
+        """The name of the port, for messages."""
     @property
     def closed(self) -> bool: ...
     @property

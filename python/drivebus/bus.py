@@ -92,7 +92,7 @@ class Bus(BusFace, Requests):
         self.close()
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
-        """Asks each of *units* who it is, and yields those that answer as they do.
+        """Asks each of *units* who it is, with the line's own settings, and yields each one that answers at once.
 
         One read of the identification register each, not repeated, and a few more of those that answer and give no code
         that is known (see `identify`). A unit that refuses has answered too, and so has one whose answer is damaged:

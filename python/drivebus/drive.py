@@ -45,7 +45,7 @@ class _Setpoint:
 
 
 class Drive(DriveFace):
-    """A drive, as `drivebus.Bus.drive` gives it.
+    """One drive on a line: its commands, values and state. `drivebus.Bus.drive` makes it.
 
     Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,
     and, for errors, its last state: every property asks the drive. Safe from any thread; a command and its confirmation
@@ -147,7 +147,7 @@ class Drive(DriveFace):
     ) -> dict[str, Value]: ...
     @documented_by(registers.read)
     def read(self, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
-        """See `registers.read`."""
+        """Reads values by name, in the fewest requests; see `registers.read`."""
         return at_once(registers.read(unit_of(self), *names, verify=verify, unverified=unverified))
 
     @overload
@@ -163,7 +163,7 @@ class Drive(DriveFace):
         *,
         unverified: bool = False,
     ) -> None:
-        """See `parameters.write`."""
+        """Writes one value by name, or several from a mapping; see `parameters.write`."""
         if isinstance(name, Mapping):
             at_once(parameters.write(unit_of(self), name, store=store, unverified=unverified))
         else:
@@ -216,7 +216,7 @@ class Drive(DriveFace):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
-        """Makes the drive act by itself when it hears nothing for *timeout* seconds, and keeps it from that until then.
+        """Makes the drive act by itself after *timeout* seconds of silence, and asks it often enough inside the block.
 
             with drive.watchdog(1.0, unverified=True), drive.running(hz=10.0):
                 ...

@@ -126,7 +126,10 @@ class SimulatedDrive:
         return self._native.eeprom_writes
 
     def eeprom_writes_of(self, address: int) -> int:
-        """How many of them went to the parameter at *address*, with or without the bit for the other memory."""
+        """How many words the bus has written to EEPROM for the parameter at *address*.
+
+        The address may have the bit for the other memory or not.
+        """
         return self._native.eeprom_writes_of(checks.address(address))
 
     def writes(self) -> list[tuple[float, int, int]]:
@@ -134,7 +137,7 @@ class SimulatedDrive:
         return self._native.writes()
 
     def take_writes(self) -> list[tuple[float, int, int]]:
-        """As `writes`, and forgets them: who takes them often enough misses none."""
+        """Returns what `writes` does and empties the list: who takes them often enough misses none."""
         return self._native.take_writes()
 
     @property
@@ -246,7 +249,7 @@ class Simulator:
         return self._native.line
 
     def drive(self, unit: int) -> SimulatedDrive:
-        """The machine's side of one drive."""
+        """The simulated drive at *unit*, seen from its shaft and keypad."""
         return SimulatedDrive(self._native.drive(checks.unit(unit)))
 
     def now(self) -> float:

@@ -86,7 +86,7 @@ impl Builder {
         Self { silence, ..self }
     }
 
-    /// Characters and silence in one.
+    /// Sets baud rate, parity, bits and silence at once.
     #[must_use]
     pub fn format(self, format: SerialFormat) -> Self {
         self.baudrate(format.baud_rate())

@@ -27,7 +27,7 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Opens `port` as it is usual: a path, or one of the URLs in the [crate's documentation](crate#ports).
+    /// Opens `port` with the usual settings: a path, or one of the URLs in the [crate's documentation](crate#ports).
     ///
     /// # Errors
     ///
@@ -36,7 +36,7 @@ impl Bus {
         Self::builder().open(port)
     }
 
-    /// Sets what is different, and then opens.
+    /// A builder for a bus with other settings than the usual ones. It opens nothing by itself.
     pub fn builder() -> Builder {
         Builder::default()
     }
@@ -60,7 +60,7 @@ impl Bus {
         self.simulator.as_ref()
     }
 
-    /// What was opened, for people.
+    /// The name of the port, for messages.
     pub fn port(&self) -> &str {
         self.core.name()
     }
@@ -185,7 +185,7 @@ impl Bus {
         Ok(reading.values(&words))
     }
 
-    /// Asks `targets` again and again, and keeps what comes as samples until they are taken.
+    /// Asks `targets` again and again, and keeps the last 10 000 samples until they are taken.
     ///
     /// In each cycle every target is asked once; a cycle begins at every beat of `interval`, or right after the one
     /// before. Whatever else wants the line goes before the next request. What is not answered is not repeated: the
@@ -255,7 +255,7 @@ impl Bus {
         self.core.notes()
     }
 
-    /// The same bus for who does not wait in a thread.
+    /// The same bus, with futures for calls.
     pub fn aio(&self) -> crate::aio::Bus {
         crate::aio::Bus::from(self.clone())
     }

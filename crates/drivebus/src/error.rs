@@ -35,7 +35,7 @@ impl Error {
         Self { kind: ErrorKind::NotAllowed, message: why.to_string(), call: None }
     }
 
-    /// Whose fault it is.
+    /// What kind of failure it is, and so by whose fault.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }

@@ -30,7 +30,7 @@ pub struct CallOptions {
 }
 
 impl CallOptions {
-    /// As the bus has it.
+    /// Options that leave everything as the bus has it.
     pub fn new() -> Self {
         Self::default()
     }
@@ -72,8 +72,8 @@ impl CallOptions {
         Self { read_back: Some(address), ..self }
     }
 
-    /// The [`reconnects`](drivebus_line::Stats::reconnects) at which you saw who answers: where the port was opened again
-    /// since, nothing is sent, for another unit may have the address now.
+    /// Sends nothing where the port was opened again since you saw who answers: another unit may have the address now.
+    /// `reconnects` is the [count](drivebus_line::Stats::reconnects) of that moment.
     #[must_use]
     pub fn connection(self, reconnects: u64) -> Self {
         Self { connection: Some(reconnects), ..self }

@@ -52,7 +52,7 @@ impl Bus {
         Shared::open(opener, options, give_up).map(|shared| Self { shared })
     }
 
-    /// What was opened, for people.
+    /// The name of the port, for messages.
     pub fn name(&self) -> &str {
         &self.shared.name
     }

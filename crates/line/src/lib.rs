@@ -5,17 +5,18 @@
 //! silence of 3.5 characters is kept before every request, counted from the last byte seen or sent; an answer is handed
 //! over at its last byte.
 //!
-//! Ports are opened by what people call them ([`url`]), or by an [`Opener`] of one's own, here of a simulated line. The crate
-//! `drivebus` puts plain numbers around it, and futures.
+//! Ports are opened by what people call them ([`url`]), or by an [`Opener`] of one's own. The crate `drivebus` puts plain
+//! numbers around it, simulated lines, and futures.
 //!
-//! ```
+//! ```no_run
+//! use drivebus_line::url::{Known, PortOptions, PortUrl};
 //! use drivebus_line::{Bus, BusOptions, CallOptions};
 //! use drivebus_rtu::{Answer, Destination, Request, SerialFormat, UnitAddress};
-//! use drivebus_sim::{Options, Simulator};
 //!
-//! let simulator = Simulator::new([(1, "gd350")], Options::default())?;
-//! let opener = move || Ok(Box::new(simulator.open_line()?) as _);
-//! let bus = Bus::open(Box::new(opener), BusOptions::new(SerialFormat::default()), &mut || false)?;
+//! let format = SerialFormat::default();
+//! let port = PortUrl::parse("/dev/ttyUSB0", &Known::default())?;
+//! let opener = port.opener(&PortOptions::new(format)).ok_or("a port that this crate opens")?;
+//! let bus = Bus::open(opener, BusOptions::new(format).retries(1), &mut || false)?;
 //!
 //! let unit = Destination::Unit(UnitAddress::new(1)?);
 //! let mut word = None;
@@ -24,8 +25,8 @@
 //!         word = words.get(0);
 //!     }
 //! };
-//! bus.call(unit, &Request::read(0x2103, 1)?, CallOptions::default(), &mut || false, &mut take)?;
-//! assert_eq!(word, Some(0x01A0)); // a Goodrive350
+//! bus.call(unit, &Request::read(0x2103, 1)?, CallOptions::new(), &mut || false, &mut take)?;
+//! println!("unit 1 says what it is: {word:04X?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -119,7 +119,7 @@ pub struct UnitOptions {
 }
 
 impl UnitOptions {
-    /// As the bus has it.
+    /// Options that leave everything as the bus has it.
     pub fn new() -> Self {
         Self::default()
     }
@@ -162,7 +162,7 @@ pub struct CallOptions {
 }
 
 impl CallOptions {
-    /// As the bus has it.
+    /// Options that leave everything as the bus has it.
     pub fn new() -> Self {
         Self::default()
     }

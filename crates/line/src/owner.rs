@@ -1,4 +1,4 @@
-//! Who has the turn: what is known of the line, its adapter and its units, and what has to go out before a request.
+//! The open line, what is known of it, its adapter and its units, and what has to go out before a request.
 
 mod arrival_pauses;
 pub(crate) mod dead_units;

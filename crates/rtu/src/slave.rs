@@ -9,7 +9,7 @@ use crate::pdu::function::EXCEPTION_BIT;
 use crate::request::{Request, RequestError};
 use crate::{Destination, FrameError, Instant, SerialFormat, UnitAddress};
 
-/// A unit's ear.
+/// The unit's side of the line: finds the requests to it, and says what it must not answer.
 ///
 /// A unit that answers after [`SlaveEvent::Request`] must still leave the silence of 3.5 characters before its
 /// answer, and must not feed its own answer back into [`receive`](Self::receive).

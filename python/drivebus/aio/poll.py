@@ -28,7 +28,7 @@ class Poll(Polling):
         self._bus = native
 
     async def batch(self, count: int | None = None, timeout: float | None = None) -> Batch:
-        """Waits until *count* samples are there, and takes as many. With None: until one is, and takes all.
+        """Waits for *count* samples and returns them. None waits for one, and returns all there are.
 
         Fewer where *timeout* seconds are over first, or where the poll has ended.
 

@@ -1,4 +1,4 @@
-"""Commands that only look: nothing here writes to a drive."""
+"""Commands that read, such as `status`, `read` and `scan`: nothing here writes to a drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings of a line: how characters look on the wire, and which others may be the right ones."""
+"""Which speeds and characters are tried, and in what order, where a drive does not answer to the line's own."""
 
 from __future__ import annotations
 

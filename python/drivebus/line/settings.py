@@ -155,7 +155,7 @@ class BusFace:
 
     @property
     def port(self) -> str:
-        """What was opened, for people."""
+        """The name of the port, for messages."""
         return self._core().port
 
     @property

@@ -42,7 +42,7 @@ class DriveFace:
         return self._unit.unverified
 
     def readable(self, *names: str) -> list[str]:
-        """*names*, or without any the monitor registers of the family that may be read. Nothing is sent.
+        """Returns *names*, or without any the monitor registers of the family that may be read. Nothing is sent.
 
         Raises:
             NotAllowed: An unknown name, one that is not verified, or one whose meaning a parameter of the drive decides
@@ -59,7 +59,7 @@ class DriveFace:
         return self._unit.profile.describe(name)
 
     def value(self, name: str, raw: int) -> Value:
-        """The word *raw* of *name* in engineering units."""
+        """Returns the word *raw* of *name* in engineering units."""
         return registers.value(self._unit, name, raw)
 
 

@@ -89,13 +89,13 @@ async def set_setpoint(unit: Unit, hz: float, *, unverified: bool = False) -> No
 
 
 async def ask(unit: Unit, setpoint: str, *, unverified: bool = False) -> float:
-    """What was given last for *setpoint*, in its own unit. Errors as for `ask_setpoint`."""
+    """Reads the value that was given last for *setpoint*, in its own unit. Errors as for `ask_setpoint`."""
     unit = await with_setpoint(unit.trusting(unverified), setpoint)
     return float(await registers.read(unit, register_of(unit, setpoint)))
 
 
 async def give(unit: Unit, setpoint: str, value: float, *, unverified: bool = False) -> None:
-    """Gives *value* for *setpoint*, if the drive would heed it. It changes what a motor does that runs.
+    """Writes *value* to *setpoint*, if the drive would heed it. A motor that runs follows it.
 
     Args:
         setpoint: One of the family's `Profile.setpoint_names()`, such as `"torque"`.

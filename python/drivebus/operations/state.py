@@ -78,7 +78,7 @@ class _Look(NamedTuple):
 
 
 async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Seen:
-    """The status words, in one read where they stand side by side.
+    """Reads the drive's status words, in one read where they stand side by side.
 
     Raises:
         NotAllowed: Nothing of them may be read; the message has the reason.
@@ -134,7 +134,7 @@ async def state(unit: Unit, *, unverified: bool = False) -> State:
 
 
 async def ping(unit: Unit) -> None:
-    """One read of what the family is known to answer: of its state word, if it has one.
+    """Checks that the unit answers, by one read: of its state word, if the family has one.
 
     Raises:
         NotAllowed: Nothing of it is known. Nothing was sent.

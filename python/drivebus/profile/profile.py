@@ -263,7 +263,7 @@ class Profile:
         return self._native.is_command(address)
 
     def state(self, raw: int, /) -> str:
-        """The state word by name."""
+        """The name of the state that the state word *raw* shows."""
         return self._native.state(raw)
 
     def is_in_fault(self, raw: int, /) -> bool:
@@ -292,7 +292,7 @@ class Profile:
 
     @property
     def variants_chosen(self) -> dict[str, str]:
-        """What `with_variants` was told."""
+        """The choices that `with_variants` was given, by the name of the variant."""
         return self._native.variants_chosen
 
     def with_variants(self, chosen: Mapping[str, str]) -> Profile:

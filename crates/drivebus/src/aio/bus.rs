@@ -30,7 +30,7 @@ impl From<crate::Bus> for Bus {
 }
 
 impl Bus {
-    /// Opens `port` as it is usual; what is different says a [`Builder`] in [`open_as`](Self::open_as).
+    /// Opens `port` with the usual settings; [`open_as`](Self::open_as) takes others.
     pub fn open(port: &str) -> Asked<Self> {
         Self::open_as(Builder::default(), port)
     }

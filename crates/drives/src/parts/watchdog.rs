@@ -1,6 +1,6 @@
 //! What makes a drive act by itself when its bus falls silent.
 
-/// The parameters that set it, and the values that they take.
+/// The parameters that set a drive's own time-out of the bus, and the values that they take.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Watchdog {
