@@ -42,6 +42,7 @@ LINE_ROOMS = [
     "ask",
     "ports",
     "health",
+    "share",
     "owner",
     "bus",
     "poll",

@@ -161,6 +161,7 @@ class Bus:
         learn_timeout: bool = False,
         low_latency: bool = True,
         queue: int = 65_536,
+        share: str = "auto",
     ) -> Bus:
         """Opens *port*.
 
@@ -318,6 +319,7 @@ def open_bus(
     learn_timeout: bool = False,
     low_latency: bool = True,
     queue: int = 65_536,
+    share: str = "auto",
 ) -> Asked[Bus]:
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 

@@ -54,6 +54,10 @@ class Bus(BusFace, Requests):
         low_latency: Whether an adapter that keeps what it receives (FTDI: 16 ms) is told to hurry while it is open.
         queue: How many requests may wait for the line, 1..1000000. Who finds no room is told so at once (`NotAllowed`);
             a stop always does.
+        share: Whether other programs of the same user may use the port at the same time: `"auto"`: who opens it first
+            has it and serves the others, who comes next uses it through that one; `"own"`: nobody is served where this
+            program has the port; `"never"`: nobody is served, and a port that another program has is busy. For serial
+            ports and `socket://`.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.

@@ -11,7 +11,7 @@ import functools
 import importlib.util
 import os
 from collections.abc import Callable, Coroutine, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import Any
 
 import pytest
@@ -27,16 +27,24 @@ settings.load_profile("drivebus")
 
 dispositions_as_usual()
 
-TRANSPORTS = ["process", pytest.param("pty", marks=pytest.mark.skipif(os.name == "nt", reason="no pty")), "tcp"]
+NO_PTY = pytest.mark.skipif(os.name == "nt", reason="no pty")
+TRANSPORTS = ["process", pytest.param("pty", marks=NO_PTY), "tcp"]
+# And a pseudo-terminal that another bus has: whoever opens it now uses it through that one.
+LINES = [*TRANSPORTS, pytest.param("shared", marks=NO_PTY)]
 # Seconds for an answer. Behind a port a thread of the simulator has to run for it; on a busy machine that takes long.
 IN_PROCESS, BEHIND_A_PORT = 0.25, 0.5
 RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
 
 
-@pytest.fixture(params=TRANSPORTS)
+@pytest.fixture(params=LINES)
 def simulator(request: pytest.FixtureRequest) -> Iterator[drivebus.Simulator]:
     clock = "virtual" if request.param == "process" else "real"
-    with drivebus.Simulator({1: "gd350", 2: "gd350"}, transport=request.param, clock=clock) as simulator:
+    is_shared = request.param == "shared"
+    transport = "pty" if is_shared else request.param
+    with (
+        drivebus.Simulator({1: "gd350", 2: "gd350"}, transport=transport, clock=clock) as simulator,
+        drivebus.Bus(simulator) if is_shared else nullcontext(),
+    ):
         yield simulator
 
 

@@ -140,4 +140,4 @@ def test_a_serial_server_that_comes_back() -> None:
 
 def test_who_has_a_busy_port_is_named(simulator: Simulator) -> None:
     with Bus(simulator.port), pytest.raises(PortError, match=r"this program has it open already: .*process \d+"):
-        Bus(simulator.port)
+        Bus(simulator.port, share="never")

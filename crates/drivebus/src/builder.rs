@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drivebus_line::url::{self, Known, PortOptions, PortUrl};
-use drivebus_line::{AdapterEcho, Bus as Core, BusOptions, Opener};
+use drivebus_line::{AdapterEcho, Bus as Core, BusOptions, Opener, Share};
 use drivebus_rtu::{DataBits, Parity, SerialFormat, Silence, StopBits};
 
 use crate::bus::Bus;
@@ -163,6 +163,14 @@ impl Builder {
         self
     }
 
+    /// Whether other programs of the same user may use the port at the same time; [`Share::Auto`] if it is not set: who
+    /// opens it first has it and serves the others.
+    #[must_use]
+    pub fn share(mut self, share: Share) -> Self {
+        self.options.share = share;
+        self
+    }
+
     /// Opens `port`: a path, or one of the URLs in the [crate's documentation](crate#ports).
     ///
     /// # Errors
@@ -188,20 +196,21 @@ impl Builder {
         let options = self.checked()?;
         let ports = self.port_options(options.format)?;
         url::check_together(Some(port), self.has_rs485(), options.echo)?;
-        let mut open = |opener| Core::open(opener, options, &mut || !wanted());
+        let mut open = |opener, key| Core::open_shared(opener, key, options, &mut || !wanted());
         match parse(port)? {
             #[cfg(feature = "sim")]
             PortUrl::Simulator(url) => {
                 let simulator = crate::simulated::simulator(&url, options.format)?;
-                let core = open(crate::simulated::opener(&simulator))?;
+                let core = open(crate::simulated::opener(&simulator), None)?;
                 Ok(Bus::simulated(core, simulator))
             }
             other => {
+                let key = other.key();
                 let opener = other.opener(&ports);
                 let opener = opener.ok_or_else(|| {
                     Error::not_allowed(format!("port {port:?}: this program was built without the feature \"sim\""))
                 })?;
-                Ok(Bus::around(open(opener)?))
+                Ok(Bus::around(open(opener, key)?))
             }
         }
     }

@@ -75,7 +75,7 @@ pub use drivebus_sim as sim;
 pub use drives::{Profile, Value};
 #[cfg(feature = "serial")]
 pub use line::rs485::Rs485;
-pub use line::{AdapterEcho, ErrorKind, Link, Opener, Stats, UnitOptions};
+pub use line::{AdapterEcho, ErrorKind, Link, Opener, Share, Stats, UnitOptions};
 pub use rtu::{DataBits, Instant, Parity, SerialFormat, Silence, StopBits};
 #[cfg(feature = "sim")]
 pub use sim::Simulator;

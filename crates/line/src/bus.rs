@@ -7,15 +7,24 @@
 //! | `call` | one call from its place in the queue to its end |
 //! | `workers` | the threads that carry out errands |
 //! | `listen` | hearing the line without asking |
+//! | `sharing` | whether the port is this program's, or another's through which it is used |
+//! | `host` | serving other programs |
+//! | `through` | being served by one |
 
 pub(crate) mod call;
 mod clock;
 pub(crate) mod errand;
+#[cfg(all(unix, feature = "share"))]
+mod host;
 mod listen;
 mod shared;
+#[cfg_attr(not(all(unix, feature = "share")), path = "bus/unshared.rs")]
+mod sharing;
+#[cfg(all(unix, feature = "share"))]
+mod through;
 pub(crate) mod workers;
 
-use std::sync::PoisonError;
+use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
@@ -28,6 +37,7 @@ use crate::health::link::Link;
 use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
+use crate::ports::key::PortKey;
 
 /// One line and its owner.
 ///
@@ -36,7 +46,7 @@ use crate::options::{BusOptions, CallOptions, UnitOptions};
 /// [`Failure::Interrupted`].
 #[derive(Debug)]
 pub struct Bus {
-    shared: Shared,
+    shared: Arc<Shared>,
 }
 
 impl Bus {
@@ -49,7 +59,24 @@ impl Bus {
     ///
     /// [`Failure::Port`]: the line cannot be opened. [`Failure::Interrupted`]: `give_up` said so first.
     pub fn open(opener: Opener, options: BusOptions, give_up: &mut dyn FnMut() -> bool) -> Result<Self, Failure> {
-        Shared::open(opener, options, give_up).map(|shared| Self { shared })
+        Shared::open(opener, None, options, give_up).map(|shared| Self { shared })
+    }
+
+    /// As [`open`](Self::open), of a port that programs may share: `key` tells it from others, and
+    /// [`BusOptions::share`] says whether it is shared. Where another program of this user has it, the bus uses it through
+    /// that one, in its queue, until that one ends; then one of the others has it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`open`](Self::open). [`Failure::Port`] also where the program that has the port opened it with other
+    /// characters, or is of another version.
+    pub fn open_shared(
+        opener: Opener,
+        key: Option<PortKey>,
+        options: BusOptions,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, Failure> {
+        Shared::open(opener, key, options, give_up).map(|shared| Self { shared })
     }
 
     /// The name of the port, for messages.
@@ -119,7 +146,10 @@ impl Bus {
             ));
         }
         let mut give_up = || self.is_shut() || give_up();
-        let result = Call::new(&self.shared, ask, options).run(&mut give_up, take);
+        let result = match &self.shared.sharing {
+            Some(_) => self.shared.call_shared(destination, request, options, &mut give_up, take),
+            None => Call::new(&self.shared, ask, options).run(&mut give_up, take),
+        };
         if self.is_shut() {
             self.close();
         }
@@ -140,12 +170,12 @@ impl Bus {
         if !self.shared.is_of_this_process() {
             return Link::default(); // a thread of the parent's may have held it
         }
-        self.shared.links.lock().unwrap_or_else(PoisonError::into_inner).of(unit)
+        self.shared.link(unit)
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`].
     pub fn fresh_word(&self) -> u16 {
-        self.shared.words.next()
+        self.shared.fresh_word()
     }
 
     /// Now, on the line's clock; its start in a forked child, where only the line of the parent knows.
@@ -163,7 +193,12 @@ impl Bus {
         if !self.shared.is_of_this_process() {
             return Stats::default(); // a thread of the parent's may have held it
         }
-        self.shared.stats.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.shared.stats()
+    }
+
+    /// How often the port was opened again after it was lost, or was another program's and changed hands.
+    pub fn reconnects(&self) -> u64 {
+        if self.shared.is_of_this_process() { self.shared.reconnects() } else { 0 }
     }
 
     /// What the user should know about the line, such as a setting that did not reach the wire.
@@ -201,6 +236,10 @@ impl Drop for Bus {
     fn drop(&mut self) {
         if self.shared.is_of_this_process() {
             self.shared.dismiss();
+            // Others hold the line too, while they use it.
+            if self.shared.sharing.is_some() {
+                self.shared.close();
+            }
         }
     }
 }

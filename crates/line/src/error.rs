@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request};
 
+use crate::error::kind::ErrorKind;
 use crate::line::PortError;
 
 /// A call that brought no answer, with all that is known of it.
@@ -171,6 +172,14 @@ pub enum Failure {
     /// An answer came and did not survive the line.
     #[error("{0}")]
     Corrupt(FrameError),
+    /// Another program has the port, and this is what it says of the failure.
+    #[error("{message}")]
+    Elsewhere {
+        /// Whose fault it is.
+        kind: ErrorKind,
+        /// Why, in its words.
+        message: String,
+    },
     /// The unit refused.
     #[error("refused function {function:02X}H with exception {:02X}H", code.0)]
     Refused {

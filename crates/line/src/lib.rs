@@ -41,6 +41,7 @@
 //! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
 //! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
 //! | `health` | what is counted, how well each unit is reached, and what the figures most likely mean |
+//! | `share` | one port, several programs: what they say to each other, and where they meet |
 //! | `owner` | who has the turn: what is known of the line and its units, and one exchange at a time |
 //! | `bus` | the bus as its callers see it: calls, errands, listening |
 //! | `poll` | what a bus asks again and again by itself |
@@ -57,6 +58,8 @@ mod options;
 mod owner;
 mod poll;
 mod ports;
+#[cfg(all(unix, feature = "share"))]
+mod share;
 mod system;
 mod turns;
 
@@ -68,9 +71,9 @@ pub use error::kind::ErrorKind;
 pub use error::{CallError, Failure};
 pub use health::hint::Hint;
 pub use health::link::Link;
-pub use health::stats::{Counters, Latency, Stats};
+pub use health::stats::{Counters, Latency, Program, Stats};
 pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};
-pub use options::{AdapterEcho, BusOptions, CallOptions, UnitOptions};
+pub use options::{AdapterEcho, BusOptions, CallOptions, Share, UnitOptions};
 pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
 pub use poll::samples::PollCounts;
@@ -79,6 +82,7 @@ pub use poll::target::{PollError, PollTarget};
 pub use ports::adapters::facts::PortFacts;
 #[cfg(feature = "serial")]
 pub use ports::adapters::identity::Places;
+pub use ports::key::PortKey;
 pub use ports::url;
 pub use ports::words::WordError;
 #[cfg(feature = "tcp")]

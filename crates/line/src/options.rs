@@ -30,6 +30,8 @@ pub struct BusOptions {
     /// How many requests may wait for the line; who comes then is told so at once
     /// ([`Failure::QueueFull`](crate::Failure::QueueFull)). A stop is always let in. 0 would let nobody wait.
     pub queue: usize,
+    /// Whether the port is shared with other programs of the same user.
+    pub share: Share,
 }
 
 impl BusOptions {
@@ -45,6 +47,7 @@ impl BusOptions {
             turnaround: TURNAROUND,
             learn_timeout: false,
             queue: DEFAULT_QUEUE,
+            share: Share::Auto,
         }
     }
 
@@ -95,6 +98,28 @@ impl BusOptions {
     pub const fn queue(self, queue: usize) -> Self {
         Self { queue, ..self }
     }
+
+    /// Sets [`share`](Self#structfield.share).
+    #[must_use]
+    pub const fn share(self, share: Share) -> Self {
+        Self { share, ..self }
+    }
+}
+
+/// Whether a port is shared with other programs of the same user on this computer.
+///
+/// The program that has the port does what the others want in its own queue. Serial ports and serial servers
+/// (`socket://`) can be shared, on systems with Unix sockets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Share {
+    /// Who opens the port first has it and serves the others; who comes next uses it through that one.
+    #[default]
+    Auto,
+    /// As `Auto`, but nobody is served where this program has the port.
+    Own,
+    /// A port that another program has is busy, and nobody is served.
+    Never,
 }
 
 /// What is known about the adapter sending our own bytes back.

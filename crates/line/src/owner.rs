@@ -81,20 +81,19 @@ impl std::fmt::Debug for Owner {
 }
 
 impl Owner {
-    pub(crate) fn open(
+    /// With no line yet.
+    pub(crate) fn new(
         opener: Opener,
         format: SerialFormat,
         echo: AdapterEcho,
         words: Arc<FreshWords>,
-        give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Self, Failure> {
-        let mut opener = LineOpener::new(opener);
-        let line = opener.open(give_up)?;
-        let mut owner = Self {
+        stats: Arc<Mutex<Stats>>,
+    ) -> Self {
+        Self {
             line: None,
             clock: None,
-            opener,
-            master: if line.gapless() { Master::with_silence(Duration::ZERO) } else { Master::new(&format) },
+            opener: LineOpener::new(opener),
+            master: Master::new(&format),
             given_echo: echo,
             echo,
             resync: Resync::default(),
@@ -102,23 +101,26 @@ impl Owner {
             links: Arc::default(),
             heard: [false; 256],
             delays: Delays::default(),
-            lumps: Lumps::of(line.as_ref()),
+            lumps: Lumps::of_no_line(),
             format,
             dead: DeadUnits::default(),
             words,
-            stats: Arc::default(),
-        };
-        owner.take_line(line);
-        Ok(owner)
+            stats,
+        }
+    }
+
+    /// Opens the line for the first time.
+    pub(crate) fn open(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
+        let line = self.opener.open(give_up)?;
+        if line.gapless() {
+            self.master = Master::with_silence(Duration::ZERO);
+        }
+        self.take_line(line);
+        Ok(())
     }
 
     pub(crate) fn close(&mut self) {
         self.line = None;
-    }
-
-    /// What is counted, to be read while somebody waits for the line.
-    pub(crate) fn shared_stats(&self) -> Arc<Mutex<Stats>> {
-        Arc::clone(&self.stats)
     }
 
     /// How well each unit could be reached lately, to be read while somebody waits for the line.
@@ -164,6 +166,11 @@ impl Owner {
     }
 
     /// Makes ready for a request: opens the line again if it was lost, unless `give_up` says so first.
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     pub(crate) fn prepare(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
         if self.line.is_none() {
             let line = self.opener.open(give_up)?;

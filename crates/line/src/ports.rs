@@ -2,6 +2,7 @@
 
 #[cfg(feature = "serial")]
 pub(crate) mod adapters;
+pub(crate) mod key;
 #[cfg(feature = "tcp")]
 pub mod mbap;
 #[cfg(feature = "serial")]

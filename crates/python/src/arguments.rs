@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_line::{AdapterEcho, BusOptions, CallOptions, Failure, Opener};
+use drivebus_line::{AdapterEcho, BusOptions, CallOptions, Failure, Opener, PortKey, Share};
 use drivebus_rtu::Request;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -26,13 +26,15 @@ pub(crate) fn to_open(
     learn_timeout: bool,
     low_latency: bool,
     queue: usize,
-) -> PyResult<(Opener, BusOptions)> {
+    share: &str,
+) -> PyResult<(Opener, Option<PortKey>, BusOptions)> {
     let echo: AdapterEcho = echo.parse().map_err(refuse)?;
-    let (opener, format) = open::opener(port, format.0, rs485, low_latency)?;
+    let share: Share = share.parse().map_err(refuse)?;
+    let (opener, key, format) = open::opener(port, format.0, rs485, low_latency)?;
     let timeout = duration("timeout", timeout)?;
     let turnaround = duration("turnaround", turnaround)?;
     let options = BusOptions::new(format).timeout(timeout).retries(retries).read_only(read_only).echo(echo);
-    Ok((opener, options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue)))
+    Ok((opener, key, options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue).share(share)))
 }
 
 /// Why a bus could not be opened.

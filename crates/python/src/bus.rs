@@ -32,7 +32,7 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536))]
+        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
         py: Python<'_>,
@@ -47,8 +47,9 @@ impl Bus {
         learn_timeout: bool,
         low_latency: bool,
         queue: usize,
+        share: &str,
     ) -> PyResult<Self> {
-        let (opener, options) = to_open(
+        let (opener, key, options) = to_open(
             port,
             format,
             timeout,
@@ -60,8 +61,10 @@ impl Bus {
             learn_timeout,
             low_latency,
             queue,
+            share,
         )?;
-        let core = with_signals(py, |give_up| CoreBus::open(opener, options, give_up))?.map_err(open_failed)?;
+        let core =
+            with_signals(py, |give_up| CoreBus::open_shared(opener, key, options, give_up))?.map_err(open_failed)?;
         Ok(Self::around(core))
     }
 
@@ -211,7 +214,7 @@ impl Bus {
 
     #[getter]
     fn reconnects(&self, py: Python<'_>) -> u64 {
-        py.detach(|| self.core.stats().reconnects)
+        py.detach(|| self.core.reconnects())
     }
 
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -221,6 +224,16 @@ impl Bus {
         all.set_item("notes", notes)?;
         all.set_item("hints", stats.hints().iter().map(ToString::to_string).collect::<Vec<_>>())?;
         all.set_item("hint_names", stats.hints().iter().map(Hint::name).collect::<Vec<_>>())?;
+        let programs = stats.programs.iter().map(|program| {
+            let one = PyDict::new(py);
+            one.set_item("name", &program.name)?;
+            one.set_item("process", program.process)?;
+            one.set_item("here", program.here)?;
+            one.set_item("calls", program.calls)?;
+            one.set_item("answered", program.answered)?;
+            Ok(one)
+        });
+        all.set_item("programs", programs.collect::<PyResult<Vec<_>>>()?)?;
         let units = PyDict::new(py);
         for (unit, figures) in &stats.units {
             units.set_item(unit.get(), counters(py, figures)?)?;

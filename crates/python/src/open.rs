@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use drivebus_line::rs485::{MAX_DELAY_MS, Rs485};
 use drivebus_line::tty::TtyOptions;
 use drivebus_line::url::{self, Known, PortOptions, PortUrl, SimulatorUrl};
-use drivebus_line::{AdapterEcho, Line, Opener, Places, WordError};
+use drivebus_line::{AdapterEcho, Line, Opener, Places, PortKey, WordError};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
@@ -16,23 +16,24 @@ use crate::errors::{not_allowed, port_error, refuse};
 use crate::pyserial::PySerialLine;
 use crate::sim::Simulator;
 
-/// What opens `port`, and the format its characters have.
+/// What opens `port`, what tells it from others if programs can share it, and the format its characters have.
 pub(crate) fn opener(
     port: &Bound<'_, PyAny>,
     format: SerialFormat,
     rs485: Option<&Bound<'_, PyDict>>,
     low_latency: bool,
-) -> PyResult<(Opener, SerialFormat)> {
+) -> PyResult<(Opener, Option<PortKey>, SerialFormat)> {
     let rs485 = rs485.map(rs485_options).transpose()?;
     if let Ok(text) = port.cast::<PyString>() {
         let options = TtyOptions::default().rs485(rs485).low_latency(low_latency);
-        return Ok((named(text.to_str()?, format, options)?, format));
+        let (opener, key) = named(text.to_str()?, format, options)?;
+        return Ok((opener, key, format));
     }
     url::check_together(None, rs485.is_some(), AdapterEcho::Auto).map_err(refuse)?;
     if let Ok(simulator) = port.cast::<Simulator>() {
         let simulator = simulator.clone().unbind();
         let opener = move || simulator.get().sim_line();
-        return Ok((Box::new(opener), format));
+        return Ok((Box::new(opener), None, format));
     }
     let line = PySerialLine::new(port, &format, false).map_err(|error| port_error(&error))?;
     let (format, name) = (line.format(), line.name());
@@ -41,16 +42,17 @@ pub(crate) fn opener(
         Some(line) => Ok(Box::new(line) as Box<dyn Line>),
         None => Err(gone(&name)),
     };
-    Ok((Box::new(opener), format))
+    Ok((Box::new(opener), None, format))
 }
 
 /// What the core opens by its name.
-fn named(port: &str, format: SerialFormat, tty: TtyOptions) -> PyResult<Opener> {
+fn named(port: &str, format: SerialFormat, tty: TtyOptions) -> PyResult<(Opener, Option<PortKey>)> {
     url::check_together(Some(port), tty.rs485.is_some(), AdapterEcho::Auto).map_err(refuse)?;
     let parsed = PortUrl::parse(port, &Known::default()).map_err(refuse)?;
-    parsed
-        .opener(&PortOptions::new(format).tty(tty))
-        .ok_or_else(|| not_allowed(format!("port {port:?} is not opened by its name here")))
+    let key = parsed.key();
+    let opener = parsed.opener(&PortOptions::new(format).tty(tty));
+    let opener = opener.ok_or_else(|| not_allowed(format!("port {port:?} is not opened by its name here")))?;
+    Ok((opener, key))
 }
 
 /// What `port` is, before anything is opened: its scheme, which a path has not, and for `sim://` the arguments of a

@@ -66,7 +66,7 @@ impl Asked {
 /// Opens a bus in a thread of its own; it comes as a letter.
 #[pyfunction]
 #[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536))]
+    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto"))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
 pub(crate) fn open_bus(
     mailbox: &Mailbox,
@@ -81,11 +81,24 @@ pub(crate) fn open_bus(
     learn_timeout: bool,
     low_latency: bool,
     queue: usize,
+    share: &str,
 ) -> PyResult<Asked> {
-    let (opener, options) =
-        to_open(port, format, timeout, retries, read_only, rs485, echo, turnaround, learn_timeout, low_latency, queue)?;
+    let (opener, key, options) = to_open(
+        port,
+        format,
+        timeout,
+        retries,
+        read_only,
+        rs485,
+        echo,
+        turnaround,
+        learn_timeout,
+        low_latency,
+        queue,
+        share,
+    )?;
     apart(&mailbox.inbox, move |wanted| {
-        let core = CoreBus::open(opener, options, &mut || !wanted.load(Ordering::Acquire));
+        let core = CoreBus::open_shared(opener, key, options, &mut || !wanted.load(Ordering::Acquire));
         move |py: Python<'_>| match core {
             Ok(core) => Ok(Bound::new(py, Bus::around(core))?.into_any()),
             Err(failure) => Err(open_failed(failure)),

@@ -242,8 +242,8 @@ class Examination:
             yield from unit.findings()
 
     def _opened(self, settings: Settings) -> Bus:
-        """The line at *settings*, for reading only."""
-        return self.open(self.port, **vars(settings), rs485=self.rs485, read_only=True)
+        """The line at *settings*, for reading only, and to itself: its figures tell of nobody else's requests."""
+        return self.open(self.port, **vars(settings), rs485=self.rs485, read_only=True, share="never")
 
     def _has_settings(self) -> bool:
         """Whether another baud rate can be tried on the port: not behind a server, nor on what is open already."""

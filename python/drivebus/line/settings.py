@@ -44,6 +44,7 @@ class Opening:
         learn_timeout: bool,
         low_latency: bool,
         queue: int,
+        share: str,
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
@@ -58,6 +59,7 @@ class Opening:
             "learn_timeout": checks.flag("learn_timeout", learn_timeout),
             "low_latency": checks.flag("low_latency", low_latency),
             "queue": checks.whole("queue", queue, 1, 1_000_000),
+            "share": checks.one_of("share", share, ("auto", "own", "never")),
         }
         _check_together(port, self.keywords)
         target = ports.resolve(port, line)
@@ -126,6 +128,7 @@ class BusFace:
         learn_timeout: bool = False,
         low_latency: bool = True,
         queue: int = 65_536,
+        share: str = "auto",
     ) -> None:
         opening = Opening(
             port,
@@ -139,6 +142,7 @@ class BusFace:
             learn_timeout=learn_timeout,
             low_latency=low_latency,
             queue=queue,
+            share=share,
         )
         self.simulator = opening.simulator
         self.format = opening.format

@@ -24,7 +24,7 @@ use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::owner::dead_units::Verdict;
-use crate::turns::order::Priority;
+use crate::turns::order::{Claim, Priority, Program};
 use crate::turns::queue::{NoTurn, Turn};
 
 /// A call under way.
@@ -33,15 +33,33 @@ pub(crate) struct Call<'b, 'r> {
     pub(crate) ask: Ask<'r>,
     pub(crate) unit: Option<UnitAddress>,
     pub(crate) priority: Priority,
+    program: Program,
     retries: u32,
     pub(crate) verify: bool,
     pub(crate) read_back: Option<u16>,
     pub(crate) connection: Option<u64>,
     /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
-    wanted: Option<&'r AtomicBool>,
+    wanted: Option<&'r dyn Wanted>,
+}
+
+/// What tells whether somebody still waits for a call.
+pub(crate) trait Wanted {
+    /// Whether somebody does.
+    fn is_wanted(&self) -> bool;
+}
+
+impl Wanted for AtomicBool {
+    fn is_wanted(&self) -> bool {
+        self.load(Ordering::Acquire)
+    }
 }
 
 impl<'b, 'r> Call<'b, 'r> {
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     pub(crate) fn new(bus: &'b Shared, ask: Ask<'r>, options: CallOptions) -> Self {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         Self {
@@ -51,6 +69,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 Destination::Broadcast => None,
             },
             priority: options.priority.unwrap_or(kind),
+            program: Program::default(),
             retries: options.retries.unwrap_or(bus.options.retries),
             verify: options.verify,
             read_back: options.read_back.filter(|_| ask.request.is_write()),
@@ -60,17 +79,29 @@ impl<'b, 'r> Call<'b, 'r> {
         }
     }
 
+    /// It is another program's, which uses the line through this one.
+    #[cfg(all(unix, feature = "share"))]
+    pub(crate) fn of_program(mut self, program: Program) -> Self {
+        self.program = program;
+        self
+    }
+
     /// Ends as soon as `wanted` is false and nothing of it is on the wire.
-    pub(crate) fn while_wanted(mut self, wanted: &'r AtomicBool) -> Self {
+    pub(crate) fn while_wanted(mut self, wanted: &'r dyn Wanted) -> Self {
         self.wanted = Some(wanted);
         self
     }
 
     pub(crate) fn is_wanted(&self) -> bool {
-        self.wanted.is_none_or(|wanted| wanted.load(Ordering::Acquire))
+        self.wanted.is_none_or(Wanted::is_wanted)
     }
 
     /// Asks until it is answered, refused or given up.
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     pub(crate) fn run(
         &mut self,
         give_up: &mut dyn FnMut() -> bool,
@@ -118,8 +149,12 @@ impl<'b, 'r> Call<'b, 'r> {
         })
     }
 
+    fn claim(&self) -> Claim {
+        Claim { priority: self.priority, unit: self.unit, program: self.program }
+    }
+
     fn turn(&self, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'b, Errand>, Box<CallError>> {
-        self.bus.queue.turn(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))
+        self.bus.queue.turn(self.claim(), give_up).map_err(|why| self.no_turn(why))
     }
 
     fn no_turn(&self, why: NoTurn) -> Box<CallError> {
@@ -186,7 +221,7 @@ impl<'b, 'r> Call<'b, 'r> {
         if ended || self.bus.is_shut() {
             return Err(self.failed(self.bus.given_up()));
         }
-        *turn = self.bus.queue.turn_again(self.priority, self.unit, give_up).map_err(|why| self.no_turn(why))?;
+        *turn = self.bus.queue.turn_again(self.claim(), give_up).map_err(|why| self.no_turn(why))?;
         Ok(())
     }
 

@@ -29,6 +29,11 @@ impl Clock {
         Self::Real { line: line.now(), system: monotonic() }
     }
 
+    /// The system's own.
+    pub(super) fn real() -> Self {
+        Self::Real { line: Instant::ZERO, system: Instant::ZERO }
+    }
+
     /// Now on the line's clock; `None` where only the line knows.
     pub(super) fn now(&self) -> Option<Instant> {
         match self {

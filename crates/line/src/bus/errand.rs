@@ -68,6 +68,12 @@ impl Errand {
         .ok()
     }
 
+    /// Whether somebody still waits for it.
+    #[cfg(all(unix, feature = "share"))]
+    pub(super) fn is_wanted(&self) -> bool {
+        self.wanted.load(std::sync::atomic::Ordering::Acquire)
+    }
+
     /// It is not carried out, for `failure`; `ended` is when that was known.
     pub(super) fn fail(mut self, failure: Failure, ended: Option<Instant>) {
         self.failed(failure, ended);

@@ -5,6 +5,7 @@ use std::time::Duration;
 use drivebus_rtu::Instant;
 
 use crate::bus::Bus;
+use crate::bus::shared::Shared;
 use crate::error::Failure;
 use crate::owner::Owner;
 use crate::system::clock::LOOK_UP;
@@ -29,15 +30,17 @@ impl Bus {
         if self.is_closed() {
             return Err(Failure::Closed);
         }
-        let result = self.listen_in_turns(time, give_up, hear);
+        let result = self.shared.listen(time, give_up, hear);
         // Closed from inside `give_up`, where it could not wait for itself.
         if self.is_shut() {
             self.close();
         }
         result
     }
+}
 
-    fn listen_in_turns(
+impl Shared {
+    pub(super) fn listen_here(
         &self,
         time: Duration,
         give_up: &mut dyn FnMut() -> bool,
@@ -45,18 +48,17 @@ impl Bus {
     ) -> Result<(), Failure> {
         let end = self.now() + time;
         loop {
-            let _turn =
-                self.shared.queue.turn(Priority::Poll, None, give_up).map_err(|why| self.shared.no_turn(why))?;
-            let mut owner = self.shared.lock();
+            let _turn = self.queue.turn((Priority::Poll, None), give_up).map_err(|why| self.no_turn(why))?;
+            let mut owner = self.lock();
             owner.prepare(give_up)?;
-            let now = self.shared.now_of(&owner);
+            let now = self.now_of(&owner);
             if now >= end {
                 return Ok(());
             }
             owner.hear(end.min(now + LOOK_UP), hear)?;
             drop(owner);
             if self.is_shut() || give_up() {
-                return Err(self.shared.given_up());
+                return Err(self.given_up());
             }
         }
     }

@@ -5,23 +5,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{BeginError, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Answer, BeginError, Destination, Instant, Request, UnitAddress};
 
-use crate::ask::Ask;
+use crate::ask::{Ask, Done};
+use crate::bus::call::Call;
 use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
-use crate::error::Failure;
-use crate::health::link::Links;
+use crate::bus::sharing::Sharing;
+use crate::error::{CallError, Failure};
+use crate::health::link::{Link, Links};
 use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
 use crate::owner::Owner;
 use crate::owner::resync::FreshWords;
+use crate::ports::key::PortKey;
 use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
 use crate::system::process::Process;
 use crate::system::punctual;
 use crate::turns::order::Priority;
-use crate::turns::queue::{NoTurn, Queue, Stops};
+use crate::turns::queue::{NoTurn, Queue, Stops, Turn};
 
 /// One line, and all that its callers share.
 #[derive(Debug)]
@@ -43,24 +46,32 @@ pub(crate) struct Shared {
     closed: AtomicBool,
     opened_by: Process,
     clock: Clock,
+    /// Where the port is of a kind that programs share, and this one does.
+    pub(super) sharing: Option<Arc<Sharing>>,
 }
 
 impl Shared {
-    /// With the line that `opener` opens.
+    /// With the line that `opener` opens, or through the program that has the port which `key` tells apart.
     pub(super) fn open(
         opener: Opener,
+        key: Option<PortKey>,
         options: BusOptions,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Self, Failure> {
-        let words = Arc::new(FreshWords::new());
-        let mut owner = Owner::open(opener, options.format, options.echo, Arc::clone(&words), give_up)?;
-        let (name, clock) =
-            owner.line().map_or_else(|| (String::new(), Clock::Virtual(None)), |line| (line.name(), Clock::of(line)));
+    ) -> Result<Arc<Self>, Failure> {
+        let (words, stats) = (Arc::new(FreshWords::new()), Arc::default());
+        let given = key.as_ref().map(ToString::to_string).unwrap_or_default();
+        let (sharing, opener) = Sharing::around(key, &options, &stats, opener);
+        let mut owner = Owner::new(opener, options.format, options.echo, Arc::clone(&words), Arc::clone(&stats));
+        match owner.open(give_up) {
+            Err(failure) if !sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) => return Err(failure),
+            _ => {}
+        }
+        let (name, clock) = owner.line().map_or_else(|| (given, Clock::real()), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         let gapless = owner.line().is_some_and(|line| line.gapless());
-        Ok(Self {
+        let shared = Arc::new(Self {
             queue: Arc::new(Queue::with_room(options.queue)),
-            stats: owner.shared_stats(),
+            stats,
             links: owner.shared_links(),
             words,
             notes: Mutex::new(notes),
@@ -73,7 +84,12 @@ impl Shared {
             closed: AtomicBool::new(false),
             opened_by: Process::current(),
             clock,
-        })
+            sharing,
+        });
+        if let Some(sharing) = &shared.sharing {
+            sharing.serves(&shared);
+        }
+        Ok(shared)
     }
 
     /// Whether the bus was closed, or was opened by another process: by the parent of this forked child.
@@ -107,8 +123,37 @@ impl Shared {
         if self.queue.has_this_thread() {
             return;
         }
-        let _turn = self.queue.turn(Priority::Stop, None, &mut || false);
+        let turn = self.queue.turn((Priority::Stop, None), &mut || false);
         self.lock().close();
+        drop(turn);
+        if let Some(sharing) = &self.sharing {
+            sharing.end();
+        }
+    }
+
+    /// `None` where there is nothing to carry out.
+    pub(super) fn carry_out_here(
+        &self,
+        errand: &Errand,
+        turn: Turn<'_, Errand>,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Option<Result<Done, Box<CallError>>> {
+        let request = errand.request()?;
+        let ask = self.ask(errand.destination, &request, &errand.options);
+        let mut call = Call::new(self, ask, errand.options).while_wanted(&*errand.wanted);
+        Some(call.run_in(turn, &mut || self.is_shut(), take))
+    }
+
+    pub(super) fn stats_here(&self) -> Stats {
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub(super) fn link_here(&self, unit: UnitAddress) -> Link {
+        self.links.lock().unwrap_or_else(PoisonError::into_inner).of(unit)
+    }
+
+    pub(super) fn reconnects_here(&self) -> u64 {
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects
     }
 
     /// Ends the crew; what waits ends with [`Failure::Closed`].
@@ -119,6 +164,11 @@ impl Shared {
     }
 
     /// What one call asks, with the times that hold for it.
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     pub(crate) fn ask<'a>(
         &'a self,
         destination: Destination,
@@ -132,6 +182,11 @@ impl Shared {
         self.ask_as(set, destination, request, options)
     }
 
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     pub(super) fn ask_as<'a>(
         &'a self,
         set: UnitOptions,
@@ -207,7 +262,8 @@ impl Shared {
             *notes = line.notes();
         }
         let late = (!self.is_virtual()).then(punctual::note).flatten();
-        notes.iter().cloned().chain(late).chain(self.priority_refused.get().cloned()).collect()
+        let shared = self.sharing.as_ref().and_then(|sharing| sharing.note());
+        notes.iter().cloned().chain(shared).chain(late).chain(self.priority_refused.get().cloned()).collect()
     }
 
     /// A thread that works for this line alone comes: it goes before others where it may.

@@ -7,7 +7,6 @@ use std::thread;
 use drivebus_rtu::{Adu, Answer, Destination, Frame};
 
 use crate::bus::Bus;
-use crate::bus::call::Call;
 use crate::bus::errand::{Errand, Reply};
 use crate::bus::shared::Shared;
 use crate::error::Failure;
@@ -65,7 +64,7 @@ impl Bus {
             Destination::Broadcast => None,
         };
         let wanted = Arc::clone(&errand.wanted);
-        match self.shared.queue.leave_work(priority, unit, errand, || Box::new(Worked(Arc::downgrade(self)))) {
+        match self.shared.queue.leave_work((priority, unit).into(), errand, || Box::new(Worked(Arc::downgrade(self)))) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),
             Err((errand, why)) => {
                 let failure = if why == NoTurn::Full { self.shared.no_turn(why) } else { Failure::Closed };
@@ -78,13 +77,10 @@ impl Bus {
 
 /// Asks, in the turn of `errand`, and tells what came of it.
 fn carry_out(mut errand: Errand, bus: &Shared, turn: Turn<'_, Errand>) {
-    let Some(request) = errand.request() else { return };
     let mut pdu = Vec::new();
-    let ask = bus.ask(errand.destination, &request, &errand.options);
-    let result = Call::new(bus, ask, errand.options)
-        .while_wanted(&errand.wanted)
-        .run_in(turn, &mut || bus.is_shut(), &mut |answer| pdu = pdu_of(errand.destination, &answer))
-        .map(|done| Reply { pdu, done });
+    let result = bus.carry_out(&errand, turn, &mut |answer| pdu = pdu_of(errand.destination, &answer));
+    let Some(result) = result else { return };
+    let result = result.map(|done| Reply { pdu, done });
     if bus.is_shut() {
         bus.close();
     }
@@ -92,7 +88,7 @@ fn carry_out(mut errand: Errand, bus: &Shared, turn: Turn<'_, Errand>) {
 }
 
 /// The answer as it came.
-fn pdu_of(from: Destination, answer: &Answer<'_>) -> Vec<u8> {
+pub(super) fn pdu_of(from: Destination, answer: &Answer<'_>) -> Vec<u8> {
     match from {
         Destination::Unit(unit) => {
             let frame = Adu::answer(unit, answer);

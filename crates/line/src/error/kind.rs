@@ -39,6 +39,7 @@ impl Failure {
             Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,
             Self::Corrupt(FrameError::Crc { .. }) => ErrorKind::Crc,
             Self::Refused { .. } => ErrorKind::Refused,
+            Self::Elsewhere { kind, .. } => *kind,
             // A line that is never silent is full of bytes that are no answer.
             _ => ErrorKind::BadAnswer,
         }

@@ -15,10 +15,31 @@ pub struct Stats {
     pub units: BTreeMap<UnitAddress, Counters>,
     /// How often the port was opened again after it was lost.
     pub reconnects: u64,
+    /// The programs that use the port through the one that has it, since that opened it.
+    pub programs: Vec<Program>,
+}
+
+/// What one program asked of a port that it shares with others. What is not counted here, the program that has the port
+/// asked itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "share", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Program {
+    /// As it calls itself, such as `drivebus`.
+    pub name: String,
+    /// Its number in the system.
+    pub process: u32,
+    /// Whether it still uses the port.
+    pub here: bool,
+    /// Calls that it wanted; a call may take several requests, or none.
+    pub calls: u64,
+    /// Those of them that brought an answer.
+    pub answered: u64,
 }
 
 /// Counts of exchanges, and how long the answers took.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "share", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
     /// Requests that went out, probes included.
@@ -61,6 +82,7 @@ pub struct Counters {
 
 /// Shortest, longest and mean of a time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "share", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Latency {
     /// The shortest; zero while nothing was measured.

@@ -104,6 +104,15 @@ impl Lumps {
             (false, None, Duration::ZERO) => Some(LEAST_BEHIND_UNKNOWN),
             (false, _, latency) => Some(LEAST + latency),
         };
+        Self::with_least(least)
+    }
+
+    /// Nothing is known, not even which line.
+    pub(crate) fn of_no_line() -> Self {
+        Self::with_least(Some(LEAST_BEHIND_UNKNOWN))
+    }
+
+    fn with_least(least: Option<Duration>) -> Self {
         let pause = UNKNOWN.max(least.unwrap_or_default());
         Self { least, pause, whole: 0, current: Period::default(), before: None, broke_off: None }
     }

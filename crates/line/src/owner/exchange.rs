@@ -288,7 +288,7 @@ mod tests {
     fn queue_with(priority: Priority) -> Queue {
         let queue = Queue::default();
         let mut state = queue.lock();
-        let ticket = state.order.ticket(priority, None);
+        let ticket = state.order.ticket((priority, None).into());
         state.order.wait(ticket, Waiter::Thread(thread::current()));
         drop(state);
         queue

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use drivebus_rtu::Request;
 
-use crate::options::{AdapterEcho, CallOptions};
+use crate::options::{AdapterEcho, CallOptions, Share};
 #[cfg(feature = "serial")]
 use crate::ports::rs485::{MAX_DELAY_MS, RTS_MARGIN_MS, Rs485, Switch};
 use crate::turns::order::Priority;
@@ -28,6 +28,12 @@ pub enum WordError {
         which: &'static str,
         /// What was given, in milliseconds.
         delay: u32,
+    },
+    /// A port is not shared so.
+    #[error("share {word:?} is not \"auto\", \"own\" or \"never\"")]
+    Share {
+        /// The word as given.
+        word: String,
     },
     /// An adapter does not echo so.
     #[error("echo {word:?} is not \"auto\", \"yes\" or \"no\"")]
@@ -82,6 +88,20 @@ impl FromStr for Rs485 {
     /// A mode of [`Switch`] by its word, with the delays that it needs.
     fn from_str(word: &str) -> Result<Self, WordError> {
         word.parse().map(Self::by)
+    }
+}
+
+impl FromStr for Share {
+    type Err = WordError;
+
+    /// `auto`, `own` or `never`.
+    fn from_str(word: &str) -> Result<Self, WordError> {
+        match word {
+            "auto" => Ok(Self::Auto),
+            "own" => Ok(Self::Own),
+            "never" => Ok(Self::Never),
+            _ => Err(WordError::Share { word: word.to_owned() }),
+        }
     }
 }
 

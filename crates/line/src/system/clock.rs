@@ -45,7 +45,7 @@ pub fn sleep_until(until: Instant) {
 /// Waits until `descriptor` is ready for one of `events` or has failed, and returns what it is ready for.
 ///
 /// `None` means that `until` was reached. A descriptor that is ready already is found so whatever `until` says.
-#[cfg(all(unix, any(feature = "serial", feature = "tcp")))]
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
 pub(crate) fn wait_for(
     descriptor: std::os::fd::BorrowedFd<'_>,
     events: rustix::event::PollFlags,

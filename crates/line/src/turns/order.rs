@@ -16,8 +16,8 @@ const CLASSES: usize = 4;
 
 /// Who goes first among those who wait for the line.
 ///
-/// Stops go in the order they came. Within each other class the units take turns, and the calls for one unit go in the
-/// order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
+/// Stops go in the order they came. Within each other class the programs that share the line take turns, of each its units
+/// do, and the calls for one unit go in the order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
 /// of several such the one that came first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[non_exhaustive]
@@ -33,16 +33,36 @@ pub enum Priority {
     Poll,
 }
 
+/// Which program a request is of: this one, or one of those that use the line through it. A number of the caller's
+/// choosing, as low as can be: something is kept for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Program(pub(crate) u16);
+
+/// What a turn is wanted for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Claim {
+    pub(crate) priority: Priority,
+    /// `None` for a broadcast and for what concerns the whole line.
+    pub(crate) unit: Option<UnitAddress>,
+    pub(crate) program: Program,
+}
+
+impl From<(Priority, Option<UnitAddress>)> for Claim {
+    /// Of this program.
+    fn from((priority, unit): (Priority, Option<UnitAddress>)) -> Self {
+        Self { priority, unit, program: Program::default() }
+    }
+}
+
 /// A place in the order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Ticket {
     /// Lower came earlier.
     number: u64,
-    priority: Priority,
-    unit: Option<UnitAddress>,
+    claim: Claim,
 }
 
-/// Those who wait, and when each unit had its last turn. `T` is what the caller keeps about each.
+/// Those who wait, and when each program and each unit had its last turn. `T` is what the caller keeps about each.
 #[derive(Debug)]
 pub(crate) struct Order<T> {
     arrivals: u64,
@@ -50,6 +70,8 @@ pub(crate) struct Order<T> {
     waiting: Vec<Waiting<T>>,
     /// The number of the last turn, for each unit of each class: a stop or a write takes nothing from the unit's reads.
     last_turn: Vec<u64>,
+    /// The same for each program of each class.
+    last_turn_of: Vec<[u64; CLASSES]>,
 }
 
 #[derive(Debug)]
@@ -64,26 +86,31 @@ struct Waiting<T> {
 
 impl Ticket {
     pub(crate) fn is_stop(&self) -> bool {
-        self.priority == Priority::Stop
+        self.claim.priority == Priority::Stop
     }
 
     /// Where the last turn of its unit in its class is kept.
     fn place(&self) -> usize {
-        self.priority as usize * UNITS + self.unit.map_or(0, |unit| usize::from(unit.get()))
+        self.claim.priority as usize * UNITS + self.claim.unit.map_or(0, |unit| usize::from(unit.get()))
     }
 }
 
 impl<T> Default for Order<T> {
     fn default() -> Self {
-        Self { arrivals: 0, turns: 0, waiting: Vec::new(), last_turn: vec![0; CLASSES * UNITS] }
+        let last_turn = vec![0; CLASSES * UNITS];
+        Self { arrivals: 0, turns: 0, waiting: Vec::new(), last_turn, last_turn_of: vec![[0; CLASSES]] }
     }
 }
 
 impl<T> Order<T> {
     /// A ticket for somebody who comes now.
-    pub(crate) fn ticket(&mut self, priority: Priority, unit: Option<UnitAddress>) -> Ticket {
+    pub(crate) fn ticket(&mut self, claim: Claim) -> Ticket {
         self.arrivals += 1;
-        Ticket { number: self.arrivals, priority, unit }
+        let programs = usize::from(claim.program.0) + 1;
+        if self.last_turn_of.len() < programs {
+            self.last_turn_of.resize(programs, [0; CLASSES]);
+        }
+        Ticket { number: self.arrivals, claim }
     }
 
     /// `ticket` waits.
@@ -153,14 +180,22 @@ impl<T> Order<T> {
         self.count(ticket, false);
     }
 
+    #[expect(
+        clippy::inline_always,
+        reason = "it has several callers, and the lone one on the hot path pays for no call"
+    )]
+    #[inline(always)]
     fn count(&mut self, ticket: Ticket, late: bool) {
         self.turns += 1;
         self.last_turn[ticket.place()] = self.turns;
+        self.last_turn_of[usize::from(ticket.claim.program.0)][ticket.claim.priority as usize] = self.turns;
         for other in &mut self.waiting {
             match other.ticket.number.cmp(&ticket.number) {
                 // One turn for all who came later, else a crowd of them would hold up the higher classes at one go.
                 Ordering::Greater if late => other.overtaken = 0,
-                Ordering::Less if ticket.priority < other.ticket.priority && !ticket.is_stop() => other.overtaken += 1,
+                Ordering::Less if ticket.claim.priority < other.ticket.claim.priority && !ticket.is_stop() => {
+                    other.overtaken += 1;
+                }
                 _ => {}
             }
         }
@@ -171,18 +206,20 @@ impl<T> Order<T> {
     }
 
     /// The lowest is next: stops, who let them pass, who was overtaken too often, and then class by class. Within a class
-    /// by the last turn of the unit, so that a unit with many tickets takes no more turns than one with few.
-    fn rank(&self, waiting: &Waiting<T>) -> (u8, u64, u64) {
-        let number = waiting.ticket.number;
-        let class = match waiting.ticket.priority {
-            Priority::Stop => return (0, 0, number),
-            _ if waiting.aside => return (1, 0, number),
-            _ if waiting.is_late() => return (2, 0, number),
+    /// by the last turn of the program and then of the unit, so that one with many tickets takes no more turns than one with
+    /// few.
+    fn rank(&self, waiting: &Waiting<T>) -> (u8, u64, u64, u64) {
+        let Ticket { number, claim } = waiting.ticket;
+        let class = match claim.priority {
+            Priority::Stop => return (0, 0, 0, number),
+            _ if waiting.aside => return (1, 0, 0, number),
+            _ if waiting.is_late() => return (2, 0, 0, number),
             Priority::Write => 3,
             Priority::Read => 4,
             Priority::Poll => 5,
         };
-        (class, self.last_turn[waiting.ticket.place()], number)
+        let of_program = self.last_turn_of[usize::from(claim.program.0)][claim.priority as usize];
+        (class, of_program, self.last_turn[waiting.ticket.place()], number)
     }
 }
 

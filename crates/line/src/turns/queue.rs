@@ -7,11 +7,9 @@ use std::fmt;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
 
-use drivebus_rtu::UnitAddress;
-
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::turns::crew::Crew;
-use crate::turns::order::{Order, Priority, Ticket};
+use crate::turns::order::{Claim, Order, Priority, Ticket};
 
 /// More than any program means to have under way, and some tens of megabytes.
 pub(crate) const DEFAULT_QUEUE: usize = 65_536;
@@ -92,49 +90,39 @@ impl<W> Queue<W> {
         Self { room, state: Mutex::default(), called: Condvar::new() }
     }
 
-    /// Waits for a turn to ask `unit`.
-    ///
-    /// `unit` is `None` for a broadcast and for what concerns the whole line.
+    /// Waits for a turn.
     ///
     /// # Errors
     ///
     /// [`NoTurn`]: `give_up` said so before it came, this thread would wait for itself, or too many wait.
     pub(crate) fn turn(
         &self,
-        priority: Priority,
-        unit: Option<UnitAddress>,
+        claim: impl Into<Claim>,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<Turn<'_, W>, NoTurn> {
-        self.enter(priority, unit, self.room, give_up)
+        self.enter(claim.into(), self.room, give_up)
     }
 
     /// As [`turn`](Self::turn), for who had one and gave way: there is always room.
     pub(crate) fn turn_again(
         &self,
-        priority: Priority,
-        unit: Option<UnitAddress>,
+        claim: impl Into<Claim>,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<Turn<'_, W>, NoTurn> {
-        self.enter(priority, unit, usize::MAX, give_up)
+        self.enter(claim.into(), usize::MAX, give_up)
     }
 
-    fn enter(
-        &self,
-        priority: Priority,
-        unit: Option<UnitAddress>,
-        room: usize,
-        give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<Turn<'_, W>, NoTurn> {
+    fn enter(&self, claim: Claim, room: usize, give_up: &mut dyn FnMut() -> bool) -> Result<Turn<'_, W>, NoTurn> {
         let thread = thread::current();
         let mut state = self.lock();
         let is_free = state.owner.is_none() && state.order.is_empty();
         if !is_free && state.has(thread.id()) {
             return Err(NoTurn::OwnThread);
         }
-        if !is_free && state.is_full_for(priority, room) {
+        if !is_free && state.is_full_for(claim.priority, room) {
             return Err(NoTurn::Full);
         }
-        let ticket = state.order.ticket(priority, unit);
+        let ticket = state.order.ticket(claim);
         if is_free {
             state.order.begin(ticket);
             state.owner = Some((ticket, thread));

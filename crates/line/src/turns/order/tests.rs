@@ -12,7 +12,7 @@ fn unit(raw: u8) -> Option<UnitAddress> {
 
 /// Comes and waits; what is kept about it is its name.
 fn come(order: &mut Order<u32>, priority: Priority, raw: u8, name: u32) -> Ticket {
-    let ticket = order.ticket(priority, unit(raw));
+    let ticket = order.ticket((priority, unit(raw)).into());
     order.wait(ticket, name);
     ticket
 }
@@ -246,4 +246,32 @@ proptest! {
         prop_assert!(served);
         prop_assert!(overtaken <= 32 * (before.len() + 1), "overtaken {} times", overtaken);
     }
+}
+
+#[test]
+fn programs_take_turns_however_many_units_one_of_them_asks() {
+    let mut order = Order::default();
+    let mut come = |program: u16, raw: u8, name: u32| {
+        let claim = Claim { priority: Read, unit: unit(raw), program: Program(program) };
+        let ticket = order.ticket(claim);
+        order.wait(ticket, name);
+    };
+    for raw in 1..=4 {
+        come(0, raw, raw.into());
+    }
+    for name in [11, 12, 13] {
+        come(1, 1, name);
+    }
+    come(2, 9, 21);
+    assert_eq!(serve_all(&mut order), [1, 21, 11, 2, 12, 3, 13, 4]);
+}
+
+#[test]
+fn a_stop_of_any_program_goes_first_and_a_write_before_its_reads() {
+    let mut order = Order::default();
+    for (name, priority, program) in [(0, Read, 0), (1, Poll, 1), (2, Write, 2), (3, Stop, 3), (4, Stop, 0)] {
+        let ticket = order.ticket(Claim { priority, unit: unit(1), program: Program(program) });
+        order.wait(ticket, name);
+    }
+    assert_eq!(serve_all(&mut order), [3, 4, 2, 0, 1]);
 }

@@ -3,6 +3,8 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
+use drivebus_rtu::UnitAddress;
+
 use super::*;
 
 use Priority::{Poll, Read, Stop, Write};
@@ -25,13 +27,13 @@ fn wait_for(queue: &Queue, count: usize) {
 fn turns_come_in_order_and_a_stop_overtakes() {
     let queue = Queue::default();
     let (done, order) = mpsc::channel();
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     thread::scope(|scope| {
         let callers = [(Poll, 1), (Read, 1), (Read, 1), (Stop, 1), (Read, 2), (Write, 1), (Stop, 3)];
         for (number, (priority, raw)) in callers.into_iter().enumerate() {
             let (queue, done) = (&queue, done.clone());
             scope.spawn(move || {
-                let _turn = queue.turn(priority, unit(raw), &mut || false);
+                let _turn = queue.turn((priority, unit(raw)), &mut || false);
                 done.send(number).unwrap();
             });
             // The next one comes only when this one stands in the queue.
@@ -45,22 +47,22 @@ fn turns_come_in_order_and_a_stop_overtakes() {
 #[test]
 fn a_full_queue_takes_nobody_but_a_stop_and_who_had_a_turn() {
     let queue = &Queue::with_room(1);
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     thread::scope(|scope| {
-        let waits = |priority| move || drop(queue.turn(priority, unit(2), &mut || false).unwrap());
+        let waits = |priority| move || drop(queue.turn((priority, unit(2)), &mut || false).unwrap());
         scope.spawn(waits(Read));
         wait_for(queue, 1);
         for priority in [Write, Read, Poll] {
-            let refused = scope.spawn(move || queue.turn(priority, unit(2), &mut || false).map(drop));
+            let refused = scope.spawn(move || queue.turn((priority, unit(2)), &mut || false).map(drop));
             assert_eq!(refused.join().unwrap(), Err(NoTurn::Full));
         }
         scope.spawn(waits(Stop));
         wait_for(queue, 2);
-        scope.spawn(|| drop(queue.turn_again(Poll, unit(3), &mut || false).unwrap()));
+        scope.spawn(|| drop(queue.turn_again((Poll, unit(3)), &mut || false).unwrap()));
         wait_for(queue, 3);
         drop(first);
     });
-    assert_eq!(queue.turn(Read, unit(1), &mut || false).map(drop), Ok(()), "there is room again");
+    assert_eq!(queue.turn((Read, unit(1)), &mut || false).map(drop), Ok(()), "there is room again");
 }
 
 #[test]
@@ -73,7 +75,7 @@ fn one_at_a_time_has_the_line() {
             scope.spawn(move || {
                 for round in 0..500 {
                     let priority = [Stop, Write, Read, Poll][(round + usize::from(raw)) % 4];
-                    let mut turn = queue.turn(priority, unit(raw), &mut || false).unwrap();
+                    let mut turn = queue.turn((priority, unit(raw)), &mut || false).unwrap();
                     drop(inside.try_lock().unwrap());
                     assert!(turn.let_pass(&mut || false));
                     drop(inside.try_lock().unwrap());
@@ -89,13 +91,13 @@ fn one_at_a_time_has_the_line() {
 fn who_lets_pass_comes_back_before_all_but_stops() {
     let queue = Queue::default();
     let (done, order) = mpsc::channel();
-    let mut first = queue.turn(Poll, unit(1), &mut || false).unwrap();
+    let mut first = queue.turn((Poll, unit(1)), &mut || false).unwrap();
     assert!(first.let_pass(&mut || panic!("nobody is there")));
     thread::scope(|scope| {
         for (count, (name, priority)) in [("write", Write), ("stop", Stop)].into_iter().enumerate() {
             let (queue, done) = (&queue, done.clone());
             scope.spawn(move || {
-                let mut turn = queue.turn(priority, unit(2), &mut || false).unwrap();
+                let mut turn = queue.turn((priority, unit(2)), &mut || false).unwrap();
                 done.send(name).unwrap();
                 assert!(turn.let_pass(&mut || false));
             });
@@ -112,11 +114,11 @@ fn who_lets_pass_comes_back_before_all_but_stops() {
 fn who_gives_up_while_others_pass_has_lost_its_turn() {
     let queue = Queue::default();
     let ((passes, it_passes), (leave, stop_may_end)) = (mpsc::channel(), mpsc::channel());
-    let mut first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let mut first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     thread::scope(|scope| {
         let queue = &queue;
         scope.spawn(move || {
-            let _turn = queue.turn(Stop, unit(2), &mut || false);
+            let _turn = queue.turn((Stop, unit(2)), &mut || false);
             passes.send(()).unwrap();
             stop_may_end.recv().unwrap();
         });
@@ -136,10 +138,10 @@ fn who_gives_up_while_others_pass_has_lost_its_turn() {
 #[test]
 fn who_waits_looks_up_though_it_is_called_all_the_time() {
     let queue = Queue::default();
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     thread::scope(|scope| {
         let queue = &queue;
-        let waiter = scope.spawn(move || assert!(queue.turn(Read, unit(1), &mut || true).is_err()));
+        let waiter = scope.spawn(move || assert!(queue.turn((Read, unit(1)), &mut || true).is_err()));
         // Ends only when the one who waits has given up.
         while !waiter.is_finished() {
             waiter.thread().unpark();
@@ -152,22 +154,22 @@ fn who_waits_looks_up_though_it_is_called_all_the_time() {
 #[test]
 fn who_gives_up_leaves_no_gap() {
     let queue = Queue::default();
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     thread::scope(|scope| {
-        scope.spawn(|| assert_eq!(queue.turn(Stop, unit(1), &mut || true).unwrap_err(), NoTurn::GivenUp));
+        scope.spawn(|| assert_eq!(queue.turn((Stop, unit(1)), &mut || true).unwrap_err(), NoTurn::GivenUp));
     });
     drop(first);
-    assert!(queue.turn(Read, unit(1), &mut || true).is_ok());
+    assert!(queue.turn((Read, unit(1)), &mut || true).is_ok());
 }
 
 #[test]
 fn who_was_called_and_gives_up_calls_the_next() {
     let queue = Queue::default();
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     let elsewhere = thread::spawn(|| ()).thread().clone();
     let waits = |priority, thread| {
         let mut state = queue.lock();
-        let ticket = state.order.ticket(priority, unit(1));
+        let ticket = state.order.ticket((priority, unit(1)).into());
         state.order.wait(ticket, Waiter::Thread(thread));
         Turn { queue: &queue, ticket }
     };
@@ -182,9 +184,9 @@ fn who_was_called_and_gives_up_calls_the_next() {
 #[test]
 fn who_panics_leaves_its_place() {
     let queue = Queue::default();
-    let first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     let panicked =
-        thread::scope(|scope| scope.spawn(|| queue.turn(Read, unit(1), &mut || panic!("asked")).is_ok()).join());
+        thread::scope(|scope| scope.spawn(|| queue.turn((Read, unit(1)), &mut || panic!("asked")).is_ok()).join());
     assert!(panicked.is_err());
     assert!(queue.lock().order.is_empty());
     drop(first);
@@ -194,16 +196,16 @@ fn who_panics_leaves_its_place() {
 fn a_thread_is_known_while_it_waits_and_while_it_has_the_turn() {
     let queue = Queue::default();
     assert!(!queue.has_this_thread());
-    let mut first = queue.turn(Read, unit(1), &mut || false).unwrap();
+    let mut first = queue.turn((Read, unit(1)), &mut || false).unwrap();
     assert!(queue.has_this_thread());
-    let again = queue.turn(Read, unit(1), &mut || panic!("it would wait for itself"));
+    let again = queue.turn((Read, unit(1)), &mut || panic!("it would wait for itself"));
     assert_eq!(again.unwrap_err(), NoTurn::OwnThread);
     thread::scope(|scope| {
         let queue = &queue;
         scope.spawn(move || {
             assert!(!queue.has_this_thread());
             let mut seen = false;
-            let turn = queue.turn(Stop, unit(2), &mut || {
+            let turn = queue.turn((Stop, unit(2)), &mut || {
                 seen = queue.has_this_thread();
                 true
             });

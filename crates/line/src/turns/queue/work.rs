@@ -4,10 +4,8 @@
 use std::sync::{MutexGuard, PoisonError};
 use std::thread;
 
-use drivebus_rtu::UnitAddress;
-
 use crate::turns::crew::{Crew, Employer};
-use crate::turns::order::{Priority, Ticket};
+use crate::turns::order::{Claim, Ticket};
 use crate::turns::queue::{NoTurn, Queue, State, Turn, Waiter};
 
 impl<W> Queue<W> {
@@ -15,8 +13,7 @@ impl<W> Queue<W> {
     /// much waits. The crew works for `employer`, if it has no other.
     pub(crate) fn leave_work(
         &self,
-        priority: Priority,
-        unit: Option<UnitAddress>,
+        claim: Claim,
         work: W,
         employer: impl FnOnce() -> Box<dyn Employer>,
     ) -> Result<Ticket, (W, NoTurn)> {
@@ -24,11 +21,11 @@ impl<W> Queue<W> {
         if state.crew.is_dismissed() {
             return Err((work, NoTurn::GivenUp));
         }
-        if state.is_full_for(priority, self.room) {
+        if state.is_full_for(claim.priority, self.room) {
             return Err((work, NoTurn::Full));
         }
         state.crew.works_for(employer);
-        let ticket = state.order.ticket(priority, unit);
+        let ticket = state.order.ticket(claim);
         state.order.wait(ticket, Waiter::Work(work));
         self.call_next(state);
         Ok(ticket)

@@ -18,7 +18,7 @@ fn told(heard: Option<u32>, probed: Option<Failure>) -> Failure {
     let read = Request::read(7, 1).unwrap();
     let ask = bus.shared.ask(UNIT.into(), &read, &CallOptions::default());
     let call = Call::new(&bus.shared, ask, CallOptions::default());
-    let mut turn = bus.shared.queue.turn(Priority::Read, Some(UNIT), &mut || false).unwrap();
+    let mut turn = bus.shared.queue.turn((Priority::Read, Some(UNIT)), &mut || false).unwrap();
 
     let mut course = Course::new(Duration::from_millis(100), 0);
     while course.sends() {}

@@ -224,7 +224,9 @@ fn that_a_write_was_not_proven_is_said_once() {
 
 fn owner() -> Owner {
     let words = Arc::new(FreshWords::new());
-    Owner::open(nobody::opener(), SerialFormat::DEFAULT, AdapterEcho::Absent, words, &mut || false).unwrap()
+    let mut owner = Owner::new(nobody::opener(), SerialFormat::DEFAULT, AdapterEcho::Absent, words, Arc::default());
+    owner.open(&mut || false).unwrap();
+    owner
 }
 
 /// `request` was put to `destination` in this form, and ended so.

@@ -1,0 +1,338 @@
+//! The side of the program that has a port: it lets others of the same user in, and does what they want in its queue.
+//!
+//! Each connection has a thread of its own, which waits in the queue and works on the line as a caller of this program's
+//! would. Whoever is at the other end hears words; whatever comes from there reaches the line only as a request that this
+//! program could have made itself.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io;
+use std::net::Shutdown;
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::thread;
+use std::time::Duration;
+
+use drivebus_rtu::{Instant, UnitAddress};
+use rustix::event::{PollFd, PollFlags, poll};
+
+use crate::bus::call::{Call, Wanted};
+use crate::bus::shared::Shared;
+use crate::bus::workers::pdu_of;
+use crate::error::Failure;
+use crate::health::stats::Program as Counted;
+use crate::options::UnitOptions;
+use crate::share::channel::Channel;
+use crate::share::failure::Said;
+use crate::share::guest::readable;
+use crate::share::message::{Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish};
+use crate::share::place::{Door, Place};
+use crate::system::clock::monotonic;
+use crate::system::process::{self, Process};
+use crate::turns::order::Program;
+
+/// The longest message of a guest: one request with its options.
+const MOST: usize = 1_024;
+/// How long a guest may take to say hello, or a message that it has begun.
+const HURRY: Duration = Duration::from_secs(1);
+/// Connections at a time: of all guests, and of one.
+const CONNECTIONS: usize = 512;
+const CONNECTIONS_OF_ONE: usize = 128;
+/// Programs that are remembered when they are gone.
+const REMEMBERED: usize = 64;
+
+/// An open door, until this is dropped.
+#[derive(Debug)]
+pub(super) struct Host {
+    door: Door,
+    guests: Arc<Guests>,
+    /// Its end wakes the thread at the door.
+    _waker: UnixStream,
+    opened_by: Process,
+}
+
+/// Who is in.
+#[derive(Debug, Default)]
+pub(super) struct Guests {
+    inside: Mutex<Inside>,
+}
+
+#[derive(Debug, Default)]
+struct Inside {
+    connections: u64,
+    /// To end them.
+    streams: BTreeMap<u64, UnixStream>,
+    programs: Vec<Arc<Entry>>,
+}
+
+/// One program.
+#[derive(Debug)]
+struct Entry {
+    name: String,
+    process: u32,
+    program: Program,
+    connections: AtomicUsize,
+    calls: AtomicU64,
+    answered: AtomicU64,
+}
+
+impl Host {
+    /// Lets programs in through `door` to the line that `shared` is.
+    pub(super) fn open(door: Door, guests: Arc<Guests>, shared: Weak<Shared>) -> io::Result<Self> {
+        let (waker, woken) = UnixStream::pair()?;
+        let listener = door.listener.try_clone()?;
+        let inside = Arc::clone(&guests);
+        thread::Builder::new().name("drivebus-door".to_owned()).spawn(move || {
+            loop {
+                let mut descriptors = [PollFd::new(&listener, PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
+                let ready = poll(&mut descriptors, None);
+                let is_over = !descriptors[1].revents().is_empty();
+                if is_over || matches!(ready, Err(error) if error != rustix::io::Errno::INTR) {
+                    return;
+                }
+                if let Ok((stream, _)) = listener.accept() {
+                    let (guests, shared) = (Arc::clone(&inside), Weak::clone(&shared));
+                    // Where the system gives no thread, the guest finds its connection ended.
+                    let _ = thread::Builder::new()
+                        .name("drivebus-guest".to_owned())
+                        .spawn(move || serve(stream, &guests, &shared));
+                }
+            }
+        })?;
+        Ok(Self { door, guests, _waker: waker, opened_by: Process::current() })
+    }
+
+    /// Whether others find it at `place`.
+    pub(super) fn is_at(&self, place: &Place) -> bool {
+        self.opened_by.is_current() && place.has(&self.door)
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        if self.opened_by.is_current() {
+            // No more is heard of them; what they asked for by now, they are still told about.
+            for stream in self.guests.lock().streams.values() {
+                // One that is ended already need not be.
+                let _ = stream.shutdown(Shutdown::Read);
+            }
+        }
+    }
+}
+
+impl Guests {
+    fn lock(&self) -> MutexGuard<'_, Inside> {
+        self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What each program asked so far.
+    pub(super) fn counted(&self) -> Vec<Counted> {
+        let inside = self.lock();
+        let counted = inside.programs.iter().map(|entry| Counted {
+            name: entry.name.clone(),
+            process: entry.process,
+            here: entry.connections.load(Ordering::Relaxed) > 0,
+            calls: entry.calls.load(Ordering::Relaxed),
+            answered: entry.answered.load(Ordering::Relaxed),
+        });
+        counted.collect()
+    }
+
+    /// Lets a program in; `Err` says why not.
+    fn enter(self: &Arc<Self>, name: String, process: u32, stream: UnixStream) -> Result<Visit, String> {
+        let mut inside = self.lock();
+        if inside.streams.len() >= CONNECTIONS {
+            return Err(format!("{CONNECTIONS} connections to this port are open already, and no more may be"));
+        }
+        let is_here = |entry: &&Arc<Entry>| entry.connections.load(Ordering::Relaxed) > 0;
+        let known = inside.programs.iter().filter(is_here).find(|entry| entry.process == process).cloned();
+        let entry = known.unwrap_or_else(|| {
+            let taken: Vec<u16> = inside.programs.iter().filter(is_here).map(|entry| entry.program.0).collect();
+            let number = (1..u16::MAX).find(|number| !taken.contains(number)).unwrap_or(u16::MAX);
+            let entry = Arc::new(Entry {
+                name,
+                process,
+                program: Program(number),
+                connections: AtomicUsize::new(0),
+                calls: AtomicU64::new(0),
+                answered: AtomicU64::new(0),
+            });
+            if inside.programs.len() >= REMEMBERED
+                && let Some(gone) =
+                    inside.programs.iter().position(|entry| entry.connections.load(Ordering::Relaxed) == 0)
+            {
+                inside.programs.remove(gone);
+            }
+            inside.programs.push(Arc::clone(&entry));
+            entry
+        });
+        if entry.connections.load(Ordering::Relaxed) >= CONNECTIONS_OF_ONE {
+            return Err(format!("this program has {CONNECTIONS_OF_ONE} connections to this port, and no more may be"));
+        }
+        entry.connections.fetch_add(1, Ordering::Relaxed);
+        inside.connections += 1;
+        let number = inside.connections;
+        inside.streams.insert(number, stream);
+        Ok(Visit { guests: Arc::clone(self), entry, number })
+    }
+}
+
+/// A connection that was let in, until this is dropped.
+struct Visit {
+    guests: Arc<Guests>,
+    entry: Arc<Entry>,
+    number: u64,
+}
+
+impl Drop for Visit {
+    fn drop(&mut self) {
+        self.guests.lock().streams.remove(&self.number);
+        self.entry.connections.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Serves one connection to its end.
+fn serve(stream: UnixStream, guests: &Arc<Guests>, shared: &Weak<Shared>) {
+    let peer = process::peer(&stream);
+    let Ok(mut channel) = Channel::new(stream, MOST) else { return };
+    match let_in(&mut channel, peer, guests, shared) {
+        Ok(Some(visit)) => {
+            let channel = RefCell::new(channel);
+            // It ends when either side does, or where what comes is no wish.
+            while next(&channel, &visit, shared).is_some() {}
+        }
+        Ok(None) => {}
+        Err(why) => {
+            // Who is sent away may be gone already.
+            let _ = channel.say_bytes(&[&[SENT_AWAY], why.as_bytes()].concat());
+        }
+    }
+}
+
+/// Hears who comes; `Err` says why it cannot come in, `None` that it said nothing.
+fn let_in(
+    channel: &mut Channel,
+    peer: process::Peer,
+    guests: &Arc<Guests>,
+    shared: &Weak<Shared>,
+) -> Result<Option<Visit>, String> {
+    if !peer.is_this_user {
+        return Err("this port is open in a program of another user".to_owned());
+    }
+    let no_greeting = || "this is a port of drivebus, and what came is no greeting of it".to_owned();
+    let Some(greeting) = channel.hear_bytes(monotonic() + HURRY).map_err(|_| no_greeting())? else { return Ok(None) };
+    let own = format!("{} (process {})", process::own_name(), std::process::id());
+    let (version, hello) = greeting.strip_prefix(GREETING).and_then(<[u8]>::split_first).ok_or_else(no_greeting)?;
+    if *version != VERSION {
+        return Err(format!(
+            "{own} has the port, and is of another version of drivebus: it speaks version {VERSION} where this program \
+             speaks {version}; use the same version, or end one of them"
+        ));
+    }
+    let hello: Hello = postcard::from_bytes(hello).map_err(|_| no_greeting())?;
+    let Some(shared) = shared.upgrade() else { return Ok(None) };
+    let ours = shared.characters();
+    if hello.characters != ours {
+        return Err(format!(
+            "{own} has the port open at {ours}, and {} is asked for; ask for the same, or end that program",
+            hello.characters
+        ));
+    }
+    let end = channel.end().map_err(|error| error.to_string())?;
+    let visit = guests.enter(readable(&hello.program), peer.process, end)?;
+    let welcome =
+        Welcome { program: process::own_name(), process: std::process::id(), reconnects: shared.reconnects_here() };
+    let welcome = postcard::to_extend(&welcome, vec![LET_IN]).map_err(|error| error.to_string())?;
+    Ok(channel.say_bytes(&welcome).is_ok().then_some(visit))
+}
+
+/// Hears one wish and fulfils it; `None` ends the connection.
+fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Option<()> {
+    let wish = hear(&mut channel.borrow_mut())?;
+    // A bus that is gone ends its connections; one that is about to be is as good as gone.
+    let shared = shared.upgrade()?;
+    let told = match wish {
+        Wish::Call(order) => {
+            visit.entry.calls.fetch_add(1, Ordering::Relaxed);
+            let told = call(channel, &shared, &order, visit.entry.program)?;
+            if matches!(told, Told::Answer { .. }) {
+                visit.entry.answered.fetch_add(1, Ordering::Relaxed);
+            }
+            told
+        }
+        Wish::Listen(time) => {
+            let mut hear = |moment: Instant, bytes: &[u8]| {
+                // Where nobody listens any more, that is seen below.
+                let _ = channel.borrow_mut().say(&Told::Heard { at: moment.as_nanos(), bytes: bytes.to_vec() });
+            };
+            let ended =
+                shared.listen_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            Told::Over(ended.err().as_ref().map(Said::from))
+        }
+        Wish::Stats => Told::Stats(Box::new(Figures::from(shared.stats()))),
+        Wish::Link(unit) => {
+            let link = shared.link_here(UnitAddress::new(unit).ok()?);
+            Told::Link { good: link.good, asked: link.asked }
+        }
+        Wish::FreshWord => Told::Word(shared.words.next()),
+        Wish::Reconnects => Told::Reconnects(shared.reconnects_here()),
+        // It came when what it is about had ended.
+        Wish::Cancel => return Some(()),
+    };
+    if shared.is_shut() {
+        shared.close();
+    }
+    channel.borrow_mut().say(&told).ok()
+}
+
+/// The next wish, for as long as it takes; `None` where none comes any more, or one takes too long.
+fn hear(channel: &mut Channel) -> Option<Wish> {
+    loop {
+        let has_begun = channel.has_begun();
+        let until = if has_begun { monotonic() + HURRY } else { monotonic() + Duration::from_secs(3_600) };
+        match channel.hear(until) {
+            Ok(Some(wish)) => return Some(wish),
+            Ok(None) if !has_begun => {}
+            _ => return None,
+        }
+    }
+}
+
+/// Whether the guest takes back what is under way, or is gone, or says what it may not say now.
+fn is_unwanted(channel: &RefCell<Channel>, shared: &Shared) -> bool {
+    shared.is_shut() || !matches!(channel.borrow_mut().hear::<Wish>(Instant::ZERO), Ok(None))
+}
+
+/// A guest that has to be there for as long as nothing of its call is on the wire.
+struct Here<'a>(&'a RefCell<Channel>);
+
+impl Wanted for Here<'_> {
+    fn is_wanted(&self) -> bool {
+        self.0.borrow().is_there()
+    }
+}
+
+/// Carries out `order`; `None` where it is none.
+fn call(channel: &RefCell<Channel>, shared: &Shared, order: &Order, program: Program) -> Option<Told> {
+    let (destination, request, options) = (order.destination()?, order.request()?, order.options()?);
+    let ask = order.times(shared.ask_as(UnitOptions::default(), destination, &request, &options));
+    let here = Here(channel);
+    let mut pdu = Vec::new();
+    let mut give_up = || is_unwanted(channel, shared);
+    let result = Call::new(shared, ask, options)
+        .of_program(program)
+        .while_wanted(&here)
+        .run(&mut give_up, &mut |answer| pdu = pdu_of(destination, &answer));
+    let reconnects = shared.reconnects_here();
+    Some(match result {
+        Ok(done) => Told::Answer { pdu, sent: done.sent.as_nanos(), ended: done.ended.as_nanos(), reconnects },
+        Err(mut error) => {
+            // What ends here because this program does is not what the guest gave up.
+            if error.failure == Failure::Interrupted && shared.is_shut() {
+                error.failure = Failure::Closed;
+            }
+            Told::failed(&error, reconnects)
+        }
+    })
+}

@@ -1,0 +1,243 @@
+//! Whether a bus has its port itself, or uses it through another program; and how one becomes the other.
+//!
+//! The port decides: who opens it has it, and serves the others; who finds it taken looks for the one who serves it. When
+//! that one ends, all others do the same again, and one of them has the port.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::thread;
+use std::time::Duration;
+
+use drivebus_rtu::SerialFormat;
+
+use crate::bus::host::{Guests, Host};
+use crate::bus::shared::Shared;
+use crate::health::stats::{Program, Stats};
+use crate::line::{Line, Opener, PortError, PortErrorKind};
+use crate::options::{BusOptions, Share};
+use crate::ports::key::PortKey;
+use crate::share::guest::{Guest, Knocked};
+use crate::share::message::{Characters, Hello};
+use crate::share::place::Place;
+use crate::system::clock::monotonic;
+use crate::system::process::own_name;
+
+/// How long a port may stay taken whose owner is gone: the system closes what a program that was killed had open, one
+/// after the other.
+const LETS_GO: Duration = Duration::from_millis(400);
+/// How often it is tried meanwhile.
+const STEP: Duration = Duration::from_millis(5);
+
+/// What a bus knows of the programs it shares its port with.
+#[derive(Debug)]
+pub(super) struct Sharing {
+    key: PortKey,
+    share: Share,
+    hello: Hello,
+    /// The bus, once it is made.
+    bus: OnceLock<Weak<Shared>>,
+    stats: Arc<Mutex<Stats>>,
+    /// Whether the port was opened, here or there, before.
+    was_open: AtomicBool,
+    is_guest: AtomicBool,
+    guest: Mutex<Option<Arc<Guest>>>,
+    host: Mutex<Serving>,
+    guests: Arc<Guests>,
+}
+
+#[derive(Debug, Default)]
+struct Serving {
+    host: Option<Host>,
+    /// Where the door shall be, as soon as there is a bus behind it.
+    at: Option<(Place, crate::share::place::Door)>,
+    /// Why others cannot come in.
+    refused: Option<String>,
+}
+
+impl Sharing {
+    /// With what opens the port, or finds who has it; none where the port is not shared, and `opener` as it was.
+    pub(super) fn around(
+        key: Option<PortKey>,
+        options: &BusOptions,
+        stats: &Arc<Mutex<Stats>>,
+        opener: Opener,
+    ) -> (Option<Arc<Self>>, Opener) {
+        let Some(key) = key.filter(|_| options.share != Share::Never) else { return (None, opener) };
+        let sharing = Arc::new(Self::new(key, options.share, &options.format, Arc::clone(stats)));
+        let opener = sharing.opener(opener);
+        (Some(sharing), opener)
+    }
+
+    fn new(key: PortKey, share: Share, format: &SerialFormat, stats: Arc<Mutex<Stats>>) -> Self {
+        Self {
+            key,
+            share,
+            hello: Hello { program: own_name(), characters: Characters::of(format) },
+            bus: OnceLock::new(),
+            stats,
+            was_open: AtomicBool::new(false),
+            is_guest: AtomicBool::new(false),
+            guest: Mutex::default(),
+            host: Mutex::default(),
+            guests: Arc::default(),
+        }
+    }
+
+    /// Opens the port by `open`, or finds who has it.
+    fn opener(self: &Arc<Self>, mut open: Opener) -> Opener {
+        let sharing = Arc::clone(self);
+        Box::new(move || sharing.open(&mut open))
+    }
+
+    /// The line; or an error, and a [`guest`](Self::guest) where another program serves the port.
+    fn open(&self, open: &mut Opener) -> Result<Box<dyn Line>, PortError> {
+        let place = match Place::of(&self.key) {
+            Ok(Some(place)) => place,
+            Ok(None) => return open(), // it says what is wrong with the port
+            Err(error) => return self.open_alone(open, &error),
+        };
+        let _turn = match place.turn() {
+            Ok(turn) => turn,
+            Err(error) => return self.open_alone(open, &error),
+        };
+        let end = monotonic() + LETS_GO;
+        // What does not keep others out by itself is asked for first.
+        let mut taken = (!self.key.locks()).then(|| PortError::new(PortErrorKind::Busy, "port", "it is taken"));
+        loop {
+            let error = match taken.take() {
+                Some(error) => error,
+                None => match open() {
+                    Ok(line) => {
+                        self.was_open.store(true, Ordering::Release);
+                        self.open_door(place);
+                        return Ok(line);
+                    }
+                    Err(error) if error.kind == PortErrorKind::Busy => error,
+                    Err(error) => return Err(error),
+                },
+            };
+            match Guest::knock(&place, &self.hello, self.seen_so_far()) {
+                Knocked::Open(guest) => {
+                    self.comes_in(guest);
+                    return Err(error);
+                }
+                Knocked::SentAway(why) => return Err(PortError { message: why, ..error }),
+                Knocked::Gone if monotonic() < end => thread::sleep(STEP),
+                Knocked::Absent | Knocked::Gone if self.key.locks() => return Err(error),
+                Knocked::Absent | Knocked::Gone => {
+                    // Nobody serves it.
+                    let line = open()?;
+                    self.was_open.store(true, Ordering::Release);
+                    self.open_door(place);
+                    return Ok(line);
+                }
+            }
+            if !self.key.locks() {
+                taken = Some(error);
+            }
+        }
+    }
+
+    /// Opens the port where nobody could be met over it.
+    fn open_alone(&self, open: &mut Opener, why: &std::io::Error) -> Result<Box<dyn Line>, PortError> {
+        self.serving().refused = Some(format!("other programs cannot use this port through this one: {why}"));
+        open()
+    }
+
+    /// How often the port was opened again, if it is opened now.
+    fn seen_so_far(&self) -> u64 {
+        let reconnects = self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects;
+        reconnects + u64::from(self.was_open.load(Ordering::Acquire))
+    }
+
+    fn comes_in(&self, guest: Guest) {
+        let mut serving = self.serving();
+        (serving.host, serving.at) = (None, None);
+        drop(serving);
+        self.was_open.store(true, Ordering::Release);
+        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(guest));
+        self.is_guest.store(true, Ordering::Release);
+    }
+
+    fn open_door(&self, place: Place) {
+        let mut serving = self.serving();
+        if self.share != Share::Auto || serving.host.as_ref().is_some_and(|host| host.is_at(&place)) {
+            return;
+        }
+        serving.host = None;
+        serving.at = match place.open_door() {
+            Ok(door) => Some((place, door)),
+            Err(error) => {
+                serving.refused = Some(format!("other programs cannot use this port through this one: {error}"));
+                None
+            }
+        };
+        self.begin_to_serve(&mut serving);
+    }
+
+    /// The bus is made: others may come in.
+    pub(super) fn serves(&self, bus: &Arc<Shared>) {
+        self.bus.get_or_init(|| Arc::downgrade(bus));
+        self.begin_to_serve(&mut self.serving());
+    }
+
+    fn begin_to_serve(&self, serving: &mut Serving) {
+        let Some(bus) = self.bus.get() else { return };
+        let Some((_, door)) = serving.at.take() else { return };
+        match Host::open(door, Arc::clone(&self.guests), Weak::clone(bus)) {
+            Ok(host) => serving.host = Some(host),
+            Err(error) => {
+                serving.refused = Some(format!("other programs cannot use this port through this one: {error}"));
+            }
+        }
+    }
+
+    /// The program through which the port is used, if it is another one's.
+    pub(super) fn guest(&self) -> Option<Arc<Guest>> {
+        if !self.is_guest() {
+            return None;
+        }
+        self.guest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Whether the port is another program's.
+    pub(super) fn is_guest(&self) -> bool {
+        self.is_guest.load(Ordering::Acquire)
+    }
+
+    /// The program through which the port was used is gone.
+    pub(super) fn lost(&self, gone: &Arc<Guest>) {
+        let mut guest = self.guest.lock().unwrap_or_else(PoisonError::into_inner);
+        if guest.as_ref().is_some_and(|guest| Arc::ptr_eq(guest, gone)) {
+            self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects = gone.reconnects();
+            self.is_guest.store(false, Ordering::Release);
+            *guest = None;
+        }
+    }
+
+    /// Nobody is let in any more, and who is in is told so. The port is closed by now.
+    pub(super) fn end(&self) {
+        let mut serving = self.serving();
+        (serving.host, serving.at) = (None, None);
+        drop(serving);
+        self.is_guest.store(false, Ordering::Release);
+        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// What the programs that come in through this one asked so far.
+    pub(super) fn programs(&self) -> Vec<Program> {
+        self.guests.counted()
+    }
+
+    /// What the user should know about it.
+    pub(super) fn note(&self) -> Option<String> {
+        match self.guest() {
+            Some(guest) => Some(format!("{} has the port; requests go through it", guest.host())),
+            None => self.serving().refused.clone(),
+        }
+    }
+
+    fn serving(&self) -> MutexGuard<'_, Serving> {
+        self.host.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

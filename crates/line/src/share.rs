@@ -1,0 +1,17 @@
+//! One port, several programs of one user: what they say to each other over a local socket, and where they meet.
+//!
+//! | room | what is in it |
+//! | --- | --- |
+//! | `key` | which port it is, whatever people call it |
+//! | `place` | the socket of a port in the run-time directory, and who may use it |
+//! | `message`, `failure` | what is said |
+//! | `channel` | one connection: messages in and out, with limits |
+//! | `guest` | the side of a program that uses a port through another |
+//!
+//! The side of the program that has the port is `bus::host`.
+
+pub(crate) mod channel;
+pub(crate) mod failure;
+pub(crate) mod guest;
+pub(crate) mod message;
+pub(crate) mod place;

@@ -1,0 +1,309 @@
+//! A program that uses a port through another one: what it wants it says there, and waits for what it is told.
+//!
+//! Each call under way has a connection of its own, so that none waits behind another here; who goes first is decided
+//! where the line is.
+
+use std::io;
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use drivebus_rtu::Instant;
+
+use crate::share::channel::Channel;
+use crate::share::message::{GREETING, Hello, LET_IN, SENT_AWAY, Told, VERSION, Welcome, Wish};
+use crate::share::place::{Nobody, Place};
+use crate::system::clock::{LOOK_UP, monotonic};
+use crate::system::process::{self, Process};
+
+/// The longest message of a program that has a port: the statistics of 247 units.
+const MOST: usize = 1 << 20;
+/// Connections of one program; stops get another one all the same.
+const CONNECTIONS: usize = 64;
+/// How long a program may take to open to one that knocks.
+const OPENS: Duration = Duration::from_secs(2);
+/// How long it may take to say what became of a call that is not wanted any more.
+const LETS_GO: Duration = Duration::from_secs(2);
+/// How long it may say nothing before it is looked whether it runs at all.
+const SILENT: Duration = Duration::from_secs(1);
+
+/// A port that another program has, as this one uses it.
+#[derive(Debug)]
+pub(crate) struct Guest {
+    place: Place,
+    hello: Hello,
+    host: Host,
+    /// How often this program had seen the port opened again when it came.
+    before: u64,
+    /// How often the other one had opened it again by then, and by what it said last.
+    began: u64,
+    seen: AtomicU64,
+    pool: Mutex<Pool>,
+    freed: Condvar,
+    gone: AtomicBool,
+    made_by: Process,
+}
+
+/// The program that has the port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Host {
+    pub(crate) program: String,
+    pub(crate) process: u32,
+}
+
+impl std::fmt::Display for Host {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} (process {})", self.program, self.process)
+    }
+}
+
+#[derive(Debug, Default)]
+struct Pool {
+    idle: Vec<Channel>,
+    under_way: usize,
+}
+
+/// What came of knocking.
+#[derive(Debug)]
+pub(crate) enum Knocked {
+    /// The port is there to be used.
+    Open(Guest),
+    /// No program serves it.
+    Absent,
+    /// One did, and is gone or about to be.
+    Gone,
+    /// One does, and does not let this one in: why, in words.
+    SentAway(String),
+}
+
+/// Why a wish was not fulfilled.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Lost {
+    /// The program that had the port is gone; the wish did not reach it.
+    Unsent,
+    /// It is gone, and may have done what was wished.
+    Unknown,
+    /// Who wished gave up before the wish was sent.
+    GivenUp,
+    /// It does not answer: why, in words. It may have done what was wished.
+    Silent(String),
+    /// It does not let this one in any more: why, in words.
+    SentAway(String),
+}
+
+enum Greeting {
+    Gone,
+    SentAway(String),
+}
+
+impl Guest {
+    /// Asks the program that serves the port at `place` to let this one in, which has seen the port opened again `before`
+    /// times.
+    pub(crate) fn knock(place: &Place, hello: &Hello, before: u64) -> Knocked {
+        let stream = match place.knock() {
+            Ok(stream) => stream,
+            Err(Nobody::Absent) => return Knocked::Absent,
+            Err(Nobody::Gone) => return Knocked::Gone,
+        };
+        match greet(stream, hello) {
+            Ok((channel, welcome)) => {
+                let pool = Mutex::new(Pool { idle: vec![channel], under_way: 0 });
+                Knocked::Open(Self {
+                    place: place.clone(),
+                    hello: hello.clone(),
+                    host: Host { program: readable(&welcome.program), process: welcome.process },
+                    before,
+                    began: welcome.reconnects,
+                    seen: AtomicU64::new(welcome.reconnects),
+                    pool,
+                    freed: Condvar::new(),
+                    gone: AtomicBool::new(false),
+                    made_by: Process::current(),
+                })
+            }
+            Err(Greeting::Gone) => Knocked::Gone,
+            Err(Greeting::SentAway(why)) => Knocked::SentAway(why),
+        }
+    }
+
+    pub(crate) fn host(&self) -> &Host {
+        &self.host
+    }
+
+    /// Whether the program that had the port is known to be gone.
+    pub(crate) fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Acquire)
+    }
+
+    /// How often this program has seen the port opened again.
+    pub(crate) fn reconnects(&self) -> u64 {
+        self.before + self.seen.load(Ordering::Acquire).saturating_sub(self.began)
+    }
+
+    /// The count of the program that has the port, where this one's is `reconnects`. What was before it came is like no
+    /// count of that one.
+    pub(crate) fn as_counted_there(&self, reconnects: u64) -> u64 {
+        reconnects.checked_sub(self.before).map_or(u64::MAX, |since| self.began + since)
+    }
+
+    /// So often has the program that has the port opened it again by now.
+    pub(crate) fn saw(&self, reconnects: u64) {
+        self.seen.fetch_max(reconnects, Ordering::AcqRel);
+    }
+
+    /// Says `wish` and gives what it is told to `hear`, until that says that it was the last. A stop waits for no other wish.
+    ///
+    /// `give_up` is asked every 50 ms. Where it says so, what is under way is taken back, and what became of it is heard.
+    pub(crate) fn ask(
+        &self,
+        wish: &Wish,
+        is_stop: bool,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut dyn FnMut(Told) -> bool,
+    ) -> Result<(), Lost> {
+        let mut channel = self.take(is_stop, give_up)?;
+        let result = self.ask_on(&mut channel, wish, give_up, hear);
+        let mut pool = self.lock();
+        pool.under_way -= 1;
+        match &result {
+            Ok(()) => pool.idle.push(channel),
+            Err(Lost::Unsent | Lost::Unknown) => {
+                self.gone.store(true, Ordering::Release);
+                pool.idle.clear();
+            }
+            Err(_) => {}
+        }
+        drop(pool);
+        self.freed.notify_one();
+        result
+    }
+
+    fn ask_on(
+        &self,
+        channel: &mut Channel,
+        wish: &Wish,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut dyn FnMut(Told) -> bool,
+    ) -> Result<(), Lost> {
+        channel.say(wish).map_err(|_| Lost::Unsent)?;
+        let mut taken_back: Option<Instant> = None;
+        let mut heard = monotonic();
+        loop {
+            match channel.hear::<Told>(monotonic() + LOOK_UP) {
+                Ok(Some(told)) => {
+                    heard = monotonic();
+                    if hear(told) {
+                        return Ok(());
+                    }
+                }
+                Ok(None) => {
+                    let now = monotonic();
+                    if taken_back.is_none() && give_up() {
+                        taken_back = Some(now);
+                        channel.say(&Wish::Cancel).map_err(|_| Lost::Unknown)?;
+                    }
+                    if taken_back.is_some_and(|moment| now >= moment + LETS_GO) {
+                        return Err(Lost::Silent(format!("{} has the port and does not answer", self.host)));
+                    }
+                    if now >= heard + SILENT {
+                        heard = now;
+                        self.look()?;
+                    }
+                }
+                Err(_) => return Err(Lost::Unknown),
+            }
+        }
+    }
+
+    /// Looks whether the program that has the port runs: one that is stopped says nothing.
+    fn look(&self) -> Result<(), Lost> {
+        if process::is_stopped(self.host.process) { Err(Lost::Silent(stopped(&self.host))) } else { Ok(()) }
+    }
+
+    /// A connection for one wish.
+    fn take(&self, is_stop: bool, give_up: &mut dyn FnMut() -> bool) -> Result<Channel, Lost> {
+        let mut pool = self.lock();
+        loop {
+            if self.is_gone() || !self.made_by.is_current() {
+                return Err(Lost::Unsent);
+            }
+            if let Some(channel) = pool.idle.pop() {
+                pool.under_way += 1;
+                return Ok(channel);
+            }
+            if is_stop || pool.under_way < CONNECTIONS {
+                break;
+            }
+            pool = self.freed.wait_timeout(pool, LOOK_UP).unwrap_or_else(PoisonError::into_inner).0;
+            drop(pool);
+            if give_up() {
+                return Err(Lost::GivenUp);
+            }
+            pool = self.lock();
+        }
+        pool.under_way += 1;
+        drop(pool);
+        let stream = self.place.knock().map_err(|_| Greeting::Gone);
+        let greeted = stream.and_then(|stream| greet(stream, &self.hello));
+        greeted.map(|(channel, _)| channel).map_err(|why| {
+            self.lock().under_way -= 1;
+            match why {
+                Greeting::Gone => {
+                    self.gone.store(true, Ordering::Release);
+                    Lost::Unsent
+                }
+                Greeting::SentAway(why) => Lost::SentAway(why),
+            }
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Pool> {
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Says hello, and waits to be let in.
+fn greet(stream: UnixStream, hello: &Hello) -> Result<(Channel, Welcome), Greeting> {
+    let peer = process::peer(&stream);
+    if !peer.is_this_user {
+        return Err(Greeting::SentAway("the socket of this port is another user's".to_owned()));
+    }
+    let gone = |_: io::Error| Greeting::Gone;
+    let mut channel = Channel::new(stream, MOST).map_err(gone)?;
+    let greeting = postcard::to_extend(hello, [GREETING, &[VERSION]].concat()).map_err(|_| Greeting::Gone)?;
+    channel.say_bytes(&greeting).map_err(gone)?;
+    let end = monotonic() + OPENS;
+    let answer = loop {
+        let until = end.min(monotonic() + LOOK_UP);
+        match channel.hear_bytes(until).map_err(gone)? {
+            Some(answer) => break answer,
+            None if monotonic() < end => {}
+            None => {
+                let host = Host { program: "a program".to_owned(), process: peer.process };
+                let is_stopped = process::is_stopped(host.process);
+                return Err(if is_stopped { Greeting::SentAway(stopped(&host)) } else { Greeting::Gone });
+            }
+        }
+    };
+    match answer.split_first() {
+        Some((&LET_IN, welcome)) => {
+            let welcome = postcard::from_bytes(welcome).map_err(|_| Greeting::Gone)?;
+            Ok((channel, welcome))
+        }
+        Some((&SENT_AWAY, why)) => Err(Greeting::SentAway(readable(&String::from_utf8_lossy(why)))),
+        _ => Err(Greeting::Gone),
+    }
+}
+
+fn stopped(host: &Host) -> String {
+    let Host { process, .. } = host;
+    format!(
+        "{host} has the port and is stopped, perhaps by Ctrl-Z; let it go on (`fg`, or `kill -CONT {process}`), or end it"
+    )
+}
+
+/// What another program says, without anything that a terminal would obey.
+pub(crate) fn readable(text: &str) -> String {
+    text.chars().filter(|letter| !letter.is_control()).take(300).collect()
+}
