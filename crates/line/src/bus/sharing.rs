@@ -25,6 +25,9 @@ use crate::system::process::own_name;
 /// How long a port may stay taken whose owner is gone: the system closes what a program that was killed had open, one
 /// after the other.
 const LETS_GO: Duration = Duration::from_millis(400);
+/// How long nothing is sent when a port is taken over: the request of a program that was killed may be on the wire, unheard,
+/// and its unit about to answer.
+const QUIET: Duration = Duration::from_millis(50);
 /// How often it is tried meanwhile.
 const STEP: Duration = Duration::from_millis(5);
 
@@ -40,6 +43,8 @@ pub(super) struct Sharing {
     /// Whether the port was opened, here or there, before.
     was_open: AtomicBool,
     is_guest: AtomicBool,
+    /// Whether the program through which the port was used is gone, and nobody opened it since.
+    takes_over: AtomicBool,
     guest: Mutex<Option<Arc<Guest>>>,
     host: Mutex<Serving>,
     guests: Arc<Guests>,
@@ -77,6 +82,7 @@ impl Sharing {
             stats,
             was_open: AtomicBool::new(false),
             is_guest: AtomicBool::new(false),
+            takes_over: AtomicBool::new(false),
             guest: Mutex::default(),
             host: Mutex::default(),
             guests: Arc::default(),
@@ -108,8 +114,7 @@ impl Sharing {
                 Some(error) => error,
                 None => match open() {
                     Ok(line) => {
-                        self.was_open.store(true, Ordering::Release);
-                        self.open_door(place);
+                        self.has_opened(place);
                         return Ok(line);
                     }
                     Err(error) if error.kind == PortErrorKind::Busy => error,
@@ -127,8 +132,7 @@ impl Sharing {
                 Knocked::Absent | Knocked::Gone => {
                     // Nobody serves it.
                     let line = open()?;
-                    self.was_open.store(true, Ordering::Release);
-                    self.open_door(place);
+                    self.has_opened(place);
                     return Ok(line);
                 }
             }
@@ -155,8 +159,17 @@ impl Sharing {
         (serving.host, serving.at) = (None, None);
         drop(serving);
         self.was_open.store(true, Ordering::Release);
+        self.takes_over.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(guest));
         self.is_guest.store(true, Ordering::Release);
+    }
+
+    fn has_opened(&self, place: Place) {
+        self.was_open.store(true, Ordering::Release);
+        self.open_door(place);
+        if self.takes_over.swap(false, Ordering::AcqRel) {
+            thread::sleep(QUIET);
+        }
     }
 
     fn open_door(&self, place: Place) {
@@ -210,6 +223,7 @@ impl Sharing {
         let mut guest = self.guest.lock().unwrap_or_else(PoisonError::into_inner);
         if guest.as_ref().is_some_and(|guest| Arc::ptr_eq(guest, gone)) {
             self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects = gone.reconnects();
+            self.takes_over.store(true, Ordering::Release);
             self.is_guest.store(false, Ordering::Release);
             *guest = None;
         }
