@@ -42,11 +42,10 @@ const CONNECTIONS_OF_ONE: usize = 128;
 /// Programs that are remembered when they are gone.
 const REMEMBERED: usize = 64;
 
-/// An open door, until this is dropped.
+/// An open door, until this is dropped. Who is in by then stays.
 #[derive(Debug)]
 pub(super) struct Host {
     door: Door,
-    guests: Arc<Guests>,
     /// Its end wakes the thread at the door.
     _waker: UnixStream,
     opened_by: Process,
@@ -82,7 +81,6 @@ impl Host {
     pub(super) fn open(door: Door, guests: Arc<Guests>, shared: Weak<Shared>) -> io::Result<Self> {
         let (waker, woken) = UnixStream::pair()?;
         let listener = door.listener.try_clone()?;
-        let inside = Arc::clone(&guests);
         thread::Builder::new().name("drivebus-door".to_owned()).spawn(move || {
             loop {
                 let mut descriptors = [PollFd::new(&listener, PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
@@ -92,7 +90,7 @@ impl Host {
                     return;
                 }
                 if let Ok((stream, _)) = listener.accept() {
-                    let (guests, shared) = (Arc::clone(&inside), Weak::clone(&shared));
+                    let (guests, shared) = (Arc::clone(&guests), Weak::clone(&shared));
                     // Where the system gives no thread, the guest finds its connection ended.
                     let _ = thread::Builder::new()
                         .name("drivebus-guest".to_owned())
@@ -100,7 +98,7 @@ impl Host {
                 }
             }
         })?;
-        Ok(Self { door, guests, _waker: waker, opened_by: Process::current() })
+        Ok(Self { door, _waker: waker, opened_by: Process::current() })
     }
 
     /// Whether others find it at `place`.
@@ -109,21 +107,17 @@ impl Host {
     }
 }
 
-impl Drop for Host {
-    fn drop(&mut self) {
-        if self.opened_by.is_current() {
-            // No more is heard of them; what they asked for by now, they are still told about.
-            for stream in self.guests.lock().streams.values() {
-                // One that is ended already need not be.
-                let _ = stream.shutdown(Shutdown::Read);
-            }
-        }
-    }
-}
-
 impl Guests {
     fn lock(&self) -> MutexGuard<'_, Inside> {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Hears no more of anybody; what they asked for by now, they are still told about.
+    pub(super) fn end(&self) {
+        for stream in self.lock().streams.values() {
+            // One that is ended already need not be.
+            let _ = stream.shutdown(Shutdown::Read);
+        }
     }
 
     /// What each program asked so far.

@@ -155,9 +155,7 @@ impl Sharing {
     }
 
     fn comes_in(&self, guest: Guest) {
-        let mut serving = self.serving();
-        (serving.host, serving.at) = (None, None);
-        drop(serving);
+        self.serves_no_more();
         self.was_open.store(true, Ordering::Release);
         self.takes_over.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(guest));
@@ -231,11 +229,16 @@ impl Sharing {
 
     /// Nobody is let in any more, and who is in is told so. The port is closed by now.
     pub(super) fn end(&self) {
+        self.serves_no_more();
+        self.is_guest.store(false, Ordering::Release);
+        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn serves_no_more(&self) {
         let mut serving = self.serving();
         (serving.host, serving.at) = (None, None);
         drop(serving);
-        self.is_guest.store(false, Ordering::Release);
-        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        self.guests.end();
     }
 
     /// What the programs that come in through this one asked so far.
