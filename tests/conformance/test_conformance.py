@@ -1,4 +1,7 @@
-"""drivebus alone through every row, with a unit that answers 08H and with one that is silent on it."""
+"""drivebus alone through every row, with a unit that answers 08H and with one that is silent on it.
+
+And once more through another program that has the port.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from .rows import ROWS, Row
 TIMEOUT = 0.4
 BOUND = 60.0
 
+LIBRARY = pytest.mark.parametrize("library", ["drivebus", "drivebus_shared"])
 SILENT = pytest.mark.parametrize("silent_on_08", [False, True], ids=["08H", "no 08H"])
 
 
@@ -25,16 +29,18 @@ def test_the_judge_knows_the_check_value_of_crc_16_modbus() -> None:
     assert wire.crc(b"123456789") == bytes.fromhex("37 4B")
 
 
+@LIBRARY
 @SILENT
 @pytest.mark.parametrize("row", ROWS, ids=[row.key for row in ROWS])
-def test_the_truth_is_told_in_every_row(row: Row, silent_on_08: bool) -> None:
-    result = play(row, "drivebus", mute=silent_on_08, timeout=TIMEOUT, bound=BOUND)
+def test_the_truth_is_told_in_every_row(row: Row, silent_on_08: bool, library: str) -> None:
+    result = play(row, library, mute=silent_on_08, timeout=TIMEOUT, bound=BOUND)
     assert result.verdict.keeps(row.must), result
     assert result.recovery.wrong == 0, result
     assert result.recovery.seconds is not None, result
 
 
-def test_no_fault_of_the_simulator_makes_an_answer_wrong() -> None:
-    tally = spoilt("drivebus", ALL, reads=60)
+@LIBRARY
+def test_no_fault_of_the_simulator_makes_an_answer_wrong(library: str) -> None:
+    tally = spoilt(library, ALL, reads=60)
     assert tally.hits > 0, tally
     assert tally.ends["wrong"] == tally.ends["hung"] == 0, tally
