@@ -93,3 +93,8 @@ __all__ = [
     "rtu",
     "sim",
 ]
+
+
+def __dir__() -> list[str]:
+    """The public names; how the package is cut into modules is its own affair."""
+    return sorted(__all__)

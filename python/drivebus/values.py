@@ -56,8 +56,8 @@ Value = int | float
 """A value in engineering units: float where the drive measures, int where it counts, `Choice` where it names."""
 
 
-class State(Enum):
-    """What the drive is doing, from its first status word."""
+class State(str, Enum):
+    """What the drive is doing, from its first status word. It equals its name: `State.STOPPED == "stopped"`."""
 
     FORWARD = "forward"
     REVERSE = "reverse"
@@ -80,9 +80,12 @@ class State(Enum):
     def __str__(self) -> str:
         return self.value.replace("_", " ")
 
+    def __format__(self, form: str) -> str:
+        return format(str(self), form)
 
-class ControlSource(Enum):
-    """Where the drive takes its run command from."""
+
+class ControlSource(str, Enum):
+    """Where the drive takes its run command from. It equals its name: `ControlSource.KEYPAD == "keypad"`."""
 
     KEYPAD = "keypad"
     TERMINAL = "terminal"
@@ -90,6 +93,9 @@ class ControlSource(Enum):
 
     def __str__(self) -> str:
         return self.value
+
+    def __format__(self, form: str) -> str:
+        return format(str(self), form)
 
 
 @dataclass(frozen=True)

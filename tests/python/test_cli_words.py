@@ -124,7 +124,7 @@ def test_no_answer_is_no(monkeypatch: pytest.MonkeyPatch, answer: str) -> None:
     """The end of the input too, Ctrl-D on a terminal."""
     monkeypatch.setattr("click.testing._NamedTextIOWrapper.isatty", lambda _: True, raising=False)
     result = CliRunner().invoke(cli, ["--port", SIM, "reset"], input=answer)
-    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, "Error: nothing was written")
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, "Cancelled. Nothing was written.")
 
 
 def test_an_interrupt_has_its_own_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

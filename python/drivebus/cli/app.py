@@ -16,6 +16,7 @@ import click
 
 import drivebus
 from drivebus.cli import backup, doctor, explain, frames, monitor, move, profiles, reading, tools
+from drivebus.cli.anywhere import in_front
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
@@ -52,6 +53,20 @@ def _quoted_as_letters() -> Iterator[None]:
         raise
 
 
+_GROUPS: dict[str, tuple[Any, ...]] = {
+    "Look": (reading, monitor),
+    "Move, write": (move,),
+    "Keep": (backup,),
+    "Find out": (explain, doctor, profiles),
+    "Tools": (frames, tools),
+}
+
+
+def _first_sentence(command: click.Command) -> str:
+    """What *command* does, in one sentence."""
+    return (command.help or "").split("\n\n")[0].replace("\n", " ").split(". ")[0].rstrip(".")
+
+
 class _Commands(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
 
@@ -59,6 +74,17 @@ class _Commands(click.Group):
         """Takes the words before the command."""
         with _quoted_as_letters():
             return super().make_context(*args, **extra)
+
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Takes the options of the whole program behind the command, too."""
+        return super().parse_args(context, in_front(self, context, args))
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """Shows the commands in groups, each with its first sentence."""
+        for title, modules in _GROUPS.items():
+            commands = [command for module in modules for command in module.COMMANDS]
+            with formatter.section(title):
+                formatter.write_dl([(str(each.name), _first_sentence(each)) for each in commands])
 
     def invoke(self, context: click.Context) -> Any:
         """Runs the command."""
@@ -95,9 +121,9 @@ class _Commands(click.Group):
     },
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
-    "Options before the command can stand in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, DRIVEBUS_FORMAT, "
-    "DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_READ_ONLY, DRIVEBUS_VARIANT, "
-    "DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
+    "These options may stand before the command or behind it, and in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
+    "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_READ_ONLY, "
+    "DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
@@ -205,9 +231,10 @@ def cli(
     )
 
 
-for module in (reading, monitor, explain, doctor, move, backup, frames, profiles, tools):
-    for command in module.COMMANDS:
-        cli.add_command(command)
+for modules in _GROUPS.values():
+    for module in modules:
+        for command in module.COMMANDS:
+            cli.add_command(command)
 
 
 def main() -> None:

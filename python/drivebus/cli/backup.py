@@ -28,13 +28,15 @@ _file = Place(dir_okay=False, path_type=Path)
 @click.command()
 @click.argument("file", type=_file)
 @click.option("--fresh", is_flag=True, help="Begin anew, whatever an interrupted backup left behind.")
-@click.option("--force", is_flag=True, help="Replace a FILE that is another drive's, or no backup.")
+@click.option("--force", is_flag=True, help="Replace a FILE that is there: an older backup, or no backup.")
 @pass_session
 def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
-    """Read every parameter into FILE, a text for people and version control. Writes nothing to the drive.
+    """Read every parameter the profile knows into FILE, a text for people and version control.
 
-    Interrupted, the same command goes on where it was. Passwords are not read.
+    Writes nothing to the drive. Interrupted, the same command goes on where it was. Passwords are not read.
     """
+    if not force:
+        _keep_older(file)
     with session.drive() as drive, _progress(session, "reading") as progress:
         kept = drive.backup(file, not fresh, progress, force=force)
     if session.out.as_json:
@@ -49,6 +51,21 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     if kept.unread:
         session.out.say(f"Not read: {len(kept.unread)}.")
         session.out.rows(["code", "reason"], kept.unread.items())
+
+
+def _keep_older(file: Path) -> None:
+    """Refuses to replace a backup that is complete: it may be the one that is wanted some day."""
+    try:
+        older = drivebus.Backup.load(file)
+    except drivebus.DrivebusError:
+        return  # there is none; or whatever it is, taking the backup says so
+    origin = older.origin
+    # Where its replacement was begun, that goes on.
+    if older.complete and not file.with_name(f"{file.name}.part").exists():
+        raise drivebus.NotAllowed(
+            f"{file} has a backup already: {len(older)} parameters of unit {origin.unit}, {origin.title}, begun "
+            f"{origin.taken:%Y-%m-%d %H:%M} UTC; give another name, or --force to replace it; nothing was read"
+        )
 
 
 @click.command()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import click
 
 import drivebus
+from drivebus import State
 from drivebus.cli import names
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
@@ -45,8 +47,9 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
         session.ask(f"This starts the motor {way} {speed}", yes)
         drive.run(hz, reverse=reverse, force=force)
         if wait is not None:
-            drive.wait_for_speed(timeout=wait)
-        _done(session, drive, "run")
+            with _told_that_it_runs(session, drive):
+                drive.wait_for_speed(timeout=wait)
+        _done(session, drive, "run", State.REVERSE if reverse else State.FORWARD)
 
 
 @click.command()
@@ -59,7 +62,7 @@ def stop(session: Session, wait: float | None) -> None:
         drive.stop()
         if wait is not None:
             drive.wait_until_stopped(timeout=wait)
-        _done(session, drive, "stop")
+        _done(session, drive, "stop", State.STOPPED)
 
 
 @click.command()
@@ -213,8 +216,28 @@ def _say_lost(text: str) -> None:
     remark(text)
 
 
-def _done(session: Session, drive: drivebus.Drive, command: str) -> None:
-    """Says what the drive does now. What it does not tell is no error of *command*, which was confirmed."""
+@contextmanager
+def _told_that_it_runs(session: Session, drive: drivebus.Drive) -> Iterator[None]:
+    """Whoever ends a wait by Ctrl-C is told that the motor goes on, and how to stop it."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        doing = ""
+        with suppress(drivebus.DrivebusError):
+            status = drive.status()
+            if not status.state.running:
+                raise
+            doing = f" ({status.state}{'' if status.frequency is None else f', {status.frequency:.2f} Hz'})"
+        if hasattr(error, "add_note"):
+            error.add_note(f"The motor keeps running{doing}: `{session.command('stop')}` stops it.")
+        raise
+
+
+def _done(session: Session, drive: drivebus.Drive, command: str, towards: State | None = None) -> None:
+    """Says what the drive does now, on its way *towards* a state if it is not there yet.
+
+    What it does not tell is no error of *command*, which was confirmed.
+    """
     status: drivebus.Status | None = None
     try:
         status = drive.status()
@@ -226,7 +249,15 @@ def _done(session: Session, drive: drivebus.Drive, command: str) -> None:
             {"command": command, "unit": drive.unit, **{name: getattr(status, name, None) for name in told}}
         )
     elif status is not None:
-        session.out.say(f"unit {drive.unit}: {status}")
+        session.out.say(f"unit {drive.unit}: {_on_the_way(status, towards) or status}")
+
+
+def _on_the_way(status: drivebus.Status, towards: State | None) -> str | None:
+    """What the motor does that turns, but not as it was told yet; None where it does."""
+    if towards is None or not status.state.running or status.state is towards:
+        return None
+    doing = "stopping" if towards is State.STOPPED else "reversing"
+    return doing if status.frequency is None else f"{doing}, {status.frequency:.2f} Hz"
 
 
 COMMANDS = [run, stop, coast, jog, reset, prepare, write]

@@ -75,7 +75,7 @@ class Output:
         for name, value in values.items():
             if value is not None and value != "":
                 table.add_row(show(name.replace("_", " ")), show(value))
-        self.console.print(table)
+        self._lay_out(table)
 
     def rows(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
         """Several things of one kind: a JSON object each, or a table."""
@@ -92,7 +92,17 @@ class Output:
                 self.console.print()
                 self.facts(dict(zip(columns, row, strict=True)))
             return
-        self.console.print(table)
+        self._lay_out(table)
+
+    def _lay_out(self, table: Table) -> None:
+        """Shows *table*, in a file or a pipe without the blanks that fill its last column."""
+        if self.console.is_terminal:
+            self.console.print(table)
+            return
+        with self.console.capture() as laid_out:
+            self.console.print(table)
+        for line in laid_out.get().splitlines():
+            self.console.print(line.rstrip(), markup=False)
 
     @staticmethod
     def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:

@@ -39,14 +39,21 @@ def scan(session: Session, units: str, timeout: float | None) -> None:
     """Find the drives on the line, by one read each."""
     wanted = names.parse_units(units)
     count = 0
-    with session.bus() as bus, Progress(transient=True, disable=not session.out.live) as progress:
+    # On the console that the lines go to, so that they stand above the bar.
+    bar = Progress(console=session.out.console, transient=True, disable=not session.out.live)
+    with session.bus() as bus, bar as progress:
+        began = bus.now()
         task = progress.add_task("asking", total=len(wanted))
         for unit in wanted:
             for found in bus.scan([unit], timeout):
                 count += 1
                 _show_found(session, found)
             progress.advance(task)
-    if not count:
+        took = bus.now() - began
+    if count:
+        units_found = f"{count} unit{'' if count == 1 else 's'}"
+        session.out.say(f"{units_found}, {len(wanted) - count} silent, {took:.0f} s")
+    else:
         remark(
             "Error: no unit answered. Check wiring (A/B), baud rate and format (factory setting of a Goodrive: "
             f"19200 8E1, unit 1). Or let `{session.doctor()}` look."

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import IO, Any
 
 import click
 
@@ -46,9 +46,13 @@ DEFAULT_FORMAT = ("8", "E", "1")
 
 
 class _Declined(click.ClickException):
-    """What moves a motor was not wanted, or nobody was there to be asked."""
+    """What moves a motor was not wanted."""
 
     exit_code = 2
+
+    def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - it goes to standard error in any case
+        """Says so: it is not an error."""
+        remark(self.message)
 
 
 @dataclass
@@ -169,6 +173,19 @@ class Session:
             if problems > 1:
                 remark(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`")
 
+    def command(self, name: str) -> str:
+        """The command *name* for the same drive, as it can be typed."""
+        words = ["drivebus", "--port", shlex.quote(str(self.port))]
+        if self.baud != DEFAULT_BAUD:
+            words.append(f"--baud {self.baud}")
+        if self.line_format != DEFAULT_FORMAT:
+            words.append(f"--format {''.join(self.line_format)}")
+        if self.unit != 1:
+            words.append(f"--unit {self.unit}")
+        if self.profile is not None:
+            words.append(f"--profile {shlex.quote(self.profile)}")
+        return " ".join([*words, name])
+
     def doctor(self, unit: int | None = None) -> str:
         """The command that looks at the same line, and at *unit*."""
         words = ["drivebus", "doctor", shlex.quote(str(self.port))]
@@ -197,14 +214,14 @@ class Session:
             return
         # Who closed standard input has none at all.
         if sys.stdin is None or not sys.stdin.isatty():
-            raise _Declined("without a terminal this needs --yes; nothing was written")
+            raise click.UsageError("without a terminal this needs --yes; nothing was written")
         try:
-            wanted = click.confirm("Is the machine clear, and shall it be done?", err=True)
+            wanted = click.confirm("Is the machine clear? Go ahead?", err=True)
         except click.Abort:
             remark()
             wanted = False
         if not wanted:
-            raise _Declined("nothing was written")
+            raise _Declined("Cancelled. Nothing was written.")
 
 
 pass_session = click.make_pass_decorator(Session)
