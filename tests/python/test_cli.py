@@ -184,7 +184,7 @@ class TestMoving:
     def test_a_drive_that_does_not_obey_is_exit_2(self) -> None:
         result = run("run", "10", "--yes")
         assert result.exit_code == 2
-        assert "prepare_control" in result.stderr
+        assert "`drivebus prepare`" in result.stderr
 
     def test_prepare_sets_the_drive_to_obey(self, pty: drivebus.Simulator) -> None:
         before = rows(run("--json", "info", port=pty.port))[0]

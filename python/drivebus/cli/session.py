@@ -14,6 +14,7 @@ from typing import IO, Any
 import click
 
 import drivebus
+from drivebus.cli.advice import in_commands
 from drivebus.cli.output import Output, remark
 
 __all__ = [
@@ -259,4 +260,4 @@ def tell(error: drivebus.DrivebusError, about: str = "") -> None:
     """Says *error* on standard error; *about* is what it is the error of, where it was one of several."""
     # Notes say what was done before; Python 3.10 has none.
     for line in (f"Error: {about + ': ' if about else ''}{error}", *getattr(error, "__notes__", ())):
-        remark(line)
+        remark(in_commands(line))
