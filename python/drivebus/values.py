@@ -291,6 +291,23 @@ class Description:
         """The group of a parameter, as its code says it; empty for a register."""
         return group_of(self.code or "")
 
+    def text(self, value: Value) -> str:
+        """*value* as people read it: with as many digits after the point as the drive counts, or with its label."""
+        if isinstance(value, Choice):
+            return f"{int(value)} = {value.label}"
+        return counted(value, self.scale)
+
+
+def counted(value: Value, scale: float) -> str:
+    """*value* with as many digits after the point as a drive counts that has *scale* counts per unit."""
+    if isinstance(value, int):
+        return str(int(value))
+    digits = 0
+    while digits < 9 and 10**digits < scale:
+        digits += 1
+    shown = f"{value:.{digits}f}"
+    return shown if float(shown) == value else repr(value)
+
 
 def group_of(code: str) -> str:
     """The group that the code of a parameter names: `P05` of P05.06, `C1` of C1-01, `ACC` of ACC."""

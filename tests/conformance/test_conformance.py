@@ -22,17 +22,20 @@ TIMEOUT = 0.4
 BOUND = 60.0
 
 LIBRARY = pytest.mark.parametrize("library", ["drivebus", "drivebus_shared"])
-SILENT = pytest.mark.parametrize("silent_on_08", [False, True], ids=["08H", "no 08H"])
+UNIT = pytest.mark.parametrize(
+    ("library", "silent_on_08"),
+    [("drivebus", False), ("drivebus", True), ("drivebus_shared", False)],
+    ids=["08H", "no 08H", "shared"],
+)
 
 
 def test_the_judge_knows_the_check_value_of_crc_16_modbus() -> None:
     assert wire.crc(b"123456789") == bytes.fromhex("37 4B")
 
 
-@LIBRARY
-@SILENT
+@UNIT
 @pytest.mark.parametrize("row", ROWS, ids=[row.key for row in ROWS])
-def test_the_truth_is_told_in_every_row(row: Row, silent_on_08: bool, library: str) -> None:
+def test_the_truth_is_told_in_every_row(row: Row, library: str, silent_on_08: bool) -> None:
     result = play(row, library, mute=silent_on_08, timeout=TIMEOUT, bound=BOUND)
     assert result.verdict.keeps(row.must), result
     assert result.recovery.wrong == 0, result

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import overload
 
 from drivebus.backup.rules import Rules
-from drivebus.backup.text import number, worded
+from drivebus.backup.text import worded
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
-from drivebus.values import Choice, Value
+from drivebus.values import Choice, Value, counted
 
 __all__ = ["Diff", "Difference", "Side", "amount", "compare", "factory", "shown"]
 
@@ -152,5 +152,5 @@ def shown(value: Value) -> str:
 def amount(profile: Profile, code: str, value: Value) -> str:
     """*value* of *code* with its unit."""
     known = profile.describe(code)
-    text = shown(value) if isinstance(value, Choice) else number(value, known.scale)
+    text = shown(value) if isinstance(value, Choice) else counted(value, known.scale)
     return f"{text} {known.unit}".rstrip()

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from drivebus import checks
-from drivebus.backup.text import number
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
-from drivebus.values import Description
+from drivebus.values import Description, counted
 
 __all__ = ["FIELDS", "Wrong", "word"]
 
@@ -80,14 +79,14 @@ def _known(profile: Profile, code: str) -> Description:
 
 
 def _example(profile: Profile, known: Description) -> str:
-    shown = number(profile.decode(known.code or "", 0), known.scale)
+    shown = counted(profile.decode(known.code or "", 0), known.scale)
     unit = f', unit = "{known.unit}"' if known.unit else ""
     return f"{{ value = {shown}{unit}, raw = 0 }}"
 
 
 def _disagree(profile: Profile, known: Description, value: float, raw: int) -> str:
     code, unit = known.code or "", f" {known.unit}" if known.unit else ""
-    means = number(profile.decode(code, raw), known.scale)
+    means = counted(profile.decode(code, raw), known.scale)
     return (
         f"{code}: value {value}{unit} and raw {raw} do not agree: raw {raw} is {means}{unit}. Change both, or take "
         "`raw` out"

@@ -12,12 +12,12 @@ from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.profile.plan import labelled
-from drivebus.values import Choice, Value
+from drivebus.values import Choice, Value, counted
 
 if TYPE_CHECKING:
     from drivebus.backup.model import Backup
 
-__all__ = ["FORMAT", "number", "printable", "text", "worded"]
+__all__ = ["FORMAT", "printable", "text", "worded"]
 
 FORMAT = 1
 
@@ -74,7 +74,7 @@ def _line(backup: Backup, code: str, is_set: bool) -> str:
     profile, raw = backup.profile, backup.raw[code]
     known = profile.describe(code)
     value = worded(profile, code, raw)
-    fields = {"value": number(value, known.scale), "raw": str(raw)}
+    fields = {"value": counted(value, known.scale), "raw": str(raw)}
     if known.unit:
         fields = {"value": fields["value"], "unit": _toml(known.unit), "raw": fields["raw"]}
     if is_set and known.evidence != "verified" and code in backup.told:
@@ -97,17 +97,6 @@ def _is_beyond(profile: Profile, code: str, raw: int) -> bool:
     except NotAllowed:
         return True
     return False
-
-
-def number(value: Value, scale: float) -> str:
-    """*value* with as many digits after the point as the drive counts."""
-    if isinstance(value, int):
-        return str(int(value))
-    digits = 0
-    while digits < 9 and 10**digits < scale:
-        digits += 1
-    shown = f"{value:.{digits}f}"
-    return shown if float(shown) == value else repr(value)
 
 
 def worded(profile: Profile, code: str, raw: int) -> Value:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext
+from datetime import datetime, timezone
 from typing import Any
 
 import click
@@ -100,7 +101,8 @@ class _Seen:
         elif self._out.as_json:
             self._out.record(self._record(sample))
         else:
-            self._out.say(f"{sample.time:.3f} {self._line(sample)}")
+            moment = datetime.fromtimestamp(sample.time, timezone.utc).isoformat(timespec="milliseconds")
+            self._out.say(f"{moment} {self._line(sample)}")
 
     def told(self, poll: drivebus.Poll, interval: float) -> Iterator[str]:
         """What is to be said of *poll* when it is over."""
@@ -113,7 +115,8 @@ class _Seen:
             yield f"{poll.dropped} samples came faster than they were taken, and are left out."
 
     def _table(self, sample: drivebus.Sample) -> Group:
-        rows = [[name, sample.get(name), row.unit, self._doubtful.get(name)] for name, row in self._known.items()]
+        came = {name: None if sample.missing else row.text(sample[name]) for name, row in self._known.items()}
+        rows = [[name, came[name], row.unit, self._doubtful.get(name)] for name, row in self._known.items()]
         table = self._out.table(["register", "value", "unit", ""], rows)
         return Group(table, Text("" if sample.missing is None else printable(f"missing: {sample.missing}")))
 
@@ -127,7 +130,7 @@ class _Seen:
         if sample.missing is not None:
             return f"missing: {sample.missing}"
         return " ".join(
-            f"{name}={sample[name]}{row.unit}{f' [{self._doubtful[name]}]' if name in self._doubtful else ''}"
+            f"{name}={row.text(sample[name])}{row.unit}{f' [{self._doubtful[name]}]' if name in self._doubtful else ''}"
             for name, row in self._known.items()
         )
 

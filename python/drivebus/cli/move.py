@@ -165,7 +165,10 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
         rows: list[list[Any]] = []
         for name in wanted:
             known = drive.describe(name)
-            rows.append([known.code or known.name, now.get(name), known.unit, known.label])
+            shown = now.get(name)
+            if shown is not None and not session.out.as_json:
+                shown = known.text(shown)
+            rows.append([known.code or known.name, shown, known.unit, known.label])
             if name in before and before[name] == now.get(name):
                 kept.append(known.code or known.name)
         rows += [[f"{place:04X}H", word, "", "unknown register, not read back"] for place, word in words.items()]

@@ -8,6 +8,7 @@ lets ESC pass, click takes away the sequences it knows, and only where there is 
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
@@ -25,6 +26,8 @@ __all__ = ["Output", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 _NO_LIMIT = 10_000
 """Characters that no line has."""
@@ -110,11 +113,16 @@ class Output:
         kept = [list(row) for row in rows]
         table = Table(box=None, header_style="bold", pad_edge=False)
         for index, name in enumerate(columns):
-            numeric = bool(kept) and all(isinstance(row[index], (int, float)) for row in kept)
+            numeric = bool(kept) and all(_is_number(row[index]) for row in kept)
             table.add_column(name.replace("_", " "), justify="right" if numeric else "left", overflow="fold")
         for row in kept:
             table.add_row(*(show(cell) for cell in row))
         return table
+
+
+def _is_number(cell: Any) -> bool:
+    """Whether *cell* is a number, or shows one."""
+    return isinstance(cell, (int, float)) or (isinstance(cell, str) and _NUMBER.fullmatch(cell) is not None)
 
 
 def _takes_everything(encoding: str | None) -> bool:

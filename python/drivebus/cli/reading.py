@@ -184,7 +184,8 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
         for place in places:
             row = _described(drive, place)
             try:
-                row["value"] = _value(drive, place, row, verify)
+                row["value"] = value = _value(drive, place, row, verify)
+                row["text"] = str(value) if isinstance(place, int) else drive.describe(place).text(value)
             except drivebus.DrivebusError as error:
                 failed.append((row["name"], error))
                 row |= {"error": str(error), "exit_code": exit_code(error)}
@@ -218,6 +219,7 @@ def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
     """Every row as JSON; for people, those that came."""
     if out.as_json:
         for row in rows:
+            row.pop("text", None)
             out.record(row)
         return
     came = [row for row in rows if "error" not in row]
@@ -225,7 +227,7 @@ def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
     if all(row["evidence"] in ("verified", None) for row in came):
         columns.remove("evidence")
     if came:
-        out.rows(columns, [[row[column] for column in columns] for row in came])
+        out.rows(columns, [[row["text" if column == "value" else column] for column in columns] for row in came])
 
 
 COMMANDS = [ports, scan, info, status, read]
