@@ -46,6 +46,8 @@ def line(folder: Path) -> Iterator[Simulator]:
 
 
 def open_bus(line: Simulator, **how: object) -> Bus:
+    """A bus, by default with a time-out that no answer reaches, however busy the machine is."""
+    how = {"timeout": 5.0, **how}
     return Bus(line.port, baudrate=115_200, parity="N", **how)  # type: ignore[arg-type]  # as the test has it
 
 
