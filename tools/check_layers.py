@@ -38,6 +38,7 @@ LINE_ROOMS = [
     "by_unit",
     "system",
     "turns",
+    "trace",
     "options",
     "ask",
     "ports",

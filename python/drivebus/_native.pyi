@@ -5,7 +5,7 @@ Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing wa
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Generic, TypeVar, final
 
 from typing_extensions import Buffer
@@ -177,6 +177,12 @@ class Bus:
         """Whether the line's clock is a simulation's, which moves only while somebody waits."""
     @property
     def read_only(self) -> bool: ...
+    def watch(self, function: Callable[[float, float | None, bool, bytes, bool], object] | None, /) -> None:
+        """Calls *function* for each frame on the line from now on, or nothing any more.
+
+        It is given the moment on the line's clock and the time since what went before, both in seconds, whether the
+        frame was sent, its bytes, and whether another program has the port.
+        """
     def close(self) -> None:
         """Closes the port. Closing again does nothing."""
     def now(self) -> float:

@@ -21,6 +21,7 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Sample
 from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.line.trace import Trace
 from drivebus.operations.program_end import end_over
 from drivebus.poll import Poll
 from drivebus.profile import Profile
@@ -71,6 +72,7 @@ class Bus(BusFace, Requests):
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
         self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
+        Trace(self._native, opening.known).as_asked_for()
         Requests.__init__(self, self._native, opening.known)
 
     def _core(self) -> _native.Bus:

@@ -5,6 +5,7 @@ Ports of real hardware and the real-time simulator are replaced by a simulated d
 
 from __future__ import annotations
 
+import logging
 import re
 from pathlib import Path
 
@@ -33,7 +34,10 @@ def blocks() -> list[object]:
 
 @pytest.mark.parametrize("block", blocks())
 def test_python_blocks_run(block: str, capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(PORT.sub('"sim://gd350?clock=virtual"', block), "<page>", "exec"), {"__name__": "page"})
+    try:
+        exec(compile(PORT.sub('"sim://gd350?clock=virtual"', block), "<page>", "exec"), {"__name__": "page"})
+    finally:
+        logging.getLogger("drivebus").setLevel(logging.NOTSET)
     assert capsys.readouterr().out, "a block shows something"
 
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions};
+use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
 use drivebus_rtu::{Answer, Destination, Instant, Request};
 
 use crate::builder::Builder;
@@ -248,6 +248,28 @@ impl Bus {
     /// Counters and latencies since the bus was opened, for the line and for each unit.
     pub fn stats(&self) -> Stats {
         self.core.stats()
+    }
+
+    /// Shows each frame that goes over the line to `watch` from now on, or to nobody any more.
+    ///
+    /// It is called in the thread that uses the line, while it does: what it takes, the next request waits. See
+    /// [`Traced`](crate::line::Traced) for what it is shown.
+    ///
+    /// ```
+    /// use std::sync::{Arc, Mutex};
+    ///
+    /// # #[cfg(feature = "sim")] {
+    /// let bus = drivebus::Bus::open("sim://gd350?clock=virtual")?;
+    /// let shown = Arc::new(Mutex::new(Vec::new()));
+    /// let show = Arc::clone(&shown);
+    /// bus.watch(Some(Arc::new(move |frame| show.lock().unwrap().push(frame.to_string()))));
+    /// bus.read(1, 0x2103, 1)?;
+    /// assert!(shown.lock().unwrap().last().unwrap().ends_with("<- 01 03 02 01 A0 B9 AC"));
+    /// # }
+    /// # Ok::<(), drivebus::Error>(())
+    /// ```
+    pub fn watch(&self, watch: Option<Watch>) {
+        self.core.watch(watch);
     }
 
     /// What the user should know about the line, such as a setting that did not reach the wire.

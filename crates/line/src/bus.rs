@@ -38,6 +38,7 @@ use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
 use crate::ports::key::PortKey;
+use crate::trace::Watch;
 
 /// One line and its owner.
 ///
@@ -186,6 +187,17 @@ impl Bus {
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
     pub fn sleep(&self, time: Duration, give_up: &mut dyn FnMut() -> bool) {
         self.shared.sleep(time, give_up);
+    }
+
+    /// Shows each frame that goes over the line to `watch` from now on, or to nobody any more.
+    ///
+    /// `watch` is called in the thread that uses the line, while it does: what it takes, the next request waits. Where
+    /// another program has the port, it is shown what this bus asks there and what comes of it. A bus that nobody ever
+    /// watched does nothing for it.
+    pub fn watch(&self, watch: Option<Watch>) {
+        if self.shared.is_of_this_process() {
+            self.shared.watch(watch);
+        }
     }
 
     /// What has happened so far; nothing in a forked child, whose parent's it is.

@@ -38,6 +38,7 @@
 //! | `by_unit` | what is kept of each unit |
 //! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
 //! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
+//! | `trace` | the frames on a line, for whoever watches it |
 //! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
 //! | `ports` | the lines that a machine has: serial ports and their adapters, serial servers, Modbus TCP |
 //! | `health` | what is counted, how well each unit is reached, and what the figures most likely mean |
@@ -61,6 +62,7 @@ mod ports;
 #[cfg(all(unix, feature = "share"))]
 mod share;
 mod system;
+mod trace;
 mod turns;
 
 pub use ask::Done;
@@ -90,4 +92,5 @@ pub use ports::{mbap, tcp};
 #[cfg(feature = "serial")]
 pub use ports::{rs485, tty};
 pub use system::clock;
+pub use trace::{Direction, Traced, Watch};
 pub use turns::order::Priority;

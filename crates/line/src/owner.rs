@@ -28,6 +28,7 @@ use crate::owner::exchange::exchange;
 use crate::owner::longer_reads::Longer;
 use crate::owner::opener::LineOpener;
 use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
+use crate::trace::{Trace, Watched};
 
 /// What to do next for a request.
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +73,8 @@ pub(crate) struct Owner {
     pub(crate) dead: DeadUnits,
     words: Arc<FreshWords>,
     stats: Arc<Mutex<Stats>>,
+    /// Where somebody watches the line, or has.
+    trace: Option<Trace>,
 }
 
 impl std::fmt::Debug for Owner {
@@ -106,6 +109,7 @@ impl Owner {
             dead: DeadUnits::default(),
             words,
             stats,
+            trace: None,
         }
     }
 
@@ -194,7 +198,18 @@ impl Owner {
         }
         self.clock = line.clock();
         self.lumps = Lumps::of(line.as_ref());
-        self.line = Some(line);
+        self.line = Some(match &self.trace {
+            Some(trace) => Box::new(Watched::new(line, trace.clone())),
+            None => line,
+        });
+    }
+
+    /// From now on `trace` has what goes over the line, this one and those that are opened later.
+    pub(crate) fn show_to(&mut self, trace: &Trace) {
+        if self.trace.is_none() {
+            self.trace = Some(trace.clone());
+            self.line = self.line.take().map(|line| Box::new(Watched::new(line, trace.clone())) as Box<dyn Line>);
+        }
     }
 
     /// What comes before `ask`, so that what is taken for its answer can only be its answer.

@@ -17,6 +17,7 @@ use crate::convert::{bytes_of, one_word, unit_address, words_of};
 use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::trace;
 
 /// One line and its owner.
 #[pyclass(frozen, module = "drivebus._native")]
@@ -86,6 +87,13 @@ impl Bus {
     #[getter]
     fn read_only(&self) -> bool {
         self.core.options().read_only
+    }
+
+    /// Calls `function` for each frame on the line, or nothing any more.
+    #[pyo3(signature = (function, /))]
+    fn watch(&self, py: Python<'_>, function: Option<Py<PyAny>>) {
+        let watch = function.map(trace::watch);
+        detached(py, || self.core.watch(watch));
     }
 
     fn close(&self, py: Python<'_>) {
@@ -344,15 +352,18 @@ pub(crate) fn with_signals<T: Send>(
             let Ok(mut raised) = raised.lock() else { return true };
             // The first is the one that counts; what comes after it, the interpreter raises when this has ended.
             if raised.is_none() {
+                *raised = trace::take_raised();
+            }
+            if raised.is_none() {
                 *raised =
                     Inside::enter().and_then(|_inside| Python::try_attach(|py| py.check_signals().err()).flatten());
             }
             raised.is_some()
         })
     });
-    match raised.into_inner() {
-        Ok(Some(error)) => Err(error),
-        _ => Ok(result),
+    match raised.into_inner().ok().flatten().or_else(trace::take_raised) {
+        Some(error) => Err(error),
+        None => Ok(result),
     }
 }
 

@@ -23,6 +23,7 @@ mod requests;
 mod sim;
 mod sim_line;
 mod tables;
+mod trace;
 
 /// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]

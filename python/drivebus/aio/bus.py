@@ -24,6 +24,7 @@ from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
+from drivebus.line.trace import Trace
 from drivebus.operations.face import documented_by
 from drivebus.operations.program_end import end_over
 from drivebus.profile import Profile
@@ -71,6 +72,7 @@ class Bus(BusFace):
                 opening.owned.close()
             raise
         self._native = line.native
+        Trace(line.native, opening.known).as_asked_for()
         self._line = line
         self._requests = AwaitedRequests(line, opening.known)
         return self

@@ -17,6 +17,7 @@ import click
 import drivebus
 from drivebus.cli import backup, doctor, explain, frames, monitor, move, profiles, reading, tools
 from drivebus.cli.anywhere import in_front
+from drivebus.cli.frames import show_frames
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
@@ -123,7 +124,7 @@ class _Commands(click.Group):
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
     "These options may stand before the command or behind it, and in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
     "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_READ_ONLY, "
-    "DRIVEBUS_VARIANT, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
+    "DRIVEBUS_VARIANT, DRIVEBUS_TRACE, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
@@ -202,6 +203,13 @@ class _Commands(click.Group):
     shell_complete=complete_variant,
     help="What a parameter of the drive makes of its registers, such as speed_unit=Hz.",
 )
+@click.option(
+    "--trace",
+    "-v",
+    is_flag=True,
+    envvar="DRIVEBUS_TRACE",
+    help="Show each frame on the line, with its meaning, on standard error.",
+)
 @click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="One JSON object a line.")
 @click.version_option(drivebus.__version__, prog_name="drivebus")
 @click.pass_context
@@ -217,6 +225,7 @@ def cli(
     unverified: bool,
     read_only: bool,
     variants: dict[str, str],
+    trace: bool,
     as_json: bool,
 ) -> None:
     """Control and watch variable-frequency drives over RS-485.
@@ -225,6 +234,8 @@ def cli(
     """
     if trust_profile and profile is None:
         raise click.UsageError("--trust-profile is for a profile that is named: give --profile too")
+    if trace:
+        show_frames(context)
     out = Output(as_json)
     context.obj = Session(
         port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile, read_only

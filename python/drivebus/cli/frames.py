@@ -1,20 +1,53 @@
-"""Frames by hand: what the serial assistants of the manuals do, with the CRC added and checked."""
+"""Frames: by hand, as with the serial assistants of the manuals, and those that other commands send and hear."""
 
 from __future__ import annotations
+
+import logging
+from contextlib import suppress
+from datetime import datetime
 
 import click
 
 import drivebus
 from drivebus.cli import names
+from drivebus.cli.output import remark
 from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.line.trace import LOGGER as TRACE_LOGGER
 
-__all__ = ["COMMANDS"]
+__all__ = ["COMMANDS", "show_frames"]
 
 _READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x08, 0x0B, 0x0C, 0x11, 0x14, 0x18})
 """Function codes that change nothing in a unit, as the core has them; of 08H, most of its sub-functions."""
 
 _DIAGNOSTICS = frozenset({0x00, 0x02, *range(0x0B, 0x13)})
 """Sub-functions of 08H that only tell something."""
+
+
+class _Shown(logging.Handler):
+    """Shows each frame as a line on standard error, with the time of day."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Shows the frame of *record*."""
+        time = datetime.fromtimestamp(record.created).astimezone().isoformat(sep=" ", timespec="microseconds")
+        # Whoever has gone and reads it no more must not keep a stop from being sent.
+        with suppress(OSError):
+            remark(f"{time[11:26]} {record.getMessage()}")
+
+
+def show_frames(context: click.Context) -> None:
+    """Shows each frame that the command in *context* sends and hears."""
+    logger, shown = logging.getLogger(TRACE_LOGGER), _Shown()
+    before = logger.level, logger.propagate
+    logger.setLevel(logging.DEBUG)
+    logger.propagate = False
+    logger.addHandler(shown)
+
+    def end() -> None:
+        logger.removeHandler(shown)
+        logger.setLevel(before[0])
+        logger.propagate = before[1]
+
+    context.call_on_close(end)
 
 
 @click.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from drivebus import _native, checks
@@ -11,6 +11,7 @@ from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
 from drivebus.line import ports
 from drivebus.line.stats import Stats
+from drivebus.line.trace import Trace
 from drivebus.line.write_guard import KnownUnits
 from drivebus.sim import Simulator, core_of
 
@@ -97,6 +98,7 @@ class _Native(Protocol):
     def read_only(self) -> bool: ...
     @property
     def reconnects(self) -> int: ...
+    def watch(self, function: Callable[[float, float | None, bool, bytes, bool], object] | None, /) -> None: ...
     def now(self) -> float: ...
     def stats(self) -> dict[str, Any]: ...
     def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None: ...
@@ -147,6 +149,7 @@ class BusFace:
         self.simulator = opening.simulator
         self.format = opening.format
         self._timeout = opening.timeout
+        self._traced = opening.known
         self._begin(opening)
 
     def _begin(self, opening: Opening) -> None:
@@ -199,6 +202,20 @@ class BusFace:
         if gap is not None:
             gap = checks.number("gap", gap, 0.0, 3600.0)
         self._core().configure(checks.unit(unit), timeout=timeout, gap=gap)
+
+    def trace(self, on: bool = True) -> None:
+        """Logs each frame on the line from now on: time, gap, direction, bytes and what they mean.
+
+        Records go to the logger `drivebus.wire` with level DEBUG. A bus that is opened while that logger is enabled for
+        DEBUG logs from its beginning. Each record has the attributes `line_time` (seconds on the line's clock), `gap`
+        (seconds since the end of what went before, or None), `sent` (False: heard), `frame` (bytes), `meaning` (text)
+        and `elsewhere` (another program has the port: see docs/sharing.md). Whoever handles a record keeps the line
+        waiting meanwhile.
+
+        Args:
+            on: False ends it.
+        """
+        Trace(self._core(), self._traced).switch(checks.flag("on", on))
 
     @property
     def reconnects(self) -> int:

@@ -29,6 +29,11 @@ class KnownUnits:
         self._profiles.setdefault(unit, {})[profile.name] = profile
         _command_registers()  # now, so that no stop has to wait for it
 
+    def only(self, unit: int) -> Profile | None:
+        """The profile of *unit*, where it is known as one and no other."""
+        profiles = list(self._profiles.get(unit, {}).values())
+        return profiles[0] if len(profiles) == 1 else None
+
     def check(self, unit: int, address: int, words: int | Sequence[int], force: bool = False) -> None:
         """Raises `NotAllowed` if the words would command *unit* (0: any of them) what its family does not define."""
         if force or not self._profiles:

@@ -24,13 +24,14 @@ _PLANS_KEPT = 256
 class Profile:
     """What one family of drives means by its words. Immutable, and shared freely between drives and threads."""
 
-    __slots__ = ("_descriptions", "_names", "_native", "_plans")
+    __slots__ = ("_descriptions", "_names", "_native", "_places", "_plans")
 
     def __init__(self, native: _native.Profile) -> None:
         self._native = native
         self._names = native.names()
         self._descriptions: dict[str, Description] = {}
         self._plans: dict[tuple[str, ...], ReadPlan] = {}
+        self._places: dict[int | None, str] = {}
 
     @classmethod
     def builtin(cls, name: str) -> Profile:
@@ -173,7 +174,10 @@ class Profile:
 
     def name_at(self, address: int, /) -> str | None:
         """The register or parameter at *address* (0..0xFFFF), or None."""
-        return next((name for name in self._names if self.describe(name).address == address), None)
+        if not self._places:
+            # The first of two names for one place is the one that is meant.
+            self._places = {self.describe(name).address: name for name in reversed(self._names)}
+        return self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
         """All that is known of one register or parameter. NotAllowed names the closest for a misspelt one."""

@@ -23,6 +23,7 @@ use crate::ports::key::PortKey;
 use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
 use crate::system::process::Process;
 use crate::system::punctual;
+use crate::trace::{Trace, Watch};
 use crate::turns::order::Priority;
 use crate::turns::queue::{NoTurn, Queue, Stops, Turn};
 
@@ -46,6 +47,7 @@ pub(crate) struct Shared {
     closed: AtomicBool,
     opened_by: Process,
     clock: Clock,
+    pub(super) trace: Trace,
     /// Where the port is of a kind that programs share, and this one does.
     pub(super) sharing: Option<Arc<Sharing>>,
 }
@@ -84,6 +86,7 @@ impl Shared {
             closed: AtomicBool::new(false),
             opened_by: Process::current(),
             clock,
+            trace: Trace::default(),
             sharing,
         });
         if let Some(sharing) = &shared.sharing {
@@ -224,6 +227,15 @@ impl Shared {
     /// As [`now`](Self::now), without waiting for who uses the line: `None` where only the line knows, and it is in use.
     pub(crate) fn now_if_known(&self) -> Option<Instant> {
         self.clock.now().or_else(|| self.owner.try_lock().ok().map(|owner| owner.now()))
+    }
+
+    /// From now on `watch` has what goes over the line; from inside of it, from the next line on.
+    pub(super) fn watch(&self, watch: Option<Watch>) {
+        let shows = watch.is_some();
+        self.trace.set(watch);
+        if shows && !self.queue.has_this_thread() {
+            self.lock().show_to(&self.trace);
+        }
     }
 
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.

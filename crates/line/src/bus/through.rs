@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Adu, Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
@@ -17,6 +17,7 @@ use crate::share::failure::Said;
 use crate::share::guest::{Guest, Lost};
 use crate::share::message::{Order, Told, Wish, nanos};
 use crate::system::clock::monotonic;
+use crate::trace::{Direction, Traced};
 use crate::turns::order::Priority;
 use crate::turns::queue::Turn;
 
@@ -46,7 +47,7 @@ impl Shared {
                 }
             };
             let began = monotonic();
-            match self.call_through(&guest, &ask, options, give_up, take) {
+            match self.call_and_show(&guest, &ask, options, give_up, take) {
                 Ok(result) => return result,
                 Err(Lost::Unsent) => sharing.lost(&guest),
                 Err(Lost::Unknown) => {
@@ -78,6 +79,40 @@ impl Shared {
 
     fn lost_there(&self, ask: &Ask<'_>, kind: PortErrorKind, why: String, sent: Option<Instant>) -> Box<CallError> {
         ask.failed(Failure::Port(PortError::new(kind, &self.name, why)), sent, monotonic(), &[])
+    }
+
+    /// As [`call_through`](Self::call_through); who watches this bus is shown what was asked and what came of it.
+    fn call_and_show(
+        &self,
+        guest: &Guest,
+        ask: &Ask<'_>,
+        options: CallOptions,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Result<Done, Box<CallError>>, Lost> {
+        let Some(watch) = self.trace.watch() else { return self.call_through(guest, ask, options, give_up, take) };
+        let mut came = None;
+        let mut keep = |answer: Answer<'_>| {
+            if let Destination::Unit(unit) = ask.destination {
+                came = Some(Adu::answer(unit, &answer).as_bytes().to_vec());
+            }
+            take(answer);
+        };
+        let result = self.call_through(guest, ask, options, give_up, &mut keep)?;
+        let (sent, ended) = match &result {
+            Ok(done) => (Some(done.sent), Some(done.ended)),
+            Err(error) => (error.sent, error.ended),
+        };
+        if let Some(at) = sent {
+            let bytes = ask.frame();
+            watch(Traced { at, gap: None, direction: Direction::Sent, bytes, elsewhere: true });
+        }
+        let raw = result.as_ref().err().map(|error| error.raw.clone()).filter(|raw| !raw.is_empty());
+        if let (Some(at), Some(bytes)) = (ended, came.or(raw)) {
+            let gap = sent.map(|sent| at.saturating_duration_since(sent));
+            watch(Traced { at, gap, direction: Direction::Heard, bytes, elsewhere: true });
+        }
+        Ok(result)
     }
 
     /// What becomes of `ask` where the line is.

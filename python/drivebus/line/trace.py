@@ -1,0 +1,197 @@
+"""The frames on a line, as records of the logger `drivebus.wire`: time, gap, direction, bytes and meaning.
+
+What a frame means is said with the names of the unit's family where that is known. Nothing here sends or judges.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from drivebus import rtu
+from drivebus.errors import DrivebusError
+from drivebus.line.write_guard import KnownUnits
+from drivebus.profile import Profile
+from drivebus.values import Choice, Description
+
+__all__ = ["LOGGER", "Trace", "meaning"]
+
+LOGGER = "drivebus.wire"
+"""The logger that has a record of level DEBUG for each frame."""
+
+_SHOWN = 8
+"""So many registers of one frame are named; a poll reads more than a line of text holds."""
+
+
+class _Watched(Protocol):
+    """A bus of the core, as far as it is watched."""
+
+    def watch(self, function: Any, /) -> None: ...
+
+
+class Trace:
+    """Logs each frame of a line with what it means.
+
+    Args:
+        native: The bus of the core.
+        known: The families of its units, as far as they are known.
+    """
+
+    def __init__(self, native: _Watched, known: KnownUnits) -> None:
+        self._native = native
+        self._known = known
+        self._asked: bytes | None = None
+
+    def as_asked_for(self) -> None:
+        """Begins where somebody wants the records already. Who never imported `logging` does not."""
+        logging = sys.modules.get("logging")
+        if logging is not None and logging.getLogger(LOGGER).isEnabledFor(logging.DEBUG):
+            self.switch(True)
+
+    def switch(self, on: bool) -> None:
+        """Begins, or ends."""
+        self._native.watch(self._log if on else None)
+
+    def _log(self, at: float, gap: float | None, sent: bool, frame: bytes, elsewhere: bool) -> None:
+        import logging
+
+        asked, self._asked = self._asked, frame if sent else self._asked
+        logger = logging.getLogger(LOGGER)
+        if not logger.isEnabledFor(logging.DEBUG):
+            return
+        profile = self._known.only(frame[0]) if frame else None
+        means = meaning(frame, sent, asked, profile)
+        extra = {"line_time": at, "gap": gap, "sent": sent, "frame": frame, "meaning": means, "elsewhere": elsewhere}
+        logger.debug(
+            "%12s  %s %s  %s%s",
+            "" if gap is None else f"+{gap * 1e3:.3f} ms",
+            "->" if sent else "<-",
+            frame.hex(" ").upper(),
+            means,
+            " (by the program that has the port)" if elsewhere else "",
+            extra=extra,
+        )
+
+
+def meaning(frame: bytes, sent: bool, asked: bytes | None = None, profile: Profile | None = None) -> str:
+    """What *frame* means, in words.
+
+    Args:
+        frame: All of it, the CRC included.
+        sent: Whether a master sent it; a unit's answer to a write looks like the write.
+        asked: The request before it, which says what the words of an answer are.
+        profile: The family of the unit, for names.
+    """
+    try:
+        fields = rtu.decode(frame)
+    except DrivebusError:
+        return "1 byte that is not a frame" if len(frame) == 1 else f"{len(frame)} bytes that are not a frame"
+    whom = f"unit {fields.unit}" if fields.unit else "all units"
+    if sent:
+        return f"{whom}: {_request(fields, profile)}"
+    if frame == asked and fields.kind == "read":
+        return "the request itself, sent back"
+    return f"{whom} {_answer(fields, asked, profile)}"
+
+
+def _request(fields: rtu.Frame, profile: Profile | None) -> str:
+    first = fields.address or 0
+    match fields.kind:
+        case "read":
+            return f"read {_names(first, fields.count or 0, profile)}"
+        case "write":
+            return f"write {_values(first, [fields.value or 0], profile)}"
+        case "write_many":
+            return f"write {_values(first, fields.words or [], profile)}"
+        case "echo":
+            return f"echo {fields.data:04X}H"
+    return f"function {fields.function:02X}H"
+
+
+def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> str:
+    match fields.kind:
+        case "read_answer":
+            words = fields.words or []
+            first = _read_from(asked, fields)
+            if first is None:
+                return f"answers {' '.join(f'{word:04X}H' for word in words)}"
+            return f"answers {_values(first, words, profile)}"
+        case "write":
+            return f"took {_values(fields.address or 0, [fields.value or 0], profile)}"
+        case "write_many_answer":
+            return f"took {_names(fields.address or 0, fields.count or 0, profile)}"
+        case "echo":
+            return f"returns {fields.data:04X}H"
+        case "exception":
+            code = fields.code or 0
+            known = "" if profile is None else f" {', '.join(profile.exception(code))}"
+            return f"refuses function {fields.function:02X}H: exception {code:02X}H{known}"
+        case "read":
+            return f"is asked by another master: read {_names(fields.address or 0, fields.count or 0, profile)}"
+    return f"answers function {fields.function:02X}H"
+
+
+def _read_from(asked: bytes | None, answer: rtu.Frame) -> int | None:
+    """The first address of the read that *answer* fits."""
+    if asked is None:
+        return None
+    request = rtu.decode(asked)
+    fits = request.kind == "read" and request.unit == answer.unit and request.count == answer.count
+    return request.address if fits else None
+
+
+def _names(first: int, count: int, profile: Profile | None) -> str:
+    """What stands at *count* addresses from *first* on."""
+    where = f"{first:04X}H" if count == 1 else f"{count} words at {first:04X}H"
+    named = [_called(row) for address in range(first, first + count) if (row := _row(address, profile)) is not None]
+    if not named:
+        return where
+    shown = ", ".join(named[:_SHOWN]) + (", …" if len(named) > _SHOWN else "")
+    return f"{shown} ({where})"
+
+
+def _values(first: int, words: list[int], profile: Profile | None) -> str:
+    """What *words* mean that stand at *first* and behind it."""
+    shown = [text for text, _ in zip(_each(first, words, profile), range(_SHOWN), strict=False)]
+    return ", ".join(shown) + (", …" if len(words) > _SHOWN else "")
+
+
+def _each(first: int, words: list[int], profile: Profile | None) -> Iterator[str]:
+    at = 0
+    while at < len(words):
+        address, word = first + at, words[at]
+        row = _row(address, profile)
+        count = 1 if row is None else min(row.words, len(words) - at)
+        if profile is None or row is None:
+            yield f"{address:04X}H = {word}"
+        else:
+            yield f"{_called(row)} = {_value(row, words[at : at + count], profile)}"
+        at += count
+
+
+def _value(row: Description, words: list[int], profile: Profile) -> str:
+    if row.address == profile.command_address:
+        meant = profile.command_codes().get(words[0])
+        return f"{words[0]}" if meant is None else f"{words[0]} ({meant.replace('_', ' ')})"
+    if row.bits:
+        return f"{words[0]:04X}H"
+    try:
+        value = profile.compile([row.name]).values([words])[0]
+    except (DrivebusError, ValueError):
+        return " ".join(f"{word:04X}H" for word in words)
+    if isinstance(value, Choice):
+        return f"{int(value)} ({value.label})"
+    return f"{row.text(value)} {row.unit}".rstrip()
+
+
+def _called(row: Description) -> str:
+    return row.name if row.code is None or row.code == row.name else f"{row.code} {row.name}"
+
+
+def _row(address: int, profile: Profile | None) -> Description | None:
+    """What stands at *address*, whichever memory it is for."""
+    if profile is None:
+        return None
+    name = profile.name_at(profile.plain_address(address))
+    return None if name is None else profile.describe(name)
