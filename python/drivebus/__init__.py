@@ -12,41 +12,46 @@
 This is not a safety function. An emergency stop is a wire.
 """
 
-from drivebus import doctor, rtu, sim
-from drivebus._native import SerialFormat, __version__, crc16
-from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
-from drivebus.bus import Bus
-from drivebus.drive import Drive
-from drivebus.errors import (
-    BadAnswer,
-    CrcError,
-    DrivebusError,
-    DrivebusWarning,
-    NoAnswer,
-    NotAllowed,
-    PortError,
-    Refused,
-    SharedCodeWarning,
-    StoreWarning,
-    Unconfirmed,
-)
-from drivebus.identify.results import Found, Identification
-from drivebus.line.samples import Batch, Sample
-from drivebus.line.stats import Link, Stats
-from drivebus.poll import Poll
-from drivebus.profile import Profile, profiles
-from drivebus.sim import Simulator
-from drivebus.values import (
-    Choice,
-    Control,
-    ControlItem,
-    ControlSource,
-    Description,
-    Fault,
-    Snapshot,
-    State,
-    Status,
-)
+from typing import TYPE_CHECKING
+
+from drivebus.later import later
+
+if TYPE_CHECKING:
+    from drivebus import doctor, rtu, sim
+    from drivebus._native import SerialFormat, __version__, crc16
+    from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
+    from drivebus.bus import Bus
+    from drivebus.drive import Drive
+    from drivebus.errors import (
+        BadAnswer,
+        CrcError,
+        DrivebusError,
+        DrivebusWarning,
+        NoAnswer,
+        NotAllowed,
+        PortError,
+        Refused,
+        SharedCodeWarning,
+        StoreWarning,
+        Unconfirmed,
+    )
+    from drivebus.identify.results import Found, Identification
+    from drivebus.line.samples import Batch, Sample
+    from drivebus.line.stats import Link, Stats
+    from drivebus.poll import Poll
+    from drivebus.profile import Profile, profiles
+    from drivebus.sim import Simulator
+    from drivebus.values import (
+        Choice,
+        Control,
+        ControlItem,
+        ControlSource,
+        Description,
+        Fault,
+        Snapshot,
+        State,
+        Status,
+    )
 
 __all__ = [
     "Backup",
@@ -93,6 +98,48 @@ __all__ = [
     "rtu",
     "sim",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = later(
+        __name__,
+        {
+            "_native": ("SerialFormat", "__version__", "crc16"),
+            "backup": ("Backup", "Diff", "Difference", "Restoration", "Restored"),
+            "bus": ("Bus",),
+            "drive": ("Drive",),
+            "errors": (
+                "BadAnswer",
+                "CrcError",
+                "DrivebusError",
+                "DrivebusWarning",
+                "NoAnswer",
+                "NotAllowed",
+                "PortError",
+                "Refused",
+                "SharedCodeWarning",
+                "StoreWarning",
+                "Unconfirmed",
+            ),
+            "identify.results": ("Found", "Identification"),
+            "line.samples": ("Batch", "Sample"),
+            "line.stats": ("Link", "Stats"),
+            "poll": ("Poll",),
+            "profile": ("Profile", "profiles"),
+            "sim": ("Simulator",),
+            "values": (
+                "Choice",
+                "Control",
+                "ControlItem",
+                "ControlSource",
+                "Description",
+                "Fault",
+                "Snapshot",
+                "State",
+                "Status",
+            ),
+        },
+        modules=("doctor", "rtu", "sim"),
+    )
 
 
 def __dir__() -> list[str]:

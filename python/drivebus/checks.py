@@ -9,7 +9,6 @@ import math
 import operator
 import os
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from typing import SupportsIndex
 
 from drivebus.errors import NotAllowed
@@ -115,6 +114,8 @@ def shown(value: object) -> str:
 
 def closest(name: str, known: Iterable[str]) -> str:
     """`"; did you mean …?"` for a misspelt *name*, or nothing where nothing is near."""
+    from difflib import get_close_matches
+
     by_lower = {candidate.lower(): candidate for candidate in known}
     matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
     return f"; did you mean {by_lower[matches[0]]!r}?" if matches else ""

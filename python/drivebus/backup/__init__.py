@@ -4,8 +4,19 @@
 was to be given back. `Drive.backup`, `Drive.diff` and `Drive.restore` make them.
 """
 
-from drivebus.backup.compare import Diff, Difference
-from drivebus.backup.model import Backup, Origin
-from drivebus.backup.report import Restoration, Restored
+from typing import TYPE_CHECKING
+
+from drivebus.later import later
+
+if TYPE_CHECKING:
+    from drivebus.backup.compare import Diff, Difference
+    from drivebus.backup.model import Backup, Origin
+    from drivebus.backup.report import Restoration, Restored
 
 __all__ = ["Backup", "Diff", "Difference", "Origin", "Restoration", "Restored"]
+
+if not TYPE_CHECKING:
+    __getattr__ = later(
+        __name__,
+        {"compare": ("Diff", "Difference"), "model": ("Backup", "Origin"), "report": ("Restoration", "Restored")},
+    )

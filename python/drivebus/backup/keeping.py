@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 from drivebus import checks
-from drivebus.backup import taking
-from drivebus.backup.compare import Diff, Side, compare, factory
-from drivebus.backup.model import Backup
-from drivebus.backup.reading import Reader
-from drivebus.backup.report import Restoration
-from drivebus.backup.restoring import Restore
-from drivebus.backup.rules import Rules
-from drivebus.backup.taking import Progress
 from drivebus.errors import NotAllowed
 from drivebus.operations.unit import Unit
 
+# Every drive has these three, and few programs use them: what they need is loaded when one is called.
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from drivebus.backup.compare import Diff
+    from drivebus.backup.model import Backup
+    from drivebus.backup.report import Restoration
+    from drivebus.backup.taking import Progress
+
 __all__ = ["backup", "diff", "restore"]
 
-Kept = Backup | str | os.PathLike[str]
+Kept: TypeAlias = "Backup | str | os.PathLike[str]"
 """A backup, or the file of one."""
 
 
@@ -51,6 +51,8 @@ async def backup(
         Refused: The drive is locked by a password.
         NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
     """
+    from drivebus.backup import taking
+
     resume, force = checks.flag("resume", resume), checks.flag("force", force)
     place = None if path is None else _path(path)
     return await taking.take(unit.trusting(unverified), place, resume=resume, force=force, progress=progress)
@@ -97,6 +99,8 @@ async def restore(
 
     A refusal of one parameter ends nothing: it stands in the report.
     """
+    from drivebus.backup.restoring import Restore
+
     dry_run, force = checks.flag("dry_run", dry_run), checks.flag("force", force)
     serial, motor, twice = checks.flag("serial", serial), checks.flag("motor", motor), checks.flag("twice", twice)
     kept = _kept(unit, backup, force)
@@ -123,6 +127,13 @@ async def diff(
         NotAllowed: The file is wrong, or of another family; nothing was sent.
         NoAnswer, BadAnswer, PortError, Refused: See each.
     """
+    from dataclasses import replace
+
+    from drivebus.backup import taking
+    from drivebus.backup.compare import Side, compare, factory
+    from drivebus.backup.reading import Reader
+    from drivebus.backup.rules import Rules
+
     everything, force = checks.flag("everything", everything), checks.flag("force", force)
     unit = unit.trusting(unverified)
     if backup is None:
@@ -136,7 +147,7 @@ async def diff(
                 "same, say force=True (`--force`)",
                 unit=unit.address,
             )
-        left = Side("backup" if isinstance(backup, Backup) else os.fspath(backup), kept.raw, kept.unread)
+        left = Side(os.fspath(backup) if isinstance(backup, (str, os.PathLike)) else "backup", kept.raw, kept.unread)
     rules = Rules(unit.profile)
     unasked = {code: reason for code in left.raw if (reason := rules.unread(code, unit.unverified)) is not None}
     left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
@@ -150,6 +161,8 @@ async def diff(
 
 def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
     """*backup* in the words of this drive's family."""
+    from drivebus.backup.model import Backup
+
     kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), unit.profile)
     if not kept.complete:
         raise NotAllowed(
@@ -170,6 +183,8 @@ def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
 
 def _path(path: object) -> Path:
     """*path*, if it can be that of a file."""
+    from pathlib import Path
+
     if not isinstance(path, (str, os.PathLike)) or not isinstance(os.fspath(path), str) or not Path(path).name:
         raise NotAllowed(f"{checks.shown(path)} is neither a backup nor the path of a file")
     return Path(checks.path("file", path))

@@ -17,7 +17,7 @@ def in_front(group: click.Group, context: click.Context, words: Sequence[str]) -
     Raises:
         click.UsageError: One that may be given once stands before the command and behind it.
     """
-    ours = _options(group)
+    ours = _own_options(group)
     place = next((place for place, word, option in _words(words, ours) if option is None), len(words))
     if place == len(words) or words[place] == "--":
         return list(words)
@@ -39,9 +39,14 @@ def in_front(group: click.Group, context: click.Context, words: Sequence[str]) -
     return [*words[:place], *moved, words[place], *kept]
 
 
+def _own_options(command: click.Command) -> dict[str, click.Option]:
+    """The options of *command* by each of their names."""
+    return {name: option for option in command.params if isinstance(option, click.Option) for name in option.opts}
+
+
 def _options(command: click.Command) -> dict[str, click.Option]:
     """The options of *command*, and of those within it, by each of their names."""
-    found = {name: option for option in command.params if isinstance(option, click.Option) for name in option.opts}
+    found = _own_options(command)
     if isinstance(command, click.Group):
         for within in command.commands.values():
             found |= _options(within)

@@ -9,15 +9,13 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
 import click
 
 import drivebus
-from drivebus.cli import backup, doctor, explain, frames, monitor, move, profiles, reading, tools
 from drivebus.cli.anywhere import in_front
-from drivebus.cli.frames import show_frames
+from drivebus.cli.commands import GROUPS, Commands
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
@@ -40,8 +38,10 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
 
 def _forget_what_is_not_shown() -> None:
     """Or the interpreter would try once more to write it when it ends, and say so in its own words."""
-    with suppress(OSError), Path(os.devnull).open("wb") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    with suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 @contextmanager
@@ -54,21 +54,12 @@ def _quoted_as_letters() -> Iterator[None]:
         raise
 
 
-_GROUPS: dict[str, tuple[Any, ...]] = {
-    "Look": (reading, monitor),
-    "Move, write": (move,),
-    "Keep": (backup,),
-    "Find out": (explain, doctor, profiles),
-    "Tools": (frames, tools),
-}
-
-
 def _first_sentence(command: click.Command) -> str:
     """What *command* does, in one sentence."""
     return (command.help or "").split("\n\n")[0].replace("\n", " ").split(". ")[0].rstrip(".")
 
 
-class _Commands(click.Group):
+class _Program(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
 
     def make_context(self, *args: Any, **extra: Any) -> click.Context:
@@ -82,8 +73,8 @@ class _Commands(click.Group):
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Shows the commands in groups, each with its first sentence."""
-        for title, modules in _GROUPS.items():
-            commands = [command for module in modules for command in module.COMMANDS]
+        for title, files in GROUPS.items():
+            commands = [self.commands[name] for names in files.values() for name in names]
             with formatter.section(title):
                 formatter.write_dl([(str(each.name), _first_sentence(each)) for each in commands])
 
@@ -115,7 +106,8 @@ class _Commands(click.Group):
 
 
 @click.group(
-    cls=_Commands,
+    cls=_Program,
+    commands=Commands(),
     context_settings={
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
@@ -235,17 +227,13 @@ def cli(
     if trust_profile and profile is None:
         raise click.UsageError("--trust-profile is for a profile that is named: give --profile too")
     if trace:
+        from drivebus.cli.frames import show_frames
+
         show_frames(context)
     out = Output(as_json)
     context.obj = Session(
         port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile, read_only
     )
-
-
-for modules in _GROUPS.values():
-    for module in modules:
-        for command in module.COMMANDS:
-            cli.add_command(command)
 
 
 def main() -> None:

@@ -7,20 +7,21 @@ lets ESC pass, click takes away the sequences it knows, and only where there is 
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.console import Console
-from rich.markup import escape
-from rich.measure import Measurement
-from rich.table import Table
 
 import drivebus
+
+# rich is loaded when something is laid out: a stop is on the wire before that.
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 __all__ = ["Output", "plain", "printable", "remark", "show"]
 
@@ -38,22 +39,30 @@ class Output:
 
     Attributes:
         as_json: One object a line and no decoration.
-        console: For people.
     """
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
-        self.console = Console(highlight=False, soft_wrap=True)
-        if not self.console.is_terminal:
-            self.console.width = _PIPE_WIDTH
+
+    @cached_property
+    def console(self) -> Console:
+        """Where people read."""
+        from rich.console import Console
+
+        console = Console(highlight=False, soft_wrap=True)
+        if not console.is_terminal:
+            console.width = _PIPE_WIDTH
+        return console
 
     @property
     def live(self) -> bool:
         """Whether a person watches: a terminal, and no JSON."""
-        return self.console.is_terminal and not self.as_json
+        return not self.as_json and self.console.is_terminal
 
     def record(self, values: Mapping[str, Any]) -> None:
         """One JSON object."""
+        import json
+
         told = {key: plain(value) for key, value in values.items()}
         text = json.dumps(told, ensure_ascii=not _takes_everything(sys.stdout.encoding))
         # Of what a terminal obeys, JSON has to escape the least part.
@@ -74,6 +83,8 @@ class Output:
         if self.as_json:
             self.record(values)
             return
+        from rich.table import Table
+
         table = Table.grid(padding=(0, 2))
         for name, value in values.items():
             if value is not None and value != "":
@@ -86,6 +97,8 @@ class Output:
             for row in rows:
                 self.record(dict(zip(columns, row, strict=True)))
             return
+        from rich.measure import Measurement
+
         kept = list(rows)
         table = self.table(columns, kept)
         # A name that is cut cannot be typed, and a word broken in the middle not be read.
@@ -110,6 +123,8 @@ class Output:
     @staticmethod
     def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:
         """A table for people, numbers to the right."""
+        from rich.table import Table
+
         kept = [list(row) for row in rows]
         table = Table(box=None, header_style="bold", pad_edge=False)
         for index, name in enumerate(columns):
@@ -149,6 +164,8 @@ def plain(value: Any) -> Any:
 
 def show(value: Any) -> str:
     """*value* for people. Text with brackets in it is no markup."""
+    from rich.markup import escape
+
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import serial
-
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed, PortError
@@ -107,6 +105,8 @@ def _resolve_text(port: str, line: SerialFormat) -> Any:
 
 
 def _open_pyserial(url: str, line: SerialFormat) -> Any:
+    import serial
+
     try:
         return serial.serial_for_url(
             url,
