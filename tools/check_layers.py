@@ -68,7 +68,7 @@ UNSAFE_ALLOWED = "crates/line/src/ports/tty/low_latency.rs"
 ROOMS: list[set[str]] = [
     {"errors", "later", "named"},
     {"values", "checks", "rtu"},
-    {"profile"},
+    {"profile", "site"},
     {"sim"},
     {"line"},
     {"identify"},
@@ -86,7 +86,7 @@ ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", 
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"drivebus", "later", "line", "rtu", "sim"},
+    "cli": {"drivebus", "later", "line", "rtu", "sim", "site"},
     "__main__": {"cli"},
 }
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import importlib.util
+import itertools
 import os
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -33,7 +34,14 @@ TRANSPORTS = ["process", pytest.param("pty", marks=NO_PTY), "tcp"]
 LINES = [*TRANSPORTS, pytest.param("shared", marks=NO_PTY)]
 # Seconds for an answer. Behind a port a thread of the simulator has to run for it; on a busy machine that takes long.
 IN_PROCESS, BEHIND_A_PORT = 0.25, 0.5
+_NUMBERS = itertools.count()
 RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
+
+
+@pytest.fixture(autouse=True)
+def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """No test knows what another one, or whoever runs the tests, has found out about a line of the same name."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.getbasetemp() / f"state-{next(_NUMBERS)}"))
 
 
 @pytest.fixture(params=LINES)

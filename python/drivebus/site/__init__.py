@@ -1,0 +1,20 @@
+"""What one owns: lines and drives by name in `drivebus.toml`, and the families that units once surely were."""
+
+from typing import TYPE_CHECKING
+
+from drivebus.later import later
+
+if TYPE_CHECKING:
+    from drivebus.site.config import FILE, Site, SiteDrive, SiteLine
+    from drivebus.site.known_families import forget, known_family, remember
+
+__all__ = ["FILE", "Site", "SiteDrive", "SiteLine", "forget", "known_family", "remember"]
+
+if not TYPE_CHECKING:
+    __getattr__ = later(
+        __name__,
+        {
+            "config": ("FILE", "Site", "SiteDrive", "SiteLine"),
+            "known_families": ("forget", "known_family", "remember"),
+        },
+    )
