@@ -265,7 +265,7 @@ class TestMoving:
 
     @pytest.mark.parametrize("command", ["stop", "coast"])
     def test_a_stop_that_did_not_go_out_is_told(self, pty: drivebus.Simulator, command: str) -> None:
-        run("prepare", port=pty.port)
+        run("--profile", "gd350", "prepare", port=pty.port)  # a family that is named is not remembered
         pty.line.drop_answers(1000)
         unknown = run(command, port=pty.port)
         assert (unknown.exit_code, f"not told to {command}" in unknown.stderr) == (3, True)

@@ -24,8 +24,8 @@ def run(*words: str, port: str | None = SIM) -> Result:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--unit", "abc", "status"], "'abc' is no whole number; allowed is 1 to 247"),
-        (["--unit", "0", "status"], "0 is out of range; allowed is 1 to 247"),
+        (["--unit", "abc", "status"], "'abc' is no unit address; write 1-247, or a list such as 1-31,40"),
+        (["--unit", "0", "status"], "units '0' are out of range or turned round; allowed is 1-247"),
         (["--baud", "fast", "status"], "'fast' is no whole number; allowed is 1 or more"),
         (["monitor", "--count", "0"], "0 is out of range; allowed is 1 or more"),
         (["monitor", "--interval", "often"], "'often' is no number of seconds"),

@@ -108,7 +108,19 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
         "drivebus.cli",
         *(
             f"drivebus.cli.{name}"
-            for name in ("advice", "anywhere", "app", "commands", "move", "names", "output", "session", "types")
+            for name in (
+                "advice",
+                "anywhere",
+                "app",
+                "choose",
+                "commands",
+                "crew",
+                "move",
+                "names",
+                "output",
+                "session",
+                "types",
+            )
         ),
     }
     assert ours(modules, "drivebus.backup") == {"drivebus.backup", "drivebus.backup.keeping"}

@@ -15,6 +15,7 @@ import click
 
 import drivebus
 from drivebus.cli.anywhere import in_front
+from drivebus.cli.choose import chosen, complete_drive, complete_port, parse_unit_list
 from drivebus.cli.commands import GROUPS, Commands
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, printable, remark
@@ -115,15 +116,17 @@ class _Program(click.Group):
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
     "These options may stand before the command or behind it, and in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
-    "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, DRIVEBUS_READ_ONLY, "
-    "DRIVEBUS_VARIANT, DRIVEBUS_TRACE, DRIVEBUS_JSON. This is not a safety function: an emergency stop is a wire.",
+    "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_CONFIG, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, "
+    "DRIVEBUS_READ_ONLY, DRIVEBUS_VARIANT, DRIVEBUS_TRACE, DRIVEBUS_JSON. "
+    "This is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
     "-p",
     metavar="PORT",
     envvar="DRIVEBUS_PORT",
-    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, or a simulated drive: "
+    shell_complete=complete_port,
+    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, a line of drivebus.toml, or a simulated drive: "
     f"sim:// and one of {', '.join(drivebus.profiles())}.",
 )
 @click.option(
@@ -155,11 +158,28 @@ class _Program(click.Group):
 @click.option(
     "--unit",
     "-u",
-    type=Whole(1, 247),
-    default=1,
+    "units",
+    metavar="LIST",
+    default="1",
     show_default=True,
     envvar="DRIVEBUS_UNIT",
-    help="Unit address.",
+    callback=parse_unit_list,
+    help="Unit address, or several: 1-4,7.",
+)
+@click.option(
+    "--drive",
+    "-d",
+    "drives",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete_drive,
+    help="A drive or a group of drivebus.toml, instead of --port and --unit; may be given several times.",
+)
+@click.option(
+    "--config",
+    metavar="FILE",
+    envvar="DRIVEBUS_CONFIG",
+    help="Take names from this file, not from drivebus.toml in this folder or among your settings.",
 )
 @click.option(
     "--profile",
@@ -211,7 +231,9 @@ def cli(
     baud: int,
     line_format: tuple[str, str, str],
     rs485: str | None,
-    unit: int,
+    units: list[int],
+    drives: tuple[str, ...],
+    config: str | None,
     profile: str | None,
     trust_profile: bool,
     unverified: bool,
@@ -231,9 +253,10 @@ def cli(
 
         show_frames(context)
     out = Output(as_json)
-    context.obj = Session(
-        port, baud, line_format, unit, profile, out, rs485, unverified, variants, trust_profile, read_only
+    base = Session(
+        port, baud, line_format, units[0], profile, out, rs485, unverified, variants, trust_profile, read_only
     )
+    context.obj = chosen(context, base, drives, units, config)
 
 
 def main() -> None:

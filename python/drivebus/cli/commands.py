@@ -13,7 +13,7 @@ import click
 __all__ = ["GROUPS", "Commands"]
 
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
-    "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",)},
+    "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write")},
     "Keep": {"backup": ("backup", "restore", "diff")},
     "Find out": {"explain": ("faults", "describe"), "doctor": ("doctor",), "profiles": ("profiles",)},

@@ -9,6 +9,7 @@ import click
 
 import drivebus
 from drivebus.cli import names
+from drivebus.cli.crew import each_drive
 from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
@@ -70,7 +71,7 @@ def _match(profile: drivebus.Profile, name: str) -> list[Any]:
 @click.command()
 @click.argument("text", metavar="[FAULT]...", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="List every fault the family knows; asks no drive for faults.")
-@pass_session
+@each_drive
 def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     """Explain the present fault, and list the last ones, with the values the drive kept of the last.
 

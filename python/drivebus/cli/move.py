@@ -12,8 +12,9 @@ import click
 import drivebus
 from drivebus import State
 from drivebus.cli import names
+from drivebus.cli.crew import each_drive
 from drivebus.cli.output import remark
-from drivebus.cli.session import Session, force_option, pass_session, yes_option
+from drivebus.cli.session import Session, force_option, yes_option
 from drivebus.cli.types import Hertz, Seconds
 
 __all__ = ["COMMANDS"]
@@ -37,7 +38,7 @@ class _Run(click.Command):
 @click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the speed is reached.")
 @force_option
 @yes_option
-@pass_session
+@each_drive
 def run(session: Session, hz: float | None, reverse: bool, wait: float | None, force: bool, yes: bool) -> None:
     """Start the motor, at HZ if given. It keeps running when this command has ended."""
     session.will_write()
@@ -54,24 +55,24 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 
 @click.command()
 @click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until it stands.")
-@pass_session
+@each_drive
 def stop(session: Session, wait: float | None) -> None:
     """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
     session.will_write()
-    with session.drive_to_halt("stop") as drive:
-        drive.stop()
+    with session.bus() as bus:
+        drive = session.halt(bus, "stop", lambda drive: drive.stop())
         if wait is not None:
             drive.wait_until_stopped(timeout=wait)
         _done(session, drive, "stop", State.STOPPED)
 
 
 @click.command()
-@pass_session
+@each_drive
 def coast(session: Session) -> None:
     """Take the voltage off the motor; it turns on until friction ends it. Asks nothing."""
     session.will_write()
-    with session.drive_to_halt("coast") as drive:
-        drive.coast()
+    with session.bus() as bus:
+        drive = session.halt(bus, "coast", lambda drive: drive.coast())
         _done(session, drive, "coast")
 
 
@@ -80,7 +81,7 @@ def coast(session: Session) -> None:
 @click.option("--reverse", is_flag=True, help="Turn the other way.")
 @force_option
 @yes_option
-@pass_session
+@each_drive
 def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool) -> None:
     """Jog the motor at the drive's jog frequency, and end the jog whatever happens: Ctrl-C, a closed terminal."""
     session.will_write()
@@ -94,7 +95,7 @@ def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool)
 
 @click.command()
 @yes_option
-@pass_session
+@each_drive
 def reset(session: Session, yes: bool) -> None:
     """Reset a fault whose cause is gone. A drive whose run command still stands may start again."""
     session.will_write()
@@ -107,7 +108,7 @@ def reset(session: Session, yes: bool) -> None:
 @click.command()
 @click.option("--store", is_flag=True, help="Keep it in EEPROM: the drive still obeys the bus after it was off.")
 @yes_option
-@pass_session
+@each_drive
 def prepare(session: Session, store: bool, yes: bool) -> None:
     """Set the drive to obey the bus, and show what is set. Writes only what differs; moves nothing by itself."""
     session.will_write()
@@ -129,7 +130,7 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
 @click.option("--store", is_flag=True, help="Keep parameters in EEPROM, whose write life is limited.")
 @click.option("--force", is_flag=True, help="Also words at addresses of which nothing is known; always asks.")
 @yes_option
-@pass_session
+@each_drive
 def write(session: Session, assignments: tuple[str, ...], store: bool, force: bool, yes: bool) -> None:
     """Write registers or parameters. Parameters go to RAM: lost when the drive is switched off, unless --store.
 
@@ -245,14 +246,15 @@ def _done(session: Session, drive: drivebus.Drive, command: str, towards: State 
     try:
         status = drive.status()
     except drivebus.DrivebusError as error:
-        _say_lost(f"unit {drive.unit}: {command} was done, and what it does now could not be read: {error}")
+        whose = "" if session.crew else f"{session.called}: "
+        _say_lost(f"{whose}{command} was done, and what it does now could not be read: {error}")
     if session.out.as_json:
         told = ("state", "frequency", "setpoint", "fault")
         session.out.record(
             {"command": command, "unit": drive.unit, **{name: getattr(status, name, None) for name in told}}
         )
     elif status is not None:
-        session.out.say(f"unit {drive.unit}: {_on_the_way(status, towards) or status}")
+        session.out.say(f"{session.called}: {_on_the_way(status, towards) or status}")
 
 
 def _on_the_way(status: drivebus.Status, towards: State | None) -> str | None:

@@ -7,9 +7,12 @@ lets ESC pass, click takes away the sequences it knows, and only where there is 
 
 from __future__ import annotations
 
+import io
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["Output", "plain", "printable", "remark", "show"]
+__all__ = ["Output", "about", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -43,13 +46,30 @@ class Output:
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
+        self._held: io.StringIO | None = None
+        self._drive = ""
+
+    def held(self, drive: str) -> Output:
+        """One for *drive* that keeps what it is given until it may `let_go`: several are filled at once."""
+        other = Output(self.as_json)
+        other._held, other._drive = io.StringIO(), drive
+        return other
+
+    def let_go(self) -> None:
+        """Shows what was kept: what has several lines, under its drive."""
+        held = "" if self._held is None else self._held.getvalue()
+        title = f"{printable(self._drive)}\n" if len(held.splitlines()) > 1 and not self.as_json else ""
+        print(f"{title}{held}", end="\n" if title else "", flush=True)
 
     @cached_property
     def console(self) -> Console:
         """Where people read."""
         from rich.console import Console
 
-        console = Console(highlight=False, soft_wrap=True)
+        if self._held is None:
+            console = Console(highlight=False, soft_wrap=True)
+        else:
+            console = Console(highlight=False, soft_wrap=True, file=self._held, force_terminal=sys.stdout.isatty())
         if not console.is_terminal:
             console.width = _PIPE_WIDTH
         return console
@@ -57,16 +77,17 @@ class Output:
     @property
     def live(self) -> bool:
         """Whether a person watches: a terminal, and no JSON."""
-        return not self.as_json and self.console.is_terminal
+        return not self.as_json and self._held is None and self.console.is_terminal
 
     def record(self, values: Mapping[str, Any]) -> None:
         """One JSON object."""
         import json
 
-        told = {key: plain(value) for key, value in values.items()}
+        told = {"drive": self._drive} if self._drive else {}
+        told |= {key: plain(value) for key, value in values.items()}
         text = json.dumps(told, ensure_ascii=not _takes_everything(sys.stdout.encoding))
         # Of what a terminal obeys, JSON has to escape the least part.
-        print(_replaced(text, lambda letter: json.dumps(letter)[1:-1]), flush=True)
+        print(_replaced(text, lambda letter: json.dumps(letter)[1:-1]), file=self._held, flush=True)
 
     def say(self, text: str) -> None:
         """A line for people; nothing in JSON."""
@@ -182,9 +203,22 @@ def printable(text: str) -> str:
     return _replaced(text, lambda letter: letter if letter == "\n" else repr(letter)[1:-1])
 
 
+@contextmanager
+def about(drive: str) -> Iterator[None]:
+    """A block whose remarks begin with *drive*: it is one of several that a command is done for."""
+    token = _ABOUT.set(f"{drive}: ")
+    try:
+        yield
+    finally:
+        _ABOUT.reset(token)
+
+
+_ABOUT: ContextVar[str] = ContextVar("about", default="")
+
+
 def remark(text: str = "") -> None:
     """A line on standard error: what is no result."""
-    click.echo(printable(text), err=True)
+    click.echo(printable(f"{_ABOUT.get()}{text}"), err=True)
 
 
 def _replaced(text: str, shown: Callable[[str], str]) -> str:

@@ -9,6 +9,7 @@ from rich.progress import Progress
 
 import drivebus
 from drivebus.cli import names, rules
+from drivebus.cli.crew import each_drive
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, exit_code, pass_session, tell
 from drivebus.cli.types import Seconds
@@ -76,7 +77,7 @@ def _show_found(session: Session, found: drivebus.Found) -> None:
 
 
 @click.command()
-@pass_session
+@each_drive
 def info(session: Session) -> None:
     """Say what the drive is and how sure that is, what is known of its family, and whether it obeys the bus."""
     out = session.out
@@ -136,7 +137,7 @@ def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
 
 
 @click.command()
-@pass_session
+@each_drive
 def status(session: Session) -> None:
     """Say what the drive is doing; and what its family, or what is known of it, does not tell, and why."""
     out = session.out
@@ -169,7 +170,7 @@ def status(session: Session) -> None:
 @click.command()
 @click.argument("wanted", metavar="NAME...", nargs=-1, required=True, shell_complete=names.complete_name)
 @click.option("--verify", is_flag=True, help="Ask twice; both answers must agree.")
-@pass_session
+@each_drive
 def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
     """Read registers or parameters: by name, code (P00.11) or address (3004H, 0x3004).
 

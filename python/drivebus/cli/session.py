@@ -6,22 +6,28 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import IO, Any
+from dataclasses import dataclass, field, replace
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
 import drivebus
 from drivebus.cli.advice import in_commands
 from drivebus.cli.output import Output, remark
+from drivebus.site import forget, known_family, remember
+
+if TYPE_CHECKING:
+    from drivebus.cli.crew import Crew
 
 __all__ = [
     "DEFAULT_BAUD",
     "DEFAULT_FORMAT",
     "EXIT_CODES",
+    "Declined",
     "Session",
+    "ask_once",
     "exit_code",
     "force_option",
     "parse_format",
@@ -46,7 +52,7 @@ DEFAULT_FORMAT = ("8", "E", "1")
 """As the factory sets a Goodrive."""
 
 
-class _Declined(click.ClickException):
+class Declined(click.ClickException):
     """What moves a motor was not wanted."""
 
     exit_code = 2
@@ -58,7 +64,7 @@ class _Declined(click.ClickException):
 
 @dataclass
 class Session:
-    """The options before the command.
+    """The options before the command, for one drive.
 
     Attributes:
         port: What to open, or None if it was not given.
@@ -72,6 +78,9 @@ class Session:
         variants: What parameters of the drive make of its registers, by name.
         trust_profile: Whether the profile is meant, whatever the drive says of itself.
         read_only: Whether nothing may be written to a drive.
+        name: What the drive is called in `drivebus.toml`; empty where it was not chosen by name.
+        several: One session for each drive, where several were chosen.
+        crew: The others that work beside this one, where several drives were chosen.
     """
 
     port: str | None
@@ -85,6 +94,14 @@ class Session:
     variants: Mapping[str, str] = field(default_factory=dict)
     trust_profile: bool = False
     read_only: bool = False
+    name: str = ""
+    several: tuple[Session, ...] = ()
+    crew: Crew | None = None
+
+    @property
+    def called(self) -> str:
+        """The drive as people know it: its name, or its address."""
+        return self.name or f"unit {self.unit}"
 
     @property
     def direction(self) -> dict[str, object] | None:
@@ -94,8 +111,15 @@ class Session:
     @contextmanager
     def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
         """The bus that the options name, opened."""
+        if self.several:
+            named = ", ".join(each.called for each in self.several)
+            command = click.get_current_context().info_name
+            raise click.UsageError(f"`{command}` takes one drive at a time, and these are named: {named}")
         if self.port is None:
-            raise click.UsageError("no port: give --port or set DRIVEBUS_PORT; `drivebus ports` lists what is there")
+            raise click.UsageError(
+                "no port: give --port or set DRIVEBUS_PORT, or name a drive of drivebus.toml with --drive; "
+                "`drivebus ports` lists what is there"
+            )
         bits, parity, stop = self.line_format
         settings: dict[str, Any] = {
             "baudrate": self.baud,
@@ -106,6 +130,9 @@ class Session:
             "read_only": self.read_only,
             **options,
         }
+        if self.crew is not None:
+            yield self.crew.bus(self.port, settings)
+            return
         with drivebus.Bus(self.port, **settings) as bus:
             yield bus
 
@@ -115,31 +142,52 @@ class Session:
         with self.bus() as bus:
             yield self.drive_on(bus)
 
-    @contextmanager
-    def drive_to_halt(self, command: str) -> Iterator[drivebus.Drive]:
-        """As `drive`, but an error before *command* can be sent says so."""
-        with self.bus() as bus:
+    def halt(self, bus: drivebus.Bus, command: str, do: Callable[[drivebus.Drive], None]) -> drivebus.Drive:
+        """Halts the drive by *do*, which is *command*, without asking it anything first where its family is known.
+
+        The family may be known from before: what the drive is now is asked behind the command, and one of another
+        family is halted once more, by its own code. An error before anything can be sent says so.
+        """
+        port = str(self.port)
+        family = None if self.profile is not None else known_family(port, self.unit)
+        if family in drivebus.profiles():
+            drive = bus.drive(self.unit, family, unverified=self.unverified, variants=self.variants or None)
+            failure: drivebus.DrivebusError | None = None
             try:
-                drive = self.drive_on(bus)
-            except drivebus.DrivebusError:
-                remark(
-                    f"Unit {self.unit} was not told to {command}: the code for that depends on the family, and it did "
-                    f"not say which it is. If you know: drivebus --profile FAMILY … {command}, which asks it nothing "
-                    f"first (or set DRIVEBUS_PROFILE); families: {', '.join(drivebus.profiles())}. "
-                    "If it has to stand now, use the emergency stop."
-                )
-                raise
-            yield drive
+                do(drive)
+            except drivebus.DrivebusError as error:
+                failure = error
+            if not _is_another(drive):
+                if failure is not None:
+                    raise failure
+                return drive
+            forget(port, self.unit)
+            remark(f"{self.called} was a {family} when it was asked last, and is not one now.")
+        try:
+            drive = self.drive_on(bus)
+        except drivebus.DrivebusError:
+            typed = replace(self, profile="FAMILY").command(command)
+            remark(
+                f"{self.called} was not told to {command}: the code for that depends on the family, and it did not say "
+                f"which it is. If you know: `{typed}`, which asks it nothing first; families: "
+                f"{', '.join(drivebus.profiles())}. If it has to stand now, use the emergency stop."
+            )
+            raise
+        do(drive)
+        return drive
 
     def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
-        """The drive that the options name, on a bus that is open."""
-        return bus.drive(
+        """The drive that the options name, on a bus that is open. Where it said surely what it is, that is kept."""
+        drive = bus.drive(
             self.unit,
             self.profile,
             unverified=self.unverified,
             variants=self.variants or None,
             trust_profile=self.trust_profile,
         )
+        if self.profile is None and not self.unverified and _is_told_by_code(drive.profile):
+            remember(str(self.port), self.unit, drive.profile.name)
+        return drive
 
     def will_write(self) -> None:
         """Refuses a command that writes where only looking was asked for, before anything is opened."""
@@ -176,16 +224,21 @@ class Session:
 
     def command(self, name: str) -> str:
         """The command *name* for the same drive, as it can be typed."""
-        words = ["drivebus", "--port", shlex.quote(str(self.port))]
+        words = ["drivebus", *(["--drive", self.name] if self.name else self._line_words())]
+        if self.profile is not None:
+            words.append(f"--profile {shlex.quote(self.profile)}")
+        return " ".join([*words, name])
+
+    def _line_words(self) -> list[str]:
+        """The options for the line and the unit, where they are not as usual."""
+        words = ["--port", shlex.quote(str(self.port))]
         if self.baud != DEFAULT_BAUD:
             words.append(f"--baud {self.baud}")
         if self.line_format != DEFAULT_FORMAT:
             words.append(f"--format {''.join(self.line_format)}")
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
-        if self.profile is not None:
-            words.append(f"--profile {shlex.quote(self.profile)}")
-        return " ".join([*words, name])
+        return words
 
     def doctor(self, unit: int | None = None) -> str:
         """The command that looks at the same line, and at *unit*."""
@@ -210,19 +263,48 @@ class Session:
 
     def ask(self, what: str, yes: bool, unit: int | None = None) -> None:
         """Says that *what* moves the motor of *unit* (None: the one of the options), and goes on only if wanted."""
-        remark(f"{what} (unit {unit or self.unit} on {self.port}).")
-        if yes:
-            return
-        # Who closed standard input has none at all.
-        if sys.stdin is None or not sys.stdin.isatty():
-            raise click.UsageError("without a terminal this needs --yes; nothing was written")
-        try:
-            wanted = click.confirm("Is the machine clear? Go ahead?", err=True)
-        except click.Abort:
-            remark()
-            wanted = False
-        if not wanted:
-            raise _Declined("Cancelled. Nothing was written.")
+        which = f"unit {unit or self.unit} on {self.port}"
+        text = f"{what} ({self.name}: {which})." if self.name else f"{what} ({which})."
+        if self.crew is not None:
+            self.crew.ask(text, yes)
+        else:
+            ask_once([text], yes)
+
+
+def ask_once(texts: Sequence[str], yes: bool) -> None:
+    """Says what *texts* say, and goes on only if that is wanted: without a question if *yes*.
+
+    Raises:
+        Declined: It is not.
+    """
+    for text in texts:
+        remark(text)
+    if yes:
+        return
+    # Who closed standard input has none at all.
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise click.UsageError("without a terminal this needs --yes; nothing was written")
+    try:
+        wanted = click.confirm("Is the machine clear? Go ahead?", err=True)
+    except click.Abort:
+        remark()
+        wanted = False
+    if not wanted:
+        raise Declined("Cancelled. Nothing was written.")
+
+
+def _is_another(drive: drivebus.Drive) -> bool:
+    """Whether *drive* says that it is of another family than it was taken for."""
+    try:
+        return drive.contradiction() is not None
+    except drivebus.DrivebusError:
+        return False
+
+
+def _is_told_by_code(profile: drivebus.Profile) -> bool:
+    """Whether the family has identification codes, and shares none with another."""
+    own = [row for row in profile.identifications() if row["family"] == profile.family]
+    return bool(own) and not any(row["shared"] for row in own)
 
 
 pass_session = click.make_pass_decorator(Session)
