@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         Unconfirmed,
     )
     from drivebus.identify.results import Found, Identification
+    from drivebus.line.listing import SerialPort, ports
     from drivebus.line.samples import Batch, Sample
     from drivebus.line.stats import Link, Stats
     from drivebus.poll import Poll
@@ -83,6 +84,7 @@ __all__ = [
     "Restored",
     "Sample",
     "SerialFormat",
+    "SerialPort",
     "SharedCodeWarning",
     "Simulator",
     "Snapshot",
@@ -94,6 +96,7 @@ __all__ = [
     "__version__",
     "crc16",
     "doctor",
+    "ports",
     "profiles",
     "rtu",
     "sim",
@@ -121,6 +124,7 @@ if not TYPE_CHECKING:
                 "Unconfirmed",
             ),
             "identify.results": ("Found", "Identification"),
+            "line.listing": ("SerialPort", "ports"),
             "line.samples": ("Batch", "Sample"),
             "line.stats": ("Link", "Stats"),
             "poll": ("Poll",),

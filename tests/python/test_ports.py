@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import pathlib
+from types import SimpleNamespace
 
 import pytest
 import serial
 
+import drivebus
 from drivebus import Bus, NotAllowed, SerialFormat, Simulator
 
 pty_only = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
@@ -79,3 +81,29 @@ def test_rtu_over_tcp() -> None:
     with Simulator({1: "gd350"}, transport="tcp") as simulator, Bus(simulator.port) as bus:
         assert simulator.port.startswith("socket://127.0.0.1:")
         assert bus.read(1, 0x2103) == [0x01A0]
+
+
+def _adapter(device: str, description: str = "n/a", serial_number: str | None = None) -> SimpleNamespace:
+    """What pyserial tells of a port."""
+    hwid = f"USB VID:PID=0403:6001 SER={serial_number}" if serial_number else "n/a"
+    return SimpleNamespace(device=device, description=description, serial_number=serial_number, hwid=hwid)
+
+
+def test_the_ports_of_the_machine_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    adapter = _adapter("/dev/ttyUSB0", "USB-RS485", "A1")
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [adapter])
+    [port] = drivebus.ports()
+    assert (port.path, str(port), os.fspath(port)) == ("/dev/ttyUSB0",) * 3
+    assert (port.description, port.serial_number) == ("USB-RS485", "A1")
+    assert port.hardware == "USB VID:PID=0403:6001 SER=A1"
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    assert drivebus.ports() == []
+
+
+@pty_only
+def test_a_port_that_was_listed_can_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Simulator({1: "gd350"}, transport="pty") as simulator:
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [_adapter(simulator.port)])
+        with Bus(drivebus.ports()[0]) as bus:
+            assert bus.port == simulator.port
+            assert bus.drive(1).profile.name == "gd350"

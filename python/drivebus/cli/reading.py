@@ -21,14 +21,12 @@ __all__ = ["COMMANDS"]
 @pass_session
 def ports(session: Session) -> None:
     """List serial ports, with what is plugged in."""
-    from serial.tools import list_ports
-
-    found = sorted(list_ports.comports())
+    found = drivebus.ports()
     if not found:
         session.out.say("No serial port found. Is the adapter plugged in? Try `drivebus demo` without one.")
     session.out.rows(
         ["port", "description", "serial_number", "hardware"],
-        [[port.device, port.description, port.serial_number, port.hwid] for port in found],
+        [[port.path, port.description, port.serial_number, port.hardware] for port in found],
     )
 
 
