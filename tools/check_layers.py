@@ -68,6 +68,7 @@ UNSAFE_ALLOWED = "crates/line/src/ports/tty/low_latency.rs"
 ROOMS: list[set[str]] = [
     {"errors", "later", "named"},
     {"values", "checks", "rtu"},
+    {"attributes"},
     {"profile", "site"},
     {"sim"},
     {"line"},

@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from drivebus import _native, checks
+from drivebus.attributes import known_only
 from drivebus.drive import Drive
 from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
@@ -29,6 +30,7 @@ from drivebus.profile import Profile
 __all__ = ["Bus"]
 
 
+@known_only
 class Bus(BusFace, Requests):
     """One line, opened at once. Safe from any thread; requests of several threads take turns.
 

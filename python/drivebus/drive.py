@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import overload
 
+from drivebus.attributes import known_only
 from drivebus.backup import keeping
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
@@ -44,6 +45,7 @@ class _Setpoint:
         at_once(setpoints.give(unit_of(drive), self._name, value))
 
 
+@known_only
 class Drive(DriveFace):
     """One drive on a line: its commands, values and state. `drivebus.Bus.drive` makes it.
 
@@ -60,6 +62,8 @@ class Drive(DriveFace):
     *identification* is what it said when it was asked what it is; None if it was not. With *trust_profile*, what it
     says against its profile does not count.
     """
+
+    bus: BusProtocol
 
     def __init__(
         self,

@@ -14,12 +14,14 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 
 from drivebus import _native
+from drivebus.attributes import known_only
 from drivebus.errors import NotAllowed
 from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
 
+@known_only
 class Poll(Polling):
     """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
 

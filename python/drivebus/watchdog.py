@@ -11,6 +11,7 @@ import atexit
 import threading
 from types import TracebackType
 
+from drivebus.attributes import known_only
 from drivebus.line.blocking import at_once
 from drivebus.operations.bus_timeout import BusTimeout
 from drivebus.operations.unit import Unit
@@ -18,6 +19,7 @@ from drivebus.operations.unit import Unit
 __all__ = ["Watchdog"]
 
 
+@known_only
 class Watchdog(BusTimeout):
     """The drive's own time-out, set and kept from running out until `close`.
 

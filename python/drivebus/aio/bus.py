@@ -14,6 +14,7 @@ from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.aio.requests import AwaitedRequests
+from drivebus.attributes import known_only
 from drivebus.errors import PortError
 from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
@@ -32,6 +33,7 @@ from drivebus.profile import Profile
 __all__ = ["Bus"]
 
 
+@known_only
 class Bus(BusFace):
     """One line, as `drivebus.Bus`, for asyncio.
 

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Any, overload
 
 from drivebus.aio.watchdog import Watchdog
+from drivebus.attributes import known_only
 from drivebus.backup import keeping
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
@@ -46,12 +47,15 @@ class _Setpoint:
         return self if drive is None else _Asked(lambda: setpoints.ask(unit_of(drive), self._name))
 
 
+@known_only
 class Drive(DriveFace):
     """A drive, as `drivebus.aio.Bus.drive` gives it: what `drivebus.Drive` has, awaitable.
 
     Who cancels a command does not take it back: once its request has left, the drive does it. After that, ask for the
     state. A block of `running` or `jogging` stops the motor also where its task is cancelled, and again.
     """
+
+    bus: AwaitableBus
 
     def __init__(
         self,

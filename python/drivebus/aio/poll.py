@@ -9,11 +9,13 @@ from types import TracebackType
 
 from drivebus import _native
 from drivebus.aio.mailbox import Mailbox
+from drivebus.attributes import known_only
 from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
 
+@known_only
 class Poll(Polling):
     """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
 

@@ -7,12 +7,14 @@ from collections.abc import Generator
 from types import TracebackType
 from typing import Any
 
+from drivebus.attributes import known_only
 from drivebus.operations.bus_timeout import BusTimeout
 from drivebus.operations.unit import Unit
 
 __all__ = ["Watchdog"]
 
 
+@known_only
 class Watchdog(BusTimeout):
     """The drive's own time-out, set when this is awaited or entered, and kept from running out until `close`.
 

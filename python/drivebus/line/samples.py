@@ -171,6 +171,10 @@ class Polling:
         shortest: Seconds that one cycle takes at least on this line; 0.0 where the line sets no such limit.
     """
 
+    interval: float | None
+    size: int
+    shortest: float
+
     def __init__(self, bus: object, native: _native.Bus, targets: object, interval: float | None, size: int) -> None:
         if interval is not None:
             interval = checks.number("interval", interval, 0.0, _LONGEST_INTERVAL, above=True)

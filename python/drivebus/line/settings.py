@@ -112,6 +112,9 @@ class BusFace:
         format: The `SerialFormat` in force.
     """
 
+    simulator: Simulator | None
+    format: SerialFormat
+
     def __init__(
         self,
         port: object,

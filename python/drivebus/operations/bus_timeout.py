@@ -35,6 +35,12 @@ class BusTimeout:
         error: What the last failure of keeping the line busy was, or of closing; None if there was none.
     """
 
+    timeout: float
+    action: str
+    verified: bool
+    armed: bool
+    error: DrivebusError | None
+
     def __init__(self, drive: Unit, timeout: float, action: str) -> None:
         settings = drive.profile.watchdog
         if settings is None:
@@ -56,7 +62,7 @@ class BusTimeout:
         self.action = checks.one_of("action", action, list(settings.actions))
         self.verified = settings.verified
         self.armed = False
-        self.error: DrivebusError | None = None
+        self.error = None
         self._unit = drive
         # The action comes first: a time-out must not run out on another one.
         self._wanted: dict[str, Value] = {

@@ -28,9 +28,12 @@ class DriveFace:
         unverified: Whether what no document of its family proves is done all the same, in every call.
     """
 
+    unit: int
+    profile: Profile
+
     def __init__(self, unit: Unit) -> None:
-        self.unit: int = unit.address
-        self.profile: Profile = unit.profile
+        self.unit = unit.address
+        self.profile = unit.profile
         self._unit = unit
 
     def __repr__(self) -> str:
