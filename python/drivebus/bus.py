@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from drivebus import _native, checks
 from drivebus.attributes import known_only
@@ -20,7 +20,7 @@ from drivebus.identify.identify import identify
 from drivebus.identify.results import Found, Identification
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
-from drivebus.line.samples import Sample
+from drivebus.line.samples import Names, Reads, Sample
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.trace import Trace
 from drivebus.operations.program_end import end_over
@@ -28,6 +28,8 @@ from drivebus.poll import Poll
 from drivebus.profile import Profile
 
 __all__ = ["Bus"]
+
+_AnyDrive = TypeVar("_AnyDrive", bound=Drive)
 
 
 @known_only
@@ -165,14 +167,41 @@ class Bus(BusFace, Requests):
         self._opening.known.add(unit, known)
         return drive
 
+    @overload
     def poll(
         self,
-        targets: Mapping[Any, Any],
+        targets: Mapping[_AnyDrive, Names],
         interval: float | None = None,
         *,
         size: int = 10_000,
         callback: Callable[[Sample], object] | None = None,
-    ) -> Poll:
+    ) -> Poll[_AnyDrive]: ...
+    @overload
+    def poll(
+        self,
+        targets: Mapping[int, Reads],
+        interval: float | None = None,
+        *,
+        size: int = 10_000,
+        callback: Callable[[Sample], object] | None = None,
+    ) -> Poll[int]: ...
+    @overload
+    def poll(
+        self,
+        targets: Mapping[Drive | int, Names | Reads],
+        interval: float | None = None,
+        *,
+        size: int = 10_000,
+        callback: Callable[[Sample], object] | None = None,
+    ) -> Poll[Drive | int]: ...
+    def poll(
+        self,
+        targets: Mapping[Any, Names | Reads],
+        interval: float | None = None,
+        *,
+        size: int = 10_000,
+        callback: Callable[[Sample], object] | None = None,
+    ) -> Poll[Any]:
         """Asks drives again and again, in a thread of the core's own, and gives what comes as samples.
 
             with bus.poll({drive: ["running_frequency", "output_current"], other: None}, interval=0.1) as poll:

@@ -12,17 +12,18 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator
 from types import TracebackType
+from typing import Any
 
 from drivebus import _native
 from drivebus.attributes import known_only
 from drivebus.errors import NotAllowed
-from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
 
 @known_only
-class Poll(Polling):
+class Poll(Polling[Key]):
     """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
 
     Iterating over it gives each sample as it comes, and ends when the poll does; `batch` and `take` give many at once.
@@ -58,7 +59,7 @@ class Poll(Polling):
             self._thread = threading.Thread(target=self._deliver, name="drivebus poll", daemon=True)
             self._thread.start()
 
-    def batch(self, count: int | None = None, timeout: float | None = None) -> Batch:
+    def batch(self, count: int | None = None, timeout: float | None = None) -> Batch[Key]:
         """Waits for *count* samples and returns them. None waits for one, and returns all there are.
 
         Fewer where *timeout* seconds of the line's clock are over first, or where the poll has ended.
@@ -106,7 +107,7 @@ class Poll(Polling):
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()
 
-    def __enter__(self) -> Poll:
+    def __enter__(self) -> Poll[Key]:
         return self
 
     def __exit__(
@@ -143,7 +144,7 @@ class Poll(Polling):
             raise error
 
 
-_polls: weakref.WeakSet[Poll] = weakref.WeakSet()
+_polls: weakref.WeakSet[Poll[Any]] = weakref.WeakSet()
 
 
 @atexit.register

@@ -113,6 +113,6 @@ def test_what_is_wrong_is_refused_at_once(run: Run) -> None:
                 with pytest.raises(NotAllowed, match="at least"):
                     bus.poll({drive: None}, interval=0.001)
                 with drivebus.Bus("sim://gd350?clock=virtual") as other, pytest.raises(NotAllowed, match="another bus"):
-                    bus.poll({other.drive(1): None})
+                    bus.poll({other.drive(1): None})  # type: ignore[type-var]
 
     run(main())

@@ -7,7 +7,7 @@ import os
 from collections.abc import AsyncIterator, Generator, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from drivebus import _native, checks
 from drivebus.aio.drive import Drive
@@ -23,6 +23,7 @@ from drivebus.identify.results import Found, Identification
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
+from drivebus.line.samples import Names, Reads
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
 from drivebus.line.trace import Trace
@@ -31,6 +32,8 @@ from drivebus.operations.program_end import end_over
 from drivebus.profile import Profile
 
 __all__ = ["Bus"]
+
+_AnyDrive = TypeVar("_AnyDrive", bound=Drive)
 
 
 @known_only
@@ -214,7 +217,19 @@ class Bus(BusFace):
         self._opening.known.add(unit, known)
         return drive
 
-    def poll(self, targets: Mapping[Any, Any], interval: float | None = None, *, size: int = 10_000) -> Poll:
+    @overload
+    def poll(
+        self, targets: Mapping[_AnyDrive, Names], interval: float | None = None, *, size: int = 10_000
+    ) -> Poll[_AnyDrive]: ...
+    @overload
+    def poll(self, targets: Mapping[int, Reads], interval: float | None = None, *, size: int = 10_000) -> Poll[int]: ...
+    @overload
+    def poll(
+        self, targets: Mapping[Drive | int, Names | Reads], interval: float | None = None, *, size: int = 10_000
+    ) -> Poll[Drive | int]: ...
+    def poll(
+        self, targets: Mapping[Any, Names | Reads], interval: float | None = None, *, size: int = 10_000
+    ) -> Poll[Any]:
         """As `drivebus.Bus.poll`, for `async with` and `async for`. It asks from now on, and keeps no event loop."""
         return Poll(self, self._core(), targets, interval, size)
 

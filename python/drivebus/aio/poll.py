@@ -10,13 +10,13 @@ from types import TracebackType
 from drivebus import _native
 from drivebus.aio.mailbox import Mailbox
 from drivebus.attributes import known_only
-from drivebus.line.samples import MOST_SAMPLES, Batch, Polling, Sample, how_many, poller_of, seconds
+from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
 
 
 @known_only
-class Poll(Polling):
+class Poll(Polling[Key]):
     """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
 
     `async for` gives each sample as it comes, and ends when the poll does; `batch` and `take` give many at once. The
@@ -29,7 +29,7 @@ class Poll(Polling):
         self._native = poller_of(self)
         self._bus = native
 
-    async def batch(self, count: int | None = None, timeout: float | None = None) -> Batch:
+    async def batch(self, count: int | None = None, timeout: float | None = None) -> Batch[Key]:
         """Waits for *count* samples and returns them. None waits for one, and returns all there are.
 
         Fewer where *timeout* seconds are over first, or where the poll has ended.
@@ -61,7 +61,7 @@ class Poll(Polling):
         """Ends the poll. What is there can still be taken. Closing again does nothing."""
         self._native.stop()
 
-    async def __aenter__(self) -> Poll:
+    async def __aenter__(self) -> Poll[Key]:
         return self
 
     async def __aexit__(

@@ -6,7 +6,7 @@ The asking is the compiled core's. How one waits for samples is the business of 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
 
 from drivebus import _native, checks
 from drivebus.errors import DrivebusError, NotAllowed, Refused
@@ -16,8 +16,33 @@ from drivebus.values import Value
 
 if TYPE_CHECKING:
     import numpy.typing
+    from typing_extensions import TypeVar
 
-__all__ = ["MOST_SAMPLES", "Batch", "Polling", "Sample", "how_many", "poller_of", "seconds"]
+    # Whoever writes `Poll` or `Batch` alone means one of anything.
+    Key = TypeVar("Key", default=Any)
+else:
+    from typing import TypeVar
+
+    Key = TypeVar("Key")
+
+__all__ = [
+    "MOST_SAMPLES",
+    "Batch",
+    "Key",
+    "Names",
+    "Polling",
+    "Reads",
+    "Sample",
+    "how_many",
+    "poller_of",
+    "seconds",
+]
+
+Names = str | Iterable[str] | None
+"""What is asked of a drive: names of registers or parameters; None for its monitor registers."""
+
+Reads = Iterable[Sequence[int]]
+"""What is asked of a unit that no profile is known of: pairs of an address and how many words."""
 
 MOST_SAMPLES = 1_000_000
 """More are never kept."""
@@ -101,7 +126,7 @@ class Sample(Mapping[str | int, Value]):
         return f"<Sample of unit {self.unit} at {self.time:.3f}: {self.missing or shown}>"
 
 
-class Batch(Sequence[Sample]):
+class Batch(Sequence[Sample], Generic[Key]):
     """Samples in the order in which they were taken by the bus. They are decoded when they are first looked at."""
 
     def __init__(self, native: _native.Batch, targets: Sequence[Target]) -> None:
@@ -125,7 +150,7 @@ class Batch(Sequence[Sample]):
     def __repr__(self) -> str:
         return f"<Batch of {len(self)} samples>"
 
-    def to_numpy(self) -> dict[Any, numpy.typing.NDArray[Any]]:
+    def to_numpy(self) -> dict[Key, numpy.typing.NDArray[numpy.void]]:
         """One structured array for each drive (or unit) that was polled, with a row for each of its samples.
 
         Its fields are `time` and `answered`, as in `Sample`, and one for each name (of a unit without a profile, each
@@ -138,7 +163,7 @@ class Batch(Sequence[Sample]):
             import numpy
         except ImportError:
             raise ImportError("to_numpy() needs numpy: pip install 'drivebus[numpy]'") from None
-        arrays: dict[Any, numpy.typing.NDArray[Any]] = {}
+        arrays: dict[Key, numpy.typing.NDArray[numpy.void]] = {}
         for index, target in enumerate(self._targets):
             names = [name if isinstance(name, str) else f"{name:#06x}" for name in target.names]
             fields = [(name, "f8") for name in ("time", "answered", *names)]
@@ -162,7 +187,7 @@ class Batch(Sequence[Sample]):
         return Sample(target, time, answered, values, error)
 
 
-class Polling:
+class Polling(Generic[Key]):
     """What every face of a poll has, whether its calls block or are awaited.
 
     Attributes:
@@ -210,7 +235,7 @@ class Polling:
         """Samples that gave way to newer ones before somebody took them."""
         return self._native.counts()["dropped"]
 
-    def take(self, max: int | None = None) -> Batch:  # noqa: A002
+    def take(self, max: int | None = None) -> Batch[Key]:  # noqa: A002
         """The oldest samples that are there, *max* at most, without waiting. Empty where there are none."""
         limit = self.size if max is None else checks.whole("max", max, 0, MOST_SAMPLES)
         return Batch(self._native.take(limit), self._targets)
@@ -221,12 +246,12 @@ class Polling:
         return f"<{type(self).__name__} of unit {units} {how}{', closed' if self.closed else ''}>"
 
 
-def poller_of(polling: Polling) -> _native.Poller:
+def poller_of(polling: Polling[Any]) -> _native.Poller:
     """What asks, in the core."""
     return polling._native
 
 
-def how_many(polling: Polling, count: int | None) -> int:
+def how_many(polling: Polling[Any], count: int | None) -> int:
     """How many samples are waited for: *count*, or one for None."""
     return 1 if count is None else checks.whole("count", count, 1, polling.size)
 
