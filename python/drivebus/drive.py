@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import overload
 
+from drivebus import checks
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
 from drivebus.line.blocking import BlockingBus, at_once
@@ -182,12 +183,17 @@ class Drive(DriveFace):
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
+        wait: bool = False,
+        timeout: float = 60.0,
     ) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
         A stop that is not confirmed is sent again, and in the end the drive is told to coast. With *unverified* the end
         is proved as the start was, by states that are not verified. An error from inside the block is raised as it is;
         if the drive could not be stopped either, its note says so.
+
+        With *wait* the block is left when the motor stands: `wait_until_stopped`, for *timeout* seconds, follows the
+        stop, also where the block ended with an error. What ends the program (Ctrl-C, SystemExit) is not kept waiting.
 
         The end of the program stops it too: what is still inside such a block when the interpreter ends, and, while the
         main thread is inside one, SIGTERM and SIGHUP (unless the program listens to them itself), which raise
@@ -196,10 +202,12 @@ class Drive(DriveFace):
         Raises:
             NotAllowed, Refused, NoAnswer, BadAnswer, PortError: From `run`, which was not sent or not taken: the
                 motor is left as it was. Or from stopping, when the block itself went well.
-            Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn.
+            Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn. Or it was
+                told to stop, and does not stand when *timeout* is over; the message says what it does.
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
-        with self._moving(run, lambda: self._end(self.stop, unverified), unverified):
+        standstill = timeout if checks.flag("wait", wait) else None
+        with self._moving(run, lambda: self._end(self.stop, unverified), unverified, standstill):
             yield self
 
     @contextmanager
@@ -255,7 +263,9 @@ class Drive(DriveFace):
         halt(unverified=True) if unverified else halt()
 
     @contextmanager
-    def _moving(self, start: Callable[[], None], end: Callable[[], None], unverified: bool) -> Iterator[None]:
+    def _moving(
+        self, start: Callable[[], None], end: Callable[[], None], unverified: bool, standstill: float | None = None
+    ) -> Iterator[None]:
         """Starts, and ends by all means."""
 
         async def begin() -> None:
@@ -264,7 +274,7 @@ class Drive(DriveFace):
         async def finish(_: Unit) -> None:
             end()
 
-        block = MotorBlock(unit_of(self).trusting(unverified), begin, finish)
+        block = MotorBlock(unit_of(self).trusting(unverified), begin, finish, standstill)
         try:
             at_once(block.begin())
             yield

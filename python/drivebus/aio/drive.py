@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mappi
 from contextlib import asynccontextmanager
 from typing import Any, overload
 
+from drivebus import checks
 from drivebus.aio.watchdog import Watchdog
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
@@ -173,15 +174,18 @@ class Drive(DriveFace):
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
+        wait: bool = False,
+        timeout: float = 60.0,
     ) -> AsyncIterator[Drive]:
         """Runs the motor inside an `async with` block and stops it whatever happens there, cancellation included.
 
         While it is stopped nothing gives that up: a cancellation that comes meanwhile is raised afterwards. The end of
-        the program stops it too, and where the event loop is gone by then, without one. Otherwise as
-        `drivebus.Drive.running`.
+        the program stops it too, and where the event loop is gone by then, without one. A cancellation is not kept
+        waiting by *wait*. Otherwise as `drivebus.Drive.running`.
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
-        block = MotorBlock(unit_of(self).trusting(unverified), run, motion.stop)
+        standstill = timeout if checks.flag("wait", wait) else None
+        block = MotorBlock(unit_of(self).trusting(unverified), run, motion.stop, standstill)
         async with _block(block):
             yield self
 

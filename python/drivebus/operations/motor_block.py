@@ -9,7 +9,7 @@ from typing import TypeAlias
 from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
-from drivebus.operations import motion
+from drivebus.operations import motion, waiting
 from drivebus.operations.program_end import Guard
 from drivebus.operations.unit import Unit
 
@@ -34,12 +34,19 @@ class MotorBlock:
         unit: What turns.
         start: Starts it.
         end: Ends it, over the view of the unit that it is given: it may be that of another thread.
+        standstill: For how many seconds it is waited for, once it was ended; None does not wait. What ends the program
+            is not kept waiting.
     """
 
     def __init__(
-        self, unit: Unit, start: Callable[[], Awaitable[None]], end: Callable[[Unit], Awaitable[None]]
+        self,
+        unit: Unit,
+        start: Callable[[], Awaitable[None]],
+        end: Callable[[Unit], Awaitable[None]],
+        standstill: float | None = None,
     ) -> None:
         self._unit = unit
+        self._standstill = standstill
         self._start = start
         self._end = end
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
@@ -52,8 +59,11 @@ class MotorBlock:
         """Starts the motor.
 
         Raises:
-            NotAllowed: Also where the end of the program has begun. Nothing was sent.
+            NotAllowed: Also where the end of the program has begun, or its standstill could not be seen. Nothing was
+                sent.
         """
+        if self._standstill is not None:
+            waiting.check_standstill(self._unit, self._standstill)
         self._guard.arm()
         with self._guard.beginning():
             await self._start()
@@ -65,6 +75,7 @@ class MotorBlock:
         if isinstance(reason, GeneratorExit):
             self._leave()
             return
+        ended = False
         try:
             with self._keeping_interruptions(), self._unit.bus.undisturbed() as bus:
                 # Of this package's errors, only Unconfirmed comes from a start once its command was sent. What ended it
@@ -73,8 +84,9 @@ class MotorBlock:
                 failure = interrupted = None
                 if self._started or (may_turn and self._unit.memory.starts > self._starts_before):
                     failure, interrupted = await self._stop(bus)
-                    if failure is not None and hasattr(reason, "add_note"):
-                        reason.add_note(f"and unit {self._unit.address} could not be stopped: {failure}")
+                    ended = failure is None
+                    if failure is not None:
+                        _note(reason, f"and unit {self._unit.address} could not be stopped: {failure}")
                 self._guard.disarm()
                 if interrupted is not None:
                     raise interrupted
@@ -82,6 +94,11 @@ class MotorBlock:
             # Of several that end the same block, and what ends the program anyway, the first is raised.
             if isinstance(reason, Exception):
                 raise
+        if ended and isinstance(reason, Exception):
+            try:
+                await self._stand()
+            except DrivebusError as failure:
+                _note(reason, f"and {self._unseen}: {failure}")
 
     async def finish(self) -> None:
         """The block went well. Raises what came of stopping the motor."""
@@ -91,6 +108,22 @@ class MotorBlock:
             unwelcome = failure or interrupted
             if unwelcome is not None:
                 raise unwelcome
+        try:
+            await self._stand()
+        except Unconfirmed:
+            raise  # it says what the motor does
+        except DrivebusError as failure:
+            _note(failure, self._unseen)
+            raise
+
+    async def _stand(self) -> None:
+        """Waits until the motor stands, where that was asked for."""
+        if self._standstill is not None:
+            await waiting.wait_until_stopped(self._unit, self._standstill)
+
+    @property
+    def _unseen(self) -> str:
+        return f"unit {self._unit.address} was told to stop, but was not seen to stand"
 
     def _keeping_interruptions(self) -> AbstractContextManager[object]:
         before = self._unit.memory.halts
@@ -140,3 +173,9 @@ class MotorBlock:
             else:
                 return None, interrupted
         return failure, interrupted
+
+
+def _note(error: BaseException, text: str) -> None:
+    """Says *text* with *error*. Python 3.10 has no notes."""
+    if hasattr(error, "add_note"):
+        error.add_note(text)

@@ -11,7 +11,7 @@ from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.unit import Unit
 from drivebus.values import State, Status
 
-__all__ = ["wait_for_speed", "wait_until_stopped"]
+__all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
 
 _STANDSTILL = 0.05
 """Output frequency in Hz below which a drive that has stopped counts as stopped."""
@@ -80,8 +80,14 @@ async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: b
         return status.state.at_rest and not turns
 
     unit = unit.trusting(unverified)
-    _check_told(unit, "waiting for the standstill")
+    check_standstill(unit, timeout)
     return await _wait(unit, stopped, "it did not stop", timeout)
+
+
+def check_standstill(unit: Unit, timeout: float) -> None:
+    """Raises `NotAllowed` if `wait_until_stopped` would, before anything moves."""
+    checks.number("timeout", timeout, 0.0)
+    _check_told(unit, "waiting for the standstill")
 
 
 async def _wait(unit: Unit, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
