@@ -161,6 +161,41 @@ class TestArrays:
             poll.batch(1).to_numpy()
 
 
+class TestFrames:
+    def test_one_frame_for_each_drive_with_its_units(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
+        pandas = pytest.importorskip("pandas")
+        drive, _ = pair
+        with still.poll({drive: ["output_current", "status_word_1"], 9: [(0x2100, 2)]}, interval=0.2) as poll:
+            batch = poll.batch(8)
+        frames = batch.to_pandas()
+        assert list(frames) == [drive, 9]
+        assert list(frames[drive].columns) == ["output_current", "status_word_1"]
+        assert list(frames[9].columns) == ["0x2100", "0x2101"]
+        assert (frames[drive].attrs, frames[9].attrs) == ({"units": {"output_current": "A"}}, {"units": {}})
+        samples = [sample for sample in batch if sample.drive is drive]
+        for name in ("output_current", "status_word_1"):
+            assert frames[drive][name].tolist() == [sample[name] for sample in samples]
+        index = frames[drive].index
+        assert (str(index.tz), index.name, index.is_monotonic_increasing) == ("UTC", "time", True)
+        assert [moment.timestamp() for moment in index] == pytest.approx([sample.time for sample in samples], abs=1e-6)
+        assert frames[9].isna().all().all()
+        assert not pandas.isna(frames[9].index).any()
+
+    def test_none_from_nothing(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
+        pytest.importorskip("pandas")
+        with still.poll({pair[0]: None}) as poll:
+            frame = poll.take().to_pandas()[pair[0]]
+        assert (len(frame), str(frame.index.tz)) == (0, "UTC")
+        assert "output_current" in frame.columns
+
+    def test_without_pandas_it_says_what_to_install(
+        self, still: Bus, pair: tuple[Drive, Drive], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(sys.modules, "pandas", None)
+        with still.poll({pair[0]: None}) as poll, pytest.raises(ImportError, match=r"pip install 'drivebus\[pandas\]'"):
+            poll.batch(1).to_pandas()
+
+
 class TestCallback:
     def test_in_virtual_time_it_is_called_by_whoever_waits(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
         seen: list[Sample] = []

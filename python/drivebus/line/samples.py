@@ -16,6 +16,7 @@ from drivebus.values import Value
 
 if TYPE_CHECKING:
     import numpy.typing
+    import pandas
     from typing_extensions import TypeVar
 
     # Whoever writes `Poll` or `Batch` alone means one of anything.
@@ -79,6 +80,17 @@ class Target(NamedTuple):
     plan: ReadPlan | None
     names: tuple[str | int, ...]
     asked: _native.Plan | list[tuple[int, int]]
+
+    def columns(self) -> list[str]:
+        """The names as text: an address as `0x3000`."""
+        return [name if isinstance(name, str) else f"{name:#06x}" for name in self.names]
+
+    def units(self) -> dict[str, str]:
+        """The unit of each name that has one."""
+        if self.profile is None:
+            return {}
+        units = {name: self.profile.describe(name).unit for name in self.columns()}
+        return {name: unit for name, unit in units.items() if unit}
 
 
 class Sample(Mapping[str | int, Value]):
@@ -165,10 +177,31 @@ class Batch(Sequence[Sample], Generic[Key]):
             raise ImportError("to_numpy() needs numpy: pip install 'drivebus[numpy]'") from None
         arrays: dict[Key, numpy.typing.NDArray[numpy.void]] = {}
         for index, target in enumerate(self._targets):
-            names = [name if isinstance(name, str) else f"{name:#06x}" for name in target.names]
-            fields = [(name, "f8") for name in ("time", "answered", *names)]
+            fields = [(name, "f8") for name in ("time", "answered", *target.columns())]
             arrays[target.key] = numpy.frombuffer(self._native.rows(index), dtype=fields)
         return arrays
+
+    def to_pandas(self) -> dict[Key, pandas.DataFrame]:
+        """One DataFrame for each drive (or unit) that was polled, with a row for each of its samples.
+
+        The index is `Sample.time` as a moment in UTC. There is a column for each name (of a unit without a profile,
+        each address such as `"0x3000"`): all float64, NaN where the sample is missing. `frame.attrs["units"]` has the
+        units by column, of those that have one: `{"output_current": "A"}`.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_pandas() needs pandas: pip install 'drivebus[pandas]'") from None
+        frames: dict[Key, pandas.DataFrame] = {}
+        for target, (key, array) in zip(self._targets, self.to_numpy().items(), strict=True):
+            moments = pandas.DatetimeIndex(pandas.to_datetime(array["time"], unit="s", utc=True), name="time")
+            frame = pandas.DataFrame({name: array[name] for name in target.columns()}, index=moments)
+            frame.attrs["units"] = target.units()
+            frames[key] = frame
+        return frames
 
     def _decoded(self) -> list[Sample]:
         if self._samples is None:
