@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import drivebus
+import drivebus.aio
 from drivebus import ControlSource, Simulator, State
 from drivebus.cli.app import cli
 
@@ -141,6 +142,7 @@ def test_a_state_is_its_name() -> None:
 
 def test_a_package_shows_its_public_names_only() -> None:
     assert dir(drivebus) == sorted(drivebus.__all__)
+    assert dir(drivebus.aio) == sorted(drivebus.aio.__all__)
     assert "operations" not in dir(drivebus)
 
 

@@ -94,6 +94,17 @@ class TestNew:
         assert profile.name == "my-drive-2"
         assert profile.family == (options[1] if "--overlay" in options else "my-drive-2")
 
+    @pytest.mark.parametrize("options", [[], ["--like", "gd350"], ["--overlay", "gd350"]])
+    def test_what_it_points_to_is_there(self, tmp_path: Path, options: list[str]) -> None:
+        """An installed drivebus has no docs/."""
+        run("profiles", "new", tmp_path / "mine", *options)
+        text = (tmp_path / "mine" / "profile.toml").read_text(encoding="utf-8")
+        assert "docs/" not in text
+        assert {"profile.schema.json", "registers.csv"} < {path.name for path in (tmp_path / "mine").iterdir()}
+        for words in re.findall(r"^#   drivebus (profiles (?:check|show) .*)$", text, re.MULTILINE):
+            what = str(tmp_path / "mine") if words.endswith("mine") else words.split()[-1]
+            assert run(*words.split()[:2], what).exit_code == 0
+
     def test_what_it_leaves_out_is_sound_too(self, tmp_path: Path) -> None:
         """The rows that stand in comments, made rows: each key of them is known."""
         run("profiles", "new", tmp_path / "mine")

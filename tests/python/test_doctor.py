@@ -34,6 +34,13 @@ def named(findings: list[Finding], name: str) -> Finding:
     return finding
 
 
+def test_a_severity_equals_its_name() -> None:
+    names: list[str] = list(Severity)
+    assert names == ["ok", "note", "warning", "fault"]
+    assert (str(Severity.OK), f"{Severity.OK:>4}") == ("ok", "  ok")
+    assert sorted(Severity, key=lambda one: one.rank) == list(Severity)
+
+
 class TestASoundLine:
     def test_nothing_is_wrong_and_everybody_is_found(self) -> None:
         with line() as simulator:

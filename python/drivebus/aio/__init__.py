@@ -23,3 +23,8 @@ from drivebus.aio.poll import Poll
 from drivebus.aio.watchdog import Watchdog
 
 __all__ = ["Bus", "Drive", "Poll", "Watchdog"]
+
+
+def __dir__() -> list[str]:
+    """The public names, as of `drivebus`."""
+    return sorted(__all__)

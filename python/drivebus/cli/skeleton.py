@@ -31,7 +31,8 @@ _HEAD = """\
 #
 # The long tables stand beside this file: registers.csv, parameters.csv, faults.csv. After each change:
 #   drivebus profiles check {folder}
-# What each key means, and from a manual page to a working profile: docs/profiles.md.
+# {schema} says what each key means: an editor shows it while you type. A whole profile in words:
+#   drivebus profiles show gd350
 
 name = "{name}"
 title = "{title}"

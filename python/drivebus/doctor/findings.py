@@ -12,8 +12,8 @@ from drivebus.errors import DrivebusError
 __all__ = ["Finding", "Severity"]
 
 
-class Severity(Enum):
-    """How bad a finding is."""
+class Severity(str, Enum):
+    """How bad a finding is. It equals its name: `Severity.FAULT == "fault"`."""
 
     OK = "ok"
     NOTE = "note"
@@ -27,6 +27,9 @@ class Severity(Enum):
 
     def __str__(self) -> str:
         return self.value
+
+    def __format__(self, form: str) -> str:
+        return format(str(self), form)
 
 
 @dataclass(frozen=True)

@@ -152,7 +152,7 @@ class Evidence:
         known = self.profile.describe(name)
         return NotAllowed(
             f"the address of {self._named(name)} is not known: {_sentence(known.reason or known.note)} Nothing was "
-            f"sent to unit {self.unit}; an overlay on the profile can fill it in (docs/profiles.md)",
+            f"sent to unit {self.unit}; an overlay on the profile can fill it in (`drivebus profiles new`)",
             unit=self.unit,
         )
 
