@@ -186,6 +186,52 @@ def buses() -> dict[str, bytes]:
     }
 
 
+def guests() -> dict[str, bytes]:
+    """For `guest`: whether it is greeted rightly, then messages as `postcard` writes them, each behind its length."""
+    calls, listening, figures, link, word, reconnects, cancel = range(7)
+    second = b"\x80\x94\xeb\xdc\x03"  # nanoseconds, seven bits a byte
+    for_ever = b"\xff" * 9 + b"\x01"
+
+    def say(*messages: bytes) -> bytes:
+        return b"\1" + b"".join(bytes([len(message)]) + message for message in messages)
+
+    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0") -> bytes:
+        request = bytes([calls, unit, len(pdu)]) + pdu
+        return request + b"\0" + timeout + b"\0\0\0" + bytes([priority, 2]) + more
+
+    read, write, echo = bytes([3, 0x21, 3, 0, 1]), bytes([6, 0x80, 11, 0, 5]), bytes([8, 0, 0, 0x12, 0xAB])
+    many = bytes([16, 0x80, 11, 0, 2, 4, 0, 1, 0, 2])
+    hello = b"drivebus share \1\1f\x80\x96\1\x08E\1"
+    greet = b"\0" + bytes([len(hello)]) + hello
+    return {
+        "read": say(call(read)),
+        "write-then-read": say(call(write, priority=1), call(read)),
+        "stop": say(call(bytes([6, 0x20, 0, 0, 5]), priority=0)),
+        "write-many": say(call(many, priority=1)),
+        "echo": say(call(echo)),
+        "read-back": say(call(write, priority=1, more=b"\0\1\x8b\x80\2\0")),
+        "on-a-connection": say(call(write, priority=1, more=b"\0\0\1\0")),
+        "verified": say(call(read, more=b"\1\0\0")),
+        "nobody": say(call(read, unit=9)),
+        "broadcast": say(call(write, unit=0, priority=1)),
+        "no-unit": say(call(read, unit=250)),
+        "no-priority": say(call(read, priority=9)),
+        "for-ever": say(call(read, unit=9, timeout=for_ever)),
+        "asks-for-figures": say(*(bytes([kind]) for kind in (figures, word, reconnects)), bytes([link, 1])),
+        "listens": say(bytes([listening]) + second),
+        "listens-for-ever": say(bytes([listening]) + for_ever),
+        "cancels": say(bytes([cancel]), bytes([listening]) + second + bytes([cancel])),
+        "greets-itself": greet + bytes([1, word]),
+        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \1", b" \2"),
+        "other-characters": b"\0" + bytes([len(hello)]) + hello.replace(b"E", b"N"),
+        "no-greeting": b"\0" + b"\5hello",
+        "too-long": b"\1\xff\4\xff\xff\0\0",
+        "cut-short": b"\1\xff\6\x20\0\0\0\0\1",
+        "nothing": b"\1",
+        "gone-at-once": b"\0",
+    }
+
+
 def profiles() -> dict[str, bytes]:
     """For `profile`: each file of the small profile by itself, and cases that are easily got wrong."""
     names = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"]
@@ -303,6 +349,7 @@ def main() -> None:
         "drive": drives(),
         "frame": frames(),
         "framer": framer,
+        "guest": guests(),
         "listener": listened,
         "master": masters(),
         "profile": profiles(),

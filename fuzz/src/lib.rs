@@ -9,6 +9,7 @@ mod bus;
 mod doubts;
 mod frame;
 mod framer;
+mod guest;
 mod listener;
 mod master;
 mod oracle;
@@ -20,6 +21,7 @@ mod told;
 pub use bus::bus;
 pub use frame::frame;
 pub use framer::framer;
+pub use guest::guest;
 pub use listener::listener;
 pub use master::master;
 pub use profile::profile;
@@ -29,7 +31,7 @@ pub use slave::slave;
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus and of its program.
-pub const TARGETS: [(&str, Target); 7] = [
+pub const TARGETS: [(&str, Target); 8] = [
     ("frame", frame),
     ("framer", framer),
     ("listener", listener),
@@ -37,4 +39,5 @@ pub const TARGETS: [(&str, Target); 7] = [
     ("master", master),
     ("profile", profile),
     ("bus", bus),
+    ("guest", guest),
 ];
