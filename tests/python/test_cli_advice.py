@@ -19,6 +19,7 @@ PYTHON = re.compile(r"\b[a-z_.]+\(\)|\b[a-z_]+=(?:True|…|\{)")
 # Said to programs only: no command leads there.
 OF_PROGRAMS = (
     "to_numpy()",
+    "to_pandas()",
     "prepare_control(setpoint=",
     "poll() takes",
     "or use broadcast()",

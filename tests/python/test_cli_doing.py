@@ -150,8 +150,7 @@ def test_values_have_as_many_digits_as_the_drive_counts() -> None:
     words = ["read", "running_frequency", "P00.11", "output_current", "identification_code"]
     lines = CliRunner().invoke(cli, ["--port", VIRTUAL, *words]).stdout.splitlines()[1:]
     assert [line.split()[1] for line in lines] == ["0.00", "10.0", "0.0", "416"]
-    stamp = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00"
     watched = CliRunner().invoke(cli, ["--port", VIRTUAL, "monitor", "--count", "1", "running_frequency"]).stdout
-    assert re.fullmatch(rf"{stamp} running_frequency=0\.00Hz\n", watched), watched
+    assert watched.splitlines()[1].split(",")[1:] == ["0.00", ""]
     written = CliRunner().invoke(cli, ["--port", VIRTUAL, "write", "P00.11=5", "--yes"]).stdout.splitlines()[1]
     assert written.split()[:3] == ["P00.11", "5.0", "s"]

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import nullcontext
+import csv
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, nullcontext
 from datetime import datetime, timezone
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 import click
-from rich.console import Group
 from rich.live import Live
-from rich.text import Text
 
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.output import Output, printable, remark
+from drivebus.cli.screen import Screen, Watched
 from drivebus.cli.session import Session, exit_code, pass_session
 from drivebus.cli.types import Seconds, Whole
 
 __all__ = ["COMMANDS"]
 
 _KEPT = 10_000
-"""Samples that wait where they are taken more slowly than they come. A person who watches wants the newest only."""
+"""Samples that wait where they are taken more slowly than they come."""
 
 
 @click.command()
@@ -33,35 +36,39 @@ _KEPT = 10_000
     show_default=True,
     help="Seconds from one sample to the next; 0: as fast as the line.",
 )
-@click.option("--count", type=Whole(1), help="Samples to take; without it, until Ctrl-C.")
+@click.option("--count", type=Whole(1), help="Samples to take of each drive; without it, until Ctrl-C.")
 @pass_session
 def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: int | None) -> None:
     """Watch registers as they change: all monitor registers, or those named.
 
-    A sample that does not come is shown as missing, and the next one is asked for. Where none comes at all, the exit
-    code says why.
+    A terminal shows the latest values, and the least and greatest so far. A file or a pipe gets CSV, and --json an
+    object for each sample. A sample that does not come is shown as missing, and the next one is asked for. Where none
+    comes at all, the exit code says why.
     """
     out = session.out
     interrupted = False
-    with session.bus() as bus:
-        drive = session.drive_on(bus)
-        known = [names.named(drive.profile, text) for text in wanted] or drive.readable()
-        if not known:
-            raise drivebus.NotAllowed(
-                f"nothing that is known of {drive.profile.title} may be watched without --unverified; name what you "
-                "want to see"
+    with ExitStack() as open_lines:
+        lines = _lines(session, wanted, open_lines)
+        drives = [drive for _, line in lines for drive in line]
+        seen = _Seen(out, [watched for watched, _ in drives])
+        polls = [
+            open_lines.enter_context(
+                bus.poll({drive: _asked(watched) for watched, drive in line}, interval or None, size=_KEPT)
             )
-        seen = _Seen(out, {name: drive.describe(name) for name in known})
-        with bus.poll({drive: known}, interval or None, size=1 if out.live else _KEPT) as poll:
-            try:
-                with seen.live or nullcontext():
-                    for sample in poll:
-                        seen.show(sample)
-                        if seen.count == count:
-                            break
-            except KeyboardInterrupt:
-                interrupted = True
-    for text in seen.told(poll, interval):
+            for bus, line in lines
+        ]
+        by_drive = {id(drive): watched for watched, drive in drives}
+        try:
+            with seen.live or nullcontext():
+                for sample in _samples(polls):
+                    seen.show(by_drive[id(sample.drive)], sample)
+                    if count is not None and seen.count == count * len(drives):
+                        break
+        except KeyboardInterrupt:
+            interrupted = True
+        told = list(seen.told(polls, interval))
+    seen.end()
+    for text in told:
         remark(text)
     if seen.last is not None and seen.missing == seen.count:
         session.advise(seen.last)
@@ -71,68 +78,171 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
         raise click.exceptions.Exit(130)
 
 
+_Drives = list[tuple[Watched, drivebus.Drive]]
+
+
+def _lines(session: Session, wanted: Sequence[str], opened: ExitStack) -> list[tuple[drivebus.Bus, _Drives]]:
+    """The drives that are watched, those of each line together."""
+    lines: dict[str, tuple[drivebus.Bus, _Drives]] = {}
+    for one in session.several or (session,):
+        key = repr((one.port, one.baud, one.line_format, one.rs485, one.read_only))
+        if key not in lines:
+            lines[key] = opened.enter_context(one.bus()), []
+        bus, drives = lines[key]
+        drive = one.drive_on(bus)
+        drives.append((_watched(one, drive, wanted), drive))
+    return list(lines.values())
+
+
+def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> Watched:
+    """What is shown of *drive*."""
+    profile = drive.profile
+    # What the drive is does not change while one looks.
+    usual = [name for name in drive.readable() if not name.startswith("identification")]
+    known = [names.named(profile, text) for text in wanted] or usual
+    if not known:
+        raise drivebus.NotAllowed(
+            f"nothing that is known of {profile.title} may be watched without --unverified; name what you want to see"
+        )
+    rows = {name: drive.describe(name) for name in known}
+    hint = ""
+    if not wanted and profile.role("frequency") not in rows:
+        hint = "What is proved for this family does not tell the frequency; --unverified shows more."
+    if hint and not session.out.live:
+        remark(hint)
+    where = f"{session.name}: " if session.name else ""
+    told = {role: _readable(drive, role) if session.out.live else None for role in ("state", "fault")}
+    return Watched(
+        session.called,
+        f"{where}{profile.title} on {session.port}, unit {session.unit}",
+        profile,
+        rows,
+        told["state"],
+        told["fault"],
+        {name: row.evidence for name, row in rows.items() if row.evidence != "verified"},
+        hint,
+    )
+
+
+def _readable(drive: drivebus.Drive, role: str) -> str | None:
+    """The register that has *role*, if it may be read."""
+    name = drive.profile.role(role)
+    try:
+        return name and drive.readable(name)[0]
+    except drivebus.NotAllowed:
+        return None
+
+
+def _asked(watched: Watched) -> list[str]:
+    told = [name for name in (watched.state, watched.fault) if name is not None]
+    return list(dict.fromkeys([*watched.rows, *told]))
+
+
+def _samples(polls: Sequence[drivebus.Poll[Any]]) -> Iterator[drivebus.Sample]:
+    """What comes of each of *polls*, as it comes."""
+    if len(polls) == 1:
+        yield from polls[0]
+        return
+    came: SimpleQueue[drivebus.Sample | None] = SimpleQueue()
+
+    def forward(poll: drivebus.Poll[Any]) -> None:
+        for sample in poll:
+            came.put(sample)
+        came.put(None)
+
+    for poll in polls:
+        Thread(target=forward, args=(poll,), name="drivebus monitor", daemon=True).start()
+    going = len(polls)
+    while going:
+        sample = came.get()
+        going -= sample is None
+        if sample is not None:
+            yield sample
+
+
 class _Seen:
     """What was shown so far.
 
     Attributes:
-        live: The table on a terminal; None where nobody watches.
+        live: The screen of a terminal; None where nobody watches.
         count: Samples, those that are missing included.
         missing: How many of them are.
         last: Why the last of these is.
     """
 
-    def __init__(self, out: Output, known: dict[str, drivebus.Description]) -> None:
+    def __init__(self, out: Output, drives: Sequence[Watched]) -> None:
         self._out = out
-        self._known = known
-        self._doubtful = {name: row.evidence for name, row in known.items() if row.evidence != "verified"}
-        self.live = Live(console=out.console, auto_refresh=False) if out.live else None
+        self._drives = drives
+        self._screen = Screen(drives)
+        self.live = Live(self._screen, console=out.console, auto_refresh=False, screen=True) if out.live else None
         self.count = 0
         self.missing = 0
         self.last: drivebus.DrivebusError | None = None
+        self._csv = csv.writer(sys.stdout, lineterminator="\n")
+        self._named = len(drives) > 1
+        self._columns = {
+            name: _titled(row, drive.doubtful.get(name, "")) for drive in drives for name, row in drive.rows.items()
+        }
 
-    def show(self, sample: drivebus.Sample) -> None:
+    def show(self, drive: Watched, sample: drivebus.Sample) -> None:
         """One sample; what is not verified is marked."""
         self.count += 1
         if sample.missing is not None:
             self.missing += 1
             self.last = sample.missing
+        drive.take(sample)
+        self._screen.take(sample.time)
         if self.live is not None:
-            self.live.update(self._table(sample), refresh=True)
-        elif self._out.as_json:
-            self._out.record(self._record(sample))
+            self.live.refresh()
+            return
+        moment = datetime.fromtimestamp(sample.time, timezone.utc).isoformat(timespec="microseconds")
+        if self._out.as_json:
+            self._out.record({"time": moment, **self._record(drive, sample)})
         else:
-            moment = datetime.fromtimestamp(sample.time, timezone.utc).isoformat(timespec="milliseconds")
-            self._out.say(f"{moment} {self._line(sample)}")
+            self._write_row(moment, drive, sample)
 
-    def told(self, poll: drivebus.Poll, interval: float) -> Iterator[str]:
-        """What is to be said of *poll* when it is over."""
+    def end(self) -> None:
+        """Leaves on the terminal what was on its screen last."""
+        if self.live is not None and self.count:
+            self._out.console.print(self._screen)
+
+    def told(self, polls: Sequence[drivebus.Poll[Any]], interval: float) -> Iterator[str]:
+        """What is to be said of *polls* when they are over."""
         if self.missing:
             yield f"{self.missing} of {self.count} samples {'is' if self.missing == 1 else 'are'} missing."
+        late, dropped = sum(poll.late for poll in polls), sum(poll.dropped for poll in polls)
         # What waits for an answer that does not come is late too, and no interval helps against that.
-        if poll.late and not self.missing:
-            yield f"{poll.late} times the line was not free in time for the next sample: {interval:g} s is too short."
-        if poll.dropped and self.live is None:
-            yield f"{poll.dropped} samples came faster than they were taken, and are left out."
+        if late and not self.missing:
+            yield f"{late} times the line was not free in time for the next sample: {interval:g} s is too short."
+        if dropped and self.live is None:
+            yield f"{dropped} samples came faster than they were taken, and are left out."
 
-    def _table(self, sample: drivebus.Sample) -> Group:
-        came = {name: None if sample.missing else row.text(sample[name]) for name, row in self._known.items()}
-        rows = [[name, came[name], row.unit, self._doubtful.get(name)] for name, row in self._known.items()]
-        table = self._out.table(["register", "value", "unit", ""], rows)
-        return Group(table, Text("" if sample.missing is None else printable(f"missing: {sample.missing}")))
-
-    def _record(self, sample: drivebus.Sample) -> dict[str, Any]:
+    def _record(self, drive: Watched, sample: drivebus.Sample) -> dict[str, Any]:
+        whose = {"drive": drive.name} if self._named else {}
         if sample.missing is not None:
-            return {"time": sample.time, "missing": str(sample.missing), "exit_code": exit_code(sample.missing)}
-        values = {str(name): value for name, value in sample.items()}
-        return {"time": sample.time, **values, **({"evidence": self._doubtful} if self._doubtful else {})}
+            return {**whose, "missing": str(sample.missing), "exit_code": exit_code(sample.missing)}
+        values = {name: sample[name] for name in drive.rows}
+        units = {name: row.unit for name, row in drive.rows.items() if row.unit}
+        return {**whose, **values, "units": units, **({"evidence": drive.doubtful} if drive.doubtful else {})}
 
-    def _line(self, sample: drivebus.Sample) -> str:
-        if sample.missing is not None:
-            return f"missing: {sample.missing}"
-        return " ".join(
-            f"{name}={row.text(sample[name])}{row.unit}{f' [{self._doubtful[name]}]' if name in self._doubtful else ''}"
-            for name, row in self._known.items()
-        )
+    def _write_row(self, moment: str, drive: Watched, sample: drivebus.Sample) -> None:
+        """A line of CSV, behind one with the names of its columns if it is the first."""
+        whose = [drive.name] if self._named else []
+        if self.count == 1:
+            self._csv.writerow(
+                ["time", *(["drive"] if self._named else []), *map(printable, self._columns.values()), "missing"]
+            )
+        shown = sample.missing is None
+        values = [drive.rows[name].text(sample[name]) if shown and name in drive.rows else "" for name in self._columns]
+        why = "" if sample.missing is None else str(sample.missing)
+        self._csv.writerow([moment, *map(printable, (*whose, *values, why))])
+        sys.stdout.flush()
+
+
+def _titled(row: drivebus.Description, doubt: str) -> str:
+    """The name of a column: with the unit of its values, and with what makes them not sure."""
+    known = ", ".join(text for text in (row.unit, doubt) if text)
+    return f"{row.name} [{known}]" if known else row.name
 
 
 COMMANDS = [monitor]
