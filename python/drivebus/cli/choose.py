@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -80,9 +81,8 @@ def _line_called(port: str | None, file: str | None) -> SiteLine | None:
     """The line that is called *port*, if it may be a name at all."""
     if port is None or not port.replace("_", "").replace("-", "").isalnum():
         return None
-    from pathlib import Path
-
-    return None if Path(port).exists() else find_site(file).lines.get(port)
+    there = os.path.exists(port)  # noqa: PTH110 - Path raises where a name is too long
+    return None if there else find_site(file).lines.get(port)
 
 
 def _of(base: Session, drive: SiteDrive) -> Session:
