@@ -11,8 +11,7 @@ pub(crate) fn parse_code(text: &str) -> Option<(u8, u8)> {
     Some((number(group)?, number(index)?))
 }
 
-/// Reads a code as people type it: `P00-11`, `p 0,11`, `P0011`. Only to look for something: what is read or written has to
-/// be named.
+/// Reads a code as people type it: `P00-11`, `p 0,11`, `P0011`.
 pub(crate) fn parse_loose_code(text: &str) -> Option<(u8, u8)> {
     let text: String = text.split_whitespace().collect();
     let code = text.strip_prefix(['P', 'p', 'R', 'r'])?;
@@ -24,7 +23,8 @@ pub(crate) fn parse_loose_code(text: &str) -> Option<(u8, u8)> {
     parse_code(&format!("P{group}.{index}"))
 }
 
-/// Reads an address as people type it, also without a sign that it is one: `2103`, `0x 2103`. Likewise.
+/// Reads an address as people type it, also without a sign that it is one: `2103`, `0x 2103`. Only to look
+/// for something: what is read or written has to be named.
 pub(crate) fn parse_loose_address(text: &str) -> Option<u16> {
     let text: String = text.split_whitespace().collect();
     parse_address(&text).or_else(|| (text.len() == 4).then(|| parse_address(&format!("0x{text}"))).flatten())

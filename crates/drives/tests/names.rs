@@ -15,6 +15,8 @@ fn registers_codes_and_addresses_are_found() {
         ("3004h", 0x3004),
         ("p00.11", 0x000B),
         ("P0.11", 0x000B),
+        ("p00-11", 0x000B),
+        ("P0011", 0x000B),
         ("0x000B", 0x000B),
     ] {
         assert_eq!(profile.find(name).unwrap().address(), Some(address), "{name:?}");
@@ -31,7 +33,10 @@ fn what_is_not_found_is_explained() {
     assert_eq!(closest("output_curent"), "output_current");
     assert_eq!(closest("setfrequency"), "set_frequency");
     assert_eq!(closest("P00.13"), "P00.03", "the first of those one character away");
-    assert!(!closest("").is_empty());
+    for nothing_near in ["", "zzz", "nonsense"] {
+        assert_eq!(closest(nothing_near), "", "{nothing_near:?}");
+    }
+    assert_eq!(profile.find("zzz").unwrap_err().to_string(), "gd350 has no \"zzz\"");
     assert_eq!(
         profile.find("output_curent").unwrap_err().to_string(),
         "gd350 has no \"output_curent\"; the closest is \"output_current\""

@@ -29,6 +29,8 @@ _COMMANDS = {
 
 # `force=True (`--force`)`, `variants={…} for bus.drive() (`--variant …`; Hz, rpm)`: both languages at once.
 _BOTH = re.compile(r"\w+=(?:\{[^}]*\}|True|…)(?: (?:for|to) bus\.drive\(\))? \(`(--[^`]+)`(?:; ([^)]*))?\)")
+# A name that nothing is near to.
+_NAMELESS = re.compile(r"\S+ has no \"[^\"]*\"$")
 _CALL = re.compile("|".join(re.escape(call) for call in _COMMANDS))
 
 
@@ -36,5 +38,6 @@ def in_commands(text: str) -> str:
     """*text* with commands and options where it names calls and arguments of Python's."""
     for python, here in _WHOLE.items():
         text = text.replace(python, here)
+    text = _NAMELESS.sub(lambda said: f"{said[0]}; `drivebus list` shows what it has", text)
     text = _BOTH.sub(lambda both: f"`{both[1]}`" + (f" ({both[2]})" if both[2] else ""), text)
     return _CALL.sub(lambda call: f"`drivebus {_COMMANDS[call[0]]}`", text)

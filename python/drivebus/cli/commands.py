@@ -16,7 +16,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write")},
     "Keep": {"backup": ("backup", "restore", "diff")},
-    "Find out": {"explain": ("faults", "describe"), "doctor": ("doctor",), "profiles": ("profiles",)},
+    "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
     "Tools": {"frames": ("raw", "decode"), "tools": ("sim", "completion", "demo")},
 }
 """The names of each file's `COMMANDS`, in the order of the help. A test compares the two."""

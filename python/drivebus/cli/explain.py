@@ -38,7 +38,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
             raise drivebus.NotAllowed(
                 f"{wanted!r} is no register or parameter of {profile.name}; it is a fault: `drivebus faults {shown}`"
             ) from None
-        found = profile.search(wanted, limit=_MATCHES)
+        found = profile.search(wanted, limit=10_000)
         if not found:
             raise
         _show_matches(session, profile, wanted, found)
@@ -54,18 +54,98 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
 
 
 def _show_matches(session: Session, profile: drivebus.Profile, wanted: str, found: list[str]) -> None:
-    session.out.say(f"{profile.name} has no {wanted!r}; what comes near:")
-    session.out.rows(
-        ["name", "code", "address", "unit", "label", "evidence"], [_match(profile, name) for name in found]
-    )
-    if len(found) == _MATCHES:
-        session.out.say(f"Only the first {_MATCHES} are shown; more words, or a longer one, narrow it.")
+    has_them = all(word in _all_of(profile.describe(found[0])) for word in wanted.lower().split())
+    matches = "match" if len(found) == 1 else "matches"
+    count = f"{len(found)} {matches}" if has_them else f"nothing that is called so, and {len(found)} near {matches}"
+    narrower = f", the best {_MATCHES} of them; more words narrow it" if len(found) > _MATCHES else ""
+    session.out.say(f'{profile.name} has {count} for "{wanted}"{narrower}:')
+    session.out.rows(_NAMED, [_match(profile, name) for name in found[:_MATCHES]])
+
+
+def _all_of(row: drivebus.Description) -> str:
+    """What is known of *row*, to look for a word in."""
+    return str(vars(row)).lower()
+
+
+_NAMED = ["name", "code", "address", "unit", "label", "evidence"]
 
 
 def _match(profile: drivebus.Profile, name: str) -> list[Any]:
     known = profile.describe(name)
-    address = None if known.address is None else f"{known.address:04X}H"
-    return [known.name, known.code, address, known.unit, known.label, known.evidence]
+    return [known.name, known.code, _address(known), known.unit, known.label, known.evidence]
+
+
+@click.command(name="list")
+@click.argument("group", metavar="[GROUP]", required=False, shell_complete=names.complete_group)
+@pass_session
+def list_(session: Session, group: str | None) -> None:
+    """List what the drive's family has: its registers and groups of parameters, or the rows of GROUP.
+
+    GROUP is a group of parameters (P00), "registers", "monitor", "parameters" or "all". With --profile, no drive is
+    asked.
+    """
+    profile = session.known_profile()
+    rows = [profile.describe(name) for name in profile.names()]
+    if group is None:
+        _show_groups(session, profile, rows)
+        return
+    wanted = group.lower()
+    chosen = {
+        "all": rows,
+        "registers": [row for row in rows if row.kind == "register"],
+        "parameters": [row for row in rows if row.kind == "parameter"],
+        "monitor": [profile.describe(name) for name in profile.monitor_names()],
+    }.get(wanted)
+    if chosen is None:
+        chosen = [row for row in rows if row.group.lower() == wanted]
+    if not chosen and wanted not in _ALWAYS:
+        known = ", ".join([*_ALWAYS, *_groups(rows)])
+        raise drivebus.NotAllowed(f'{profile.name} has no group "{group}"; it has {known}')
+    session.out.say(f"{profile.title}, {group}: {_counted(len(chosen), 'row')}")
+    session.out.rows(
+        ["name", "code", "address", "unit", "range", "access", "label"],
+        [
+            [row.name, row.code, _address(row), row.unit, _range(row), row.access, row.label]
+            for row in sorted(chosen, key=lambda row: (row.kind == "parameter", row.address is None, row.address))
+        ],
+    )
+
+
+_ALWAYS = ("registers", "monitor", "parameters", "all")
+"""Groups that every family has."""
+
+
+def _show_groups(session: Session, profile: drivebus.Profile, rows: list[drivebus.Description]) -> None:
+    registers = [row for row in rows if row.kind == "register"]
+    listed = [["registers", len(registers), "what exists for the bus only"]]
+    listed.append(["monitor", len(profile.monitor_names()), "what `drivebus monitor` shows by itself"])
+    for name in _groups(rows):
+        members = [row for row in rows if row.group == name]
+        listed.append(
+            [name, len(members), ", ".join(row.label for row in members[:3]) + (", …" if members[3:] else "")]
+        )
+    session.out.say(f"{profile.title}: {_counted(len(rows), 'name')}; `drivebus list GROUP` shows those of a group")
+    session.out.rows(["group", "names", "such as"], listed)
+
+
+def _groups(rows: list[drivebus.Description]) -> list[str]:
+    return list(dict.fromkeys(row.group for row in rows if row.group))
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _address(row: drivebus.Description) -> str | None:
+    return None if row.address is None else f"{row.address:04X}H"
+
+
+def _range(row: drivebus.Description) -> str:
+    if row.choices:
+        return f"{len(row.choices)} choices"
+    if row.low is None or row.high is None:
+        return ""
+    return f"{row.text(row.low)} to {row.text(row.high)}"
 
 
 @click.command()
@@ -168,4 +248,4 @@ def _values(drive: drivebus.Drive, values: Mapping[str, Any]) -> list[list[Any]]
     return [[row.code or row.name, value, row.unit, row.label] for value, row in known]
 
 
-COMMANDS = [faults, describe]
+COMMANDS = [faults, describe, list_]

@@ -2,20 +2,20 @@
 
 use crate::entry::{Entry, names};
 use crate::profile::Profile;
-use crate::text::{closest, near, parameter_address, parse_address, parse_code, parse_loose_address, parse_loose_code};
+use crate::text::{near, parameter_address, parse_address, parse_code, parse_loose_address, parse_loose_code};
 
 /// Why a name means nothing here.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
     /// Nothing has this name.
-    #[error("{profile} has no \"{name}\"; the closest is \"{closest}\"")]
+    #[error("{profile} has no \"{name}\"{}", hint(closest))]
     Unknown {
         /// The profile that was asked.
         profile: String,
         /// The name as given.
         name: String,
-        /// The name closest to it.
+        /// The name closest to it; empty where none is near.
         closest: String,
     },
     /// The profile knows nothing at this address.
@@ -44,9 +44,13 @@ pub enum NameError {
     },
 }
 
+fn hint(closest: &str) -> String {
+    if closest.is_empty() { String::new() } else { format!("; the closest is \"{closest}\"") }
+}
+
 impl Profile {
-    /// The entry with this name: the name of a register or parameter, a parameter's code in upper or lower case
-    /// (`p00.11`), or an address in hex (`0x3004`, `3004H`).
+    /// The entry with this name: the name of a register or parameter, a parameter's code as people type it
+    /// (`p00.11`, `P00-11`), or an address in hex (`0x3004`, `3004H`).
     ///
     /// # Errors
     ///
@@ -57,7 +61,7 @@ impl Profile {
         if let Some(entry) = self.entries().find(|entry| called(entry.name()) || entry.alias().is_some_and(called)) {
             return Ok(entry);
         }
-        if let Some((group, index)) = parse_code(wanted) {
+        if let Some((group, index)) = parse_loose_code(wanted) {
             let address = parameter_address(group, index);
             if self.is_closed(address) {
                 return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
@@ -90,11 +94,11 @@ impl Profile {
         }
     }
 
-    /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds.
+    /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds. Empty
+    /// where neither is there: any other would mislead.
     fn closest(&self, name: &str) -> &str {
-        let names = || self.entries().flat_map(names);
-        let found = || self.search(name, 1).first().map(|entry| entry.alias().unwrap_or(entry.name()));
-        near(name, names()).or_else(found).or_else(|| closest(name, names())).unwrap_or_default()
+        let found = || self.search_exactly(name, 1).first().map(|entry| entry.alias().unwrap_or(entry.name()));
+        near(name, self.entries().flat_map(names)).or_else(found).unwrap_or_default()
     }
 
     fn unknown_address(&self, name: &str, address: u16) -> NameError {
