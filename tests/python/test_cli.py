@@ -51,7 +51,7 @@ class TestLooking:
 
     def test_scan_finds_the_drive(self) -> None:
         [found] = rows(run("--json", "scan", "--units", "1-3"))
-        assert (found["unit"], found["profile"], found["identification"]) == (1, "gd350", 0x01A0)
+        assert (found["unit"], found["profile"], found["identification"]) == (1, "gd350", "0x01a0")
         assert "unit 1: gd350" in run("scan", "--units", "1-3").stdout
 
     def test_scan_without_an_answer_exits_3(self) -> None:

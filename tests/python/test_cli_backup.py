@@ -51,7 +51,7 @@ def store(simulator: drivebus.Simulator, *assignments: str) -> None:
 def test_a_whole_round(simulator: drivebus.Simulator, file: Path) -> None:
     taken = run(simulator, "backup", file)
     assert taken.exit_code == 0
-    assert "52 parameters of unit 1, INVT Goodrive350" in taken.stdout
+    assert "52 of the 54 parameters that the profile gd350 knows, of unit 1, INVT Goodrive350" in taken.stdout
     assert "P07.00  a password has no place in a file" in taken.stdout
     store(simulator, "P00.11=3.0", "P00.12=4.0")
 

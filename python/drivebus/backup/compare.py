@@ -92,13 +92,17 @@ class Side:
         name: What it is, in words.
         raw: The word of each parameter that it has.
         unread: Why it has no others.
-        partial: Whether what it lacks says nothing: it knows some parameters only.
+        partial: Why what it lacks says nothing, where it knows some parameters only; else empty.
     """
 
     name: str
     raw: Mapping[str, int]
     unread: Mapping[str, str]
-    partial: bool = False
+    partial: str = ""
+
+    def lacks(self, code: str) -> str:
+        """Why it has no *code*."""
+        return self.partial or self.unread.get(code, f"{self.name} does not have it")
 
 
 def compare(profile: Profile, left: Side, right: Side, *, everything: bool = False) -> Diff:
@@ -116,7 +120,7 @@ def compare(profile: Profile, left: Side, right: Side, *, everything: bool = Fal
         sides = (left.raw.get(code), right.raw.get(code))
         lacking = next((side for side, word in zip((left, right), sides, strict=True) if word is None), None)
         if reason is None and lacking is not None and lacking.partial:
-            reason = f"{lacking.name} does not have it"
+            reason = lacking.lacks(code)
         if reason is not None:
             uncompared[code] = reason
             continue
@@ -125,7 +129,7 @@ def compare(profile: Profile, left: Side, right: Side, *, everything: bool = Fal
             continue
         known = profile.describe(code)
         values = [None if word is None else worded(profile, code, word) for word in sides]
-        why = "" if lacking is None else lacking.unread.get(code, f"{lacking.name} does not have it")
+        why = "" if lacking is None else lacking.lacks(code)
         differences.append(Difference(code, known.label, known.unit, values[0], values[1], why))
     return Diff(differences, left.name, right.name, compared, uncompared)
 
@@ -141,7 +145,7 @@ def factory(profile: Profile) -> Side:
             raw[code] = profile.encode(code, default)
         except NotAllowed:
             continue
-    return Side("factory defaults", raw, {}, partial=True)
+    return Side("factory defaults", raw, {}, partial="its factory value is not known")
 
 
 def shown(value: Value) -> str:

@@ -156,6 +156,9 @@ async def diff(
     right = Side(f"unit {unit.address}", words.raw, words.unread)
     found = compare(unit.profile, left, right, everything=everything)
     found.uncompared.update(unasked)
+    # What was not read, because there is nothing to hold it against.
+    unknown = [code for code in rules.codes() if code not in left.raw and code not in found.uncompared]
+    found.uncompared.update({code: rules.uncompared(code) or left.lacks(code) for code in unknown})
     return found
 
 

@@ -18,7 +18,7 @@ from drivebus.cli.anywhere import in_front
 from drivebus.cli.choose import chosen, complete_drive, complete_port, parse_unit_list
 from drivebus.cli.commands import GROUPS, Commands
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
-from drivebus.cli.output import Output, printable, remark
+from drivebus.cli.output import Output, laid_out, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
 from drivebus.cli.types import Whole
 
@@ -51,7 +51,9 @@ def _quoted_as_letters() -> Iterator[None]:
     try:
         yield
     except click.ClickException as error:
-        error.message = printable(error.message)  # type: ignore[misc]  # it is shown later, by click itself
+        # It is shown later, by click itself, behind this word.
+        label = "Error: "
+        error.message = laid_out(label + printable(error.message)).removeprefix(label)  # type: ignore[misc]
         raise
 
 

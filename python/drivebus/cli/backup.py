@@ -47,7 +47,12 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
         )
         return
     begun = f"{kept.origin.taken:%Y-%m-%d %H:%M} UTC"
-    session.out.say(f"{file}: {len(kept)} parameters of unit {drive.unit}, {kept.origin.title}, begun {begun}.")
+    profile = kept.profile
+    known = sum(profile.describe(name).kind == "parameter" for name in profile.names())
+    session.out.say(
+        f"{file}: {len(kept)} of the {known} parameters that the profile {profile.name} knows, of {session.called}, "
+        f"{kept.origin.title}, begun {begun}."
+    )
     if kept.unread:
         session.out.say(f"Not read: {len(kept.unread)}.")
         session.out.rows(["code", "reason"], kept.unread.items())
@@ -139,7 +144,12 @@ def _complete_side(_context: click.Context, _parameter: click.Parameter, incompl
 @click.command()
 @click.argument("a", metavar="A", shell_complete=_complete_side)
 @click.argument("b", metavar="[B]", required=False, shell_complete=_complete_side)
-@click.option("--all", "everything", is_flag=True, help="Also what changes by itself, such as the fault history.")
+@click.option(
+    "--all",
+    "everything",
+    is_flag=True,
+    help="Also what changes by itself, such as the fault history; list what is not compared.",
+)
 @click.option("--force", is_flag=True, help="Also with a drive of another identification or firmware.")
 @pass_session
 def diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> None:
@@ -154,10 +164,15 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
             session.out.record(vars(each))
     else:
         sides = (found.left if a == _FACTORY else a, found.right if b is None else b)
-        session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.")
+        rest = f" {len(found.uncompared)} were not compared." if found.uncompared else ""
+        hint = " --all lists them." if rest and not everything else ""
+        session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.{rest}{hint}")
         if found:
             rows = [[each.code, each.left, each.right, each.unit, each.label, each.reason] for each in found]
             session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
+        if everything and found.uncompared:
+            session.out.say("Not compared:")
+            session.out.rows(["code", "reason"], found.uncompared.items())
     if found:
         raise click.exceptions.Exit(1)
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from contextlib import closing, nullcontext
+from time import monotonic
 from typing import Any
 
 import click
@@ -17,6 +20,7 @@ from drivebus.cli.types import Seconds, Whole
 __all__ = ["COMMANDS"]
 
 _SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
+_STYLES = {"ok": "green", "note": "", "warning": "bold yellow", "fault": "bold red"}
 
 
 @click.command()
@@ -57,7 +61,8 @@ def doctor(
         unit = session.unit
     bits, parity, stop = line_format or session.line_format
     out = session.out
-    worst: drivebus.doctor.Finding | None = None
+    wrong: list[drivebus.doctor.Finding] = []
+    began = monotonic()
     with Status("", console=out.console) if out.live else nullcontext() as status:
         findings = drivebus.doctor.examine(
             port,
@@ -76,16 +81,24 @@ def doctor(
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.
         with closing(findings):
             for finding in findings:
-                _show(out, finding)
-                if worst is None or finding.severity.rank > worst.severity.rank:
-                    worst = finding
-    if worst is None or not worst.wrong:
-        out.say("Nothing is wrong.")
+                _show(out, finding, port)
+                if finding.wrong:
+                    wrong.append(finding)
+    took = f"Took {monotonic() - began:.0f} s."
+    if not wrong:
+        out.say(f"Nothing is wrong. {took}")
         return
-    context.exit(_exit_code(worst))
+    counts = [(name, sum(finding.severity == name for finding in wrong)) for name in ("fault", "warning")]
+    found = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts if count)
+    out.say(f"{found}. {took}")
+    # The first of the worst.
+    context.exit(_exit_code(max(wrong, key=lambda finding: finding.severity.rank)))
 
 
-def _show(out: Output, finding: drivebus.doctor.Finding) -> None:
+def _show(out: Output, finding: drivebus.doctor.Finding, port: str) -> None:
+    # What it says to type is for this port, unless the environment has it.
+    here = "`drivebus " if os.environ.get("DRIVEBUS_PORT") == port else f"`drivebus --port {shlex.quote(port)} "
+    advice = finding.advice.replace("`drivebus ", here)
     if out.as_json:
         fields: dict[str, Any] = {
             "step": finding.step,
@@ -93,15 +106,16 @@ def _show(out: Output, finding: drivebus.doctor.Finding) -> None:
             "severity": finding.severity,
             "unit": finding.unit,
             "text": finding.text,
-            "advice": finding.advice,
+            "advice": advice,
             "values": finding.values,
             "exit_code": _exit_code(finding),
         }
         out.record(fields)
         return
-    out.say(f"{_SIGNS[finding.severity.value]:<8} {finding.text}")
-    if finding.advice:
-        out.say(f"{'':<8} -> {finding.advice}")
+    style = _STYLES[finding.severity.value]
+    out.say(f"{_SIGNS[finding.severity.value]:<8} {finding.text}", style, hanging=9)
+    if advice:
+        out.say(f"{'':<8} -> {advice}", hanging=3)
 
 
 def _exit_code(finding: drivebus.doctor.Finding) -> int:

@@ -175,6 +175,8 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
         if reason is not None:
             out.record({"when": "now", "missing": reason})
         listed = [("now", present)] if present is not None else []
+        if present is None and reason is None:
+            out.record({"when": "now", "code": None, "label": "no fault"})
         for when, fault in [*listed, *_numbered(history)]:
             out.record({"when": when, **dict(zip(_COLUMNS, _row(fault), strict=True)), "values": dict(fault.values)})
         return
@@ -209,6 +211,9 @@ def _numbered(history: list[drivebus.Fault]) -> list[tuple[str, drivebus.Fault]]
 
 def _show_known(session: Session, text: str) -> None:
     """The faults of the family that *text* means; all for none. One alone is told with all that is known of it."""
+    if text and session.profile is None and session.port is None:
+        _show_of_all(session, text)
+        return
     profile = session.known_profile()
     known = _meant(profile.faults(), text) if text else profile.faults()
     if text and not known:
@@ -223,6 +228,27 @@ def _show_known(session: Session, text: str) -> None:
     if not known and not session.out.as_json:
         session.out.say("No fault of this family is known by number; the drive's manual has them.")
     session.out.rows(_COLUMNS, [_row(fault) for fault in known])
+
+
+def _show_of_all(session: Session, text: str) -> None:
+    """The faults that *text* means in each family: what the keypad shows is enough to look it up."""
+    found = [
+        (name, fault) for name in drivebus.profiles() for fault in _meant(drivebus.Profile.builtin(name).faults(), text)
+    ]
+    if not found:
+        raise drivebus.NotAllowed(f'no family that is known names a fault "{text}"; `drivebus profiles` lists them')
+    # Families of one maker have most of their faults in common.
+    families: dict[tuple[Any, ...], list[str]] = {}
+    for name, fault in found:
+        families.setdefault(tuple(_row(fault)[:-1]), []).append(name)
+    if session.out.as_json:
+        for row, names_of in families.items():
+            session.out.record({"families": names_of, **dict(zip(_COLUMNS, row, strict=False))})
+        return
+    for row, names_of in families.items():
+        code, mnemonic, label, cause, remedy = row
+        session.out.say(f"{code} {mnemonic}: {label} ({', '.join(names_of)})".replace(" :", ":"), "bold")
+        session.out.facts({"cause": cause, "remedy": remedy})
 
 
 def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:

@@ -119,7 +119,7 @@ def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> 
         rows,
         told["state"],
         told["fault"],
-        {name: row.evidence for name, row in rows.items() if row.evidence != "verified"},
+        {name: doubt for name, row in rows.items() if (doubt := names.evidence(profile, row)) != "verified"},
         hint,
     )
 

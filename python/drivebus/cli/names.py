@@ -17,6 +17,7 @@ __all__ = [
     "complete_profile",
     "complete_units",
     "complete_variant",
+    "evidence",
     "named",
     "parse_assignment",
     "parse_hex",
@@ -51,6 +52,13 @@ def named(profile: drivebus.Profile, text: str) -> str:
     if isinstance(place, int):
         raise drivebus.NotAllowed(f"{profile.name} has no name for address {place:04X}H; `read` takes it as it is")
     return place
+
+
+def evidence(profile: drivebus.Profile, row: drivebus.Description) -> str:
+    """How well *row* is proved, with what its values mean: a state's codes may be less sure than its place."""
+    if row.evidence == "verified" and profile.state_reason() is not None and row.name == profile.role("state"):
+        return "unverified"
+    return row.evidence
 
 
 def parse_assignment(text: str) -> tuple[str, int | float | str]:

@@ -8,6 +8,7 @@ lets ESC pass, click takes away the sequences it knows, and only where there is 
 from __future__ import annotations
 
 import io
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,8 +26,9 @@ import drivebus
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-__all__ = ["Output", "about", "plain", "printable", "remark", "show"]
+__all__ = ["Output", "about", "laid_out", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -89,10 +91,22 @@ class Output:
         # Of what a terminal obeys, JSON has to escape the least part.
         print(_replaced(text, lambda letter: json.dumps(letter)[1:-1]), file=self._held, flush=True)
 
-    def say(self, text: str) -> None:
-        """A line for people; nothing in JSON."""
-        if not self.as_json:
-            self.console.print(printable(text), markup=False)
+    def say(self, text: str, first: str = "", hanging: int = 0) -> None:
+        """A line for people; nothing in JSON.
+
+        Args:
+            text: The line. On a terminal it is broken between words.
+            first: The style of its first word.
+            hanging: Columns by which the lines behind the first are moved in.
+        """
+        if self.as_json:
+            return
+        shown = printable(text)
+        if self.console.is_terminal:
+            shown = wrapped(shown, self.console.width, hanging)
+        word = len(shown) - len(shown.lstrip()) + len((shown.split() or [""])[0])
+        line = show_plainly(shown, first, word) if first else shown
+        self.console.print(line, markup=False)
 
     def heading(self, text: str) -> None:
         """A line above a section; nothing in JSON."""
@@ -158,6 +172,8 @@ class Output:
 
 def _is_number(cell: Any) -> bool:
     """Whether *cell* is a number, or shows one."""
+    if isinstance(cell, drivebus.Choice):
+        return False
     return isinstance(cell, (int, float)) or (isinstance(cell, str) and _NUMBER.fullmatch(cell) is not None)
 
 
@@ -195,7 +211,48 @@ def show(value: Any) -> str:
         return escape(printable(f"{int(value)} = {value.label}"))
     if isinstance(value, bytes):
         return value.hex(" ").upper()
-    return escape(printable(str(value)))
+    text = escape(printable(str(value)))
+    style = _style(value)
+    return f"[{style}]{text}[/]" if style else text
+
+
+def _style(value: Any) -> str:
+    """How *value* is shown where there are colours."""
+    if isinstance(value, drivebus.Fault) or value is drivebus.State.FAULT:
+        return "bold red"
+    return "green" if isinstance(value, drivebus.State) and value.running else ""
+
+
+def show_plainly(text: str, style: str, count: int) -> Text:
+    """*text* as it is, the first *count* letters in *style*."""
+    from rich.text import Text
+
+    shown = Text(text)
+    shown.stylize(style, 0, count)
+    return shown
+
+
+def wrapped(text: str, width: int, hanging: int = 0) -> str:
+    """*text* broken between words so that its lines have at most *width* columns.
+
+    A word that is longer stays whole, and so does a command in backticks: whoever copies it gets all of it.
+    """
+    from textwrap import TextWrapper
+
+    lines = []
+    for line in text.split("\n"):
+        kept = _COMMAND.sub(lambda command: command[0].replace(" ", _NO_BREAK), line)
+        indent = " " * (len(line) - len(line.lstrip()) + hanging)
+        wrapper = TextWrapper(width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+        wrapper.drop_whitespace = True
+        wrapper.expand_tabs = wrapper.replace_whitespace = False
+        lines += wrapper.wrap(kept) or [""]
+    return "\n".join(lines).replace(_NO_BREAK, " ")
+
+
+_COMMAND = re.compile(r"`[^`]*`")
+_NO_BREAK = "\x00"
+"""Stands for a blank at which no line ends; no text that is shown has it."""
 
 
 def printable(text: str) -> str:
@@ -217,8 +274,32 @@ _ABOUT: ContextVar[str] = ContextVar("about", default="")
 
 
 def remark(text: str = "") -> None:
-    """A line on standard error: what is no result."""
-    click.echo(printable(f"{_ABOUT.get()}{text}"), err=True)
+    """A line on standard error: what is no result. On a terminal it is broken between words."""
+    shown = laid_out(printable(f"{_ABOUT.get()}{text}"))
+    if _is_terminal(sys.stderr):
+        for word, colour in (("Error:", "red"), ("Warning:", "yellow")):
+            if _is_coloured() and word in shown[: len(_ABOUT.get()) + len(word)]:
+                shown = shown.replace(word, click.style(word, fg=colour, bold=True), 1)
+    click.echo(shown, err=True)
+
+
+def laid_out(text: str) -> str:
+    """*text* for standard error: on a terminal, broken between words."""
+    if not _is_terminal(sys.stderr):
+        return text
+    from shutil import get_terminal_size
+
+    return wrapped(text, get_terminal_size().columns)
+
+
+def _is_terminal(stream: Any) -> bool:
+    # Who closed it has none at all.
+    return stream is not None and bool(stream.isatty())
+
+
+def _is_coloured() -> bool:
+    """As rich decides it of standard output: https://no-color.org, and a terminal that knows no colours."""
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM", "") not in ("dumb", "unknown")
 
 
 def _replaced(text: str, shown: Callable[[str], str]) -> str:

@@ -26,22 +26,31 @@ def profiles(context: click.Context, session: Session) -> None:
     """List the families of drives that are known; show one; check or begin one of your own."""
     if context.invoked_subcommand is not None:
         return
-    rows = []
+    rows: list[list[Any]] = []
     for name in drivebus.profiles():
         profile = drivebus.Profile.builtin(name)
         counts = profile.counts()
-        rows.append([name, profile.title, profile.kind, *(counts[kind]["total"] for kind in KINDS), _printed(counts)])
-    session.out.rows(["name", "title", "kind", *KINDS, "verified"], rows)
+        totals = [counts[kind]["total"] for kind in KINDS]
+        share = _printed(counts)
+        if session.out.as_json:
+            rows.append([name, profile.title, profile.kind, *totals, share])
+        else:
+            rows.append([name, profile.title, sum(totals), "" if share is None else f"{int(share * 100)} %"])
+    if session.out.as_json:
+        session.out.rows(["name", "title", "kind", *KINDS, "verified"], rows)
+        return
+    session.out.rows(["name", "title", "rows", "verified"], rows)
     session.out.say(
-        "verified: rows that a document of this very family prints. `drivebus profiles show NAME` has more."
+        "rows: registers, parameters and faults that are known. verified: those that a document of this very family "
+        "prints. `drivebus profiles show NAME` has more."
     )
 
 
-def _printed(counts: dict[str, dict[str, int]]) -> str:
-    """The share of rows that a document of the family itself prints."""
+def _printed(counts: dict[str, dict[str, int]]) -> float | None:
+    """The share of rows that a document of the family itself prints, 0.0 to 1.0; None where there are no rows."""
     total = sum(counts[kind]["total"] for kind in KINDS)
     doubtful = sum(counts[kind]["unverified"] + counts[kind]["assumed"] for kind in KINDS)
-    return f"{(total - doubtful) * 100 // total} %" if total else ""
+    return round((total - doubtful) / total, 3) if total else None
 
 
 @profiles.command()

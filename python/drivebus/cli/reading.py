@@ -62,7 +62,8 @@ def scan(session: Session, units: str, timeout: float | None) -> None:
 
 def _show_found(session: Session, found: drivebus.Found) -> None:
     if session.out.as_json:
-        session.out.record(vars(found))
+        code = None if found.identification is None else f"{found.identification:#06x}"
+        session.out.record({**vars(found), "identification": code})
         return
     family = found.profile or " or ".join(found.candidates) or "unknown family"
     if found.certainty == "shared" and found.profile is not None:
@@ -108,8 +109,8 @@ def info(session: Session) -> None:
                 **facts,
                 "contradiction": against,
                 "memory": "; ".join(rules.memory(profile)),
-                "round_trip_ms": _round_trip(bus, drive.unit),
-                "status": str(drive.status()),
+                **_round_trip(bus, drive.unit, out.as_json),
+                "status": _facts_of(drive.status()) if out.as_json else str(drive.status()),
                 "obeys_bus": bool(control) if len(control) else None,
             }
         )
@@ -120,49 +121,90 @@ def info(session: Session) -> None:
         if not len(control):
             out.say("What makes it obey the bus is not known.")
             return
+        if out.as_json:
+            out.rows(
+                ["code", "is", "needed", "ok", "verified", "label", "note"],
+                [
+                    [item.code, item.actual, item.wanted, item.ok, item.verified, item.label, item.note]
+                    for item in control
+                ],
+            )
+            return
         out.rows(
-            ["code", "is", "needed", "ok", "verified", "label", "note"],
-            [[item.code, item.actual, item.wanted, item.ok, item.verified, item.label, item.note] for item in control],
+            ["code", "is", "needed", "ok", "label"],
+            [[item.code, item.actual, item.wanted, item.ok, item.label] for item in control],
         )
+        for item in control:
+            if item.note:
+                out.say(f"{item.code}{'' if item.verified else ' is not verified'}: {item.note}")
 
 
-def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
-    """Milliseconds there and back; None if the unit takes no echo."""
+def _round_trip(bus: drivebus.Bus, unit: int, as_json: bool) -> dict[str, Any]:
+    """How long an echo takes there and back: seconds in JSON, as everywhere. Nothing if the unit takes no echo."""
     try:
-        return round(bus.echo(unit) * 1000, 3)
+        seconds = bus.echo(unit)
     except drivebus.Refused:
-        return None
+        return {"round_trip": None}
+    return {"round_trip": round(seconds, 6) if as_json else f"{seconds * 1e3:.1f} ms"}
+
+
+def _facts_of(status: drivebus.Status) -> dict[str, Any]:
+    """What *status* tells, by name, and what it does not, and why."""
+    return {
+        "state": status.state,
+        "ready": status.ready,
+        "frequency": status.frequency,
+        "setpoint": status.setpoint,
+        "commands_from": status.source,
+        "motor": status.motor,
+        "overload_alarm": status.overload_alarm,
+        "fault": status.fault,
+        "missing": dict(status.missing),
+    }
 
 
 @click.command()
 @each_drive
 def status(session: Session) -> None:
-    """Say what the drive is doing; and what its family, or what is known of it, does not tell, and why."""
+    """Show what the drive is doing: state, frequency, current, voltage, speed, fault; and what is not told, and why."""
     out = session.out
     with session.drive() as drive:
         now = drive.status()
-    values: dict[str, Any] = {
-        "state": now.state,
-        "ready": now.ready,
-        "frequency": now.frequency,
-        "setpoint": now.setpoint,
-        "commands_from": now.source,
-        "motor": now.motor,
-        "overload_alarm": now.overload_alarm,
-        "fault": now.fault,
-    }
+        measured = _measured(drive)
+    values = _facts_of(now)
     if out.as_json:
-        out.record({**values, "missing": dict(now.missing)})
+        out.record({**values, **measured})
         return
+    del values["missing"]
     if "state" in now.missing:
         values["state"] = None
     for name in ("frequency", "setpoint"):
         if values[name] is not None:
             values[name] = f"{values[name]:.2f} Hz"
-    out.facts(values)
+    shown = {
+        name: f"{drive.describe(name).text(value)} {drive.describe(name).unit}" for name, value in measured.items()
+    }
+    out.facts({**values, **shown})
     if now.missing:
         out.say("Not told:")
         out.facts(now.missing)
+
+
+_MEASURED = ("output_current", "output_voltage", "bus_voltage", "rotation_speed")
+"""What one wants to see of a motor besides, where the family has it."""
+
+
+def _measured(drive: drivebus.Drive) -> dict[str, Any]:
+    """What the drive measures at its motor, in one more read at most."""
+    known = [name for name in _MEASURED if name in drive.profile.names() and _may_be_read(drive, name)]
+    return {str(name): value for name, value in drive.snapshot(*known).items()} if known else {}
+
+
+def _may_be_read(drive: drivebus.Drive, name: str) -> bool:
+    try:
+        return bool(drive.readable(name))
+    except drivebus.NotAllowed:
+        return False
 
 
 @click.command()
@@ -185,6 +227,9 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
             try:
                 row["value"] = value = _value(drive, place, row, verify)
                 row["text"] = str(value) if isinstance(place, int) else drive.describe(place).text(value)
+                bits = drive.profile.fields(place, int(value)) if isinstance(place, str) else {}
+                if bits:
+                    row["bits"] = bits
             except drivebus.DrivebusError as error:
                 failed.append((row["name"], error))
                 row |= {"error": str(error), "exit_code": exit_code(error)}
@@ -202,8 +247,13 @@ def _described(drive: drivebus.Drive, place: str | int) -> dict[str, Any]:
     if isinstance(place, int):
         return {"name": f"{place:04X}H", "value": None, "unit": "", "label": "unknown register", "evidence": None}
     known = drive.describe(place)
-    name = known.code or known.name
-    return {"name": name, "value": None, "unit": known.unit, "label": known.label, "evidence": known.evidence}
+    return {
+        "name": known.code or known.name,
+        "value": None,
+        "unit": known.unit,
+        "label": known.label,
+        "evidence": names.evidence(drive.profile, known),
+    }
 
 
 def _value(drive: drivebus.Drive, place: str | int, row: dict[str, Any], verify: bool) -> Any:
@@ -227,6 +277,9 @@ def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
         columns.remove("evidence")
     if came:
         out.rows(columns, [[row["text" if column == "value" else column] for column in columns] for row in came])
+    for row in came:
+        if "bits" in row:
+            out.say(f"{row['name']}: {', '.join(f'{name} = {meaning}' for name, meaning in row['bits'].items())}")
 
 
 COMMANDS = [ports, scan, info, status, read]

@@ -20,6 +20,9 @@ _CHARS = 8
 _UNEVEN = 0.02
 """Seconds between the usual and the longest turnaround that a sound line with a sound unit does not show."""
 
+_ENOUGH = 20
+"""Echoes that came back in time, beside which a single slow one says nothing yet."""
+
 
 @dataclass
 class Echoes:
@@ -145,11 +148,17 @@ class Echoes:
         )
 
     def _late_answers(self) -> Finding:
+        text = (
+            f"{self.silent} of {self.asked} echoes of unit {self.unit} did not come back in time, and {self.late} "
+            f"{'answer' if self.late == 1 else 'answers'} came after it"
+        )
+        if self.silent == 1 and self.answered >= _ENOUGH:
+            advice = "a busy computer may do that once; if it is so the next time too, look for the cause"
+            return self._finding("late_answers", Severity.NOTE, text, advice, late=self.late)
         return self._finding(
             "late_answers",
             self._severity,
-            f"{self.silent} of {self.asked} echoes of unit {self.unit} did not come back in time, and {self.late} "
-            "answers came after it",
+            text,
             "lower its response delay (INVT: P14.03), or give a longer time-out; behind a gateway or a radio link both "
             "are usual",
             error=NoAnswer,
@@ -196,18 +205,20 @@ class Echoes:
         """How long the unit takes to begin, and whether it does so evenly."""
         low, middle, high = min(self.turnarounds), median(self.turnarounds), max(self.turnarounds)
         values = {"turnaround_min": low, "turnaround_median": middle, "turnaround_max": high}
-        text = (
-            f"unit {self.unit} begins to answer {low * 1e3:.1f} to {high * 1e3:.1f} ms after a request, half of them "
-            f"within {middle * 1e3:.1f} ms"
-        )
-        if high - middle <= _UNEVEN:
+        text = f"unit {self.unit} responds after {low * 1e3:.1f} to {high * 1e3:.1f} ms (median {middle * 1e3:.1f} ms)"
+        slow = sum(each - middle > _UNEVEN for each in self.turnarounds)
+        if slow == 0:
             return Finding("unit", "turnaround", Severity.OK, text, unit=self.unit, values=values)
+        if slow == 1 and self.answered > _ENOUGH:
+            advice = "only one was so slow, which a busy computer may cause"
+            return Finding("unit", "turnaround", Severity.NOTE, text, advice, self.unit, values)
         return Finding(
             "unit",
             "turnaround",
             Severity.WARNING,
             text,
-            "so uneven is neither line nor unit as a rule: an adapter's latency timer, a busy machine, or a gateway",
+            "such uneven times rarely come from the line or the unit: check the adapter's latency timer, the load of "
+            "this computer, or the gateway",
             unit=self.unit,
             values=values,
             error=NoAnswer,
