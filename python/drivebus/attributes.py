@@ -23,7 +23,7 @@ def known_only(kind: type[_T]) -> type[_T]:
 
     def set_known(self: object, name: str, value: object) -> None:
         if type(self) is kind and name not in known and not name.startswith("_"):
-            raise AttributeError(f"a {kind.__name__} has no attribute {name!r}{checks.closest(name, sorted(known))}")
+            raise AttributeError(f'a {kind.__name__} has no attribute "{name}"{checks.closest(name, sorted(known))}')
         given(self, name, value)
 
     # Not in the class's own text, where type checkers would take it for leave to set anything.

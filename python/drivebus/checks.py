@@ -24,7 +24,7 @@ def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = 
     # Nearly every call: what follows takes a hundred times as long.
     if type(value) is int and low <= value <= high:
         return value
-    allowed = f"{low:#06x}..{high:#06x}" if hexadecimal else f"{low}..{high}"
+    allowed = f"{low:#06x} to {high:#06x}" if hexadecimal else f"{low} to {high}"
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):
         raise NotAllowed(f"{what} {shown(value)} is not a whole number; allowed is {allowed}")
     number = operator.index(value)
@@ -39,7 +39,7 @@ def unit(value: object) -> int:
     if type(value) is int and 0 < value <= 247:
         return value
     if value == 0 and not isinstance(value, bool):
-        raise NotAllowed("unit 0 is the broadcast address, which nobody answers; allowed is 1..247, or use broadcast()")
+        raise NotAllowed("unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()")
     return whole("unit", value, 1, 247)
 
 
@@ -59,7 +59,7 @@ def payload(value: object) -> int | list[int]:
 
 def number(what: str, value: object, low: float, high: float = math.inf, *, above: bool = False) -> float:
     """*value* as a finite float in *low*..*high*; with *above*, *low* itself is refused."""
-    allowed = f"{'more than ' if above else ''}{low:g}" + ("" if math.isinf(high) else f"..{high:g}")
+    allowed = f"{'more than ' if above else ''}{low:g}" + ("" if math.isinf(high) else f" to {high:g}")
     allowed += " or more" if math.isinf(high) and not above else ""
     if isinstance(value, (bool, str, bytes)):
         raise NotAllowed(f"{what} {shown(value)} is not a number; allowed is {allowed}")
@@ -96,7 +96,7 @@ def path(what: str, value: object) -> str:
             return text
     except (TypeError, UnicodeError):
         pass
-    raise NotAllowed(f"{what} {shown(value)} is no path")
+    raise NotAllowed(f"{what} {shown(value)} is not a path")
 
 
 def digits(text: str) -> int | None:
@@ -105,11 +105,15 @@ def digits(text: str) -> int | None:
 
 
 def shown(value: object) -> str:
-    """*value* as Python shows it; a number that it refuses to show, by its size."""
+    """*value* as Python shows it, a text in double quotes; a number that it refuses to show, by its size."""
     try:
-        return repr(value)
+        text = repr(value)
     except ValueError:
         return f"of {value.bit_length()} bits" if isinstance(value, int) else f"of type {type(value).__name__}"
+    if type(value) is str and text.startswith("'"):
+        inner = text[1:-1].replace("\\'", "'").replace('"', '\\"')
+        return f'"{inner}"'
+    return text
 
 
 def closest(name: str, known: Iterable[str]) -> str:
@@ -118,4 +122,4 @@ def closest(name: str, known: Iterable[str]) -> str:
 
     by_lower = {candidate.lower(): candidate for candidate in known}
     matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
-    return f"; did you mean {by_lower[matches[0]]!r}?" if matches else ""
+    return f'; did you mean "{by_lower[matches[0]]}"?' if matches else ""

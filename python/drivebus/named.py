@@ -34,7 +34,7 @@ class Named(Mapping[str, T]):
             return self._values[name]
         except KeyError:
             kind = type(self).__name__
-            raise AttributeError(f"this {kind} holds no {name!r}, only {', '.join(self._values)}") from None
+            raise AttributeError(f'this {kind} does not hold "{name}", only {", ".join(self._values)}') from None
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._values]

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any
 
-from drivebus import _native
+from drivebus import _native, checks
 from drivebus.attributes import known_only
 from drivebus.errors import NotAllowed
 from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
@@ -45,7 +45,9 @@ class Poll(Polling[Key]):
         callback: Callable[[Sample], object] | None,
     ) -> None:
         if callback is not None and not callable(callback):
-            raise NotAllowed(f"callback {callback!r} cannot be called; give a function that takes a sample")
+            raise NotAllowed(
+                f"callback is {checks.shown(callback)}, which cannot be called; give a function that takes a sample"
+            )
         super().__init__(bus, native, targets, interval, size)
         self._native = poller_of(self)
         self._bus = native

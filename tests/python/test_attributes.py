@@ -22,7 +22,7 @@ def bus() -> Iterator[drivebus.Bus]:
 def refuse(thing: object, name: str, meant: str) -> None:
     """*name* is refused, *meant* is named, and nothing was set."""
     kind = type(thing).__name__
-    with pytest.raises(AttributeError, match=f"^a {kind} has no attribute '{name}'; did you mean '{meant}'\\?$"):
+    with pytest.raises(AttributeError, match=f'^a {kind} has no attribute "{name}"; did you mean "{meant}"\\?$'):
         setattr(thing, name, 5)
     assert not hasattr(thing, name)
 
@@ -40,7 +40,7 @@ def test_a_misspelt_attribute_is_refused(bus: drivebus.Bus) -> None:
 
 
 def test_what_is_like_nothing_is_refused_too(bus: drivebus.Bus) -> None:
-    with pytest.raises(AttributeError, match=r"^a Drive has no attribute 'qqq'$"):
+    with pytest.raises(AttributeError, match=r'^a Drive has no attribute "qqq"$'):
         setattr(bus.drive(1), "qqq", 5)  # noqa: B010
 
 

@@ -117,15 +117,15 @@ SPOILT = [
     ('P00.03 = { value = 700.00, unit = "Hz" }', "630"),
     ('P00.03 = { value = 50.001, unit = "Hz" }', "P00.03"),
     ('P00.03 = { value = 50.00, unit = "s", raw = 5000 }', "P00.03 is in Hz, not in 's'"),
-    ("P00.03 = { value = 50.00, raw = 70000 }", "raw 70000 is no whole number in 0..65535"),
-    ("P00.03 = { value = 50.00, raw = 5000.0 }", "raw 5000.0 is no whole number"),
-    ("P00.03 = { value = 50.00, raw = true }", "raw True is no whole number"),
-    ("P00.03 = { value = true }", "value True is no number"),
+    ("P00.03 = { value = 50.00, raw = 70000 }", "raw 70000 is not a whole number from 0 to 65535"),
+    ("P00.03 = { value = 50.00, raw = 5000.0 }", "raw 5000.0 is not a whole number"),
+    ("P00.03 = { value = 50.00, raw = true }", "raw True is not a whole number"),
+    ("P00.03 = { value = true }", "value True is not a number"),
     ("P00.03 = { value = nan }", "not a number of Hz"),
     ("P00.03 = { value = inf }", "inf"),
     ("P00.03 = { raw = 5000 }", "P00.03 lacks its value"),
-    ("P00.03 = { value = 50.00, words = 5000 }", "has no field 'words'"),
-    ("P00.03 = { valeu = 50.00 }", "did you mean 'value'?"),
+    ("P00.03 = { value = 50.00, words = 5000 }", 'has no field "words"'),
+    ("P00.03 = { valeu = 50.00 }", 'did you mean "value"?'),
     ("P00.03 = 50.00", 'P00.03 must be { value = 0.00, unit = "Hz", raw = 0 }'),
     ("P00.03 = { value = 50.00, raw = 5000, beyond = 1 }", "beyond must be true or false"),
     ("P00.03 = { value = 900.00, raw = 5000, beyond = true }", "do not agree"),
@@ -133,11 +133,11 @@ SPOILT = [
     ("p00.03 = { value = 50.00, raw = 5000 }", "P00.03"),
     ("P63.01 = { value = 1, raw = 1 }", "P63.01"),
     ("output_current = { value = 1.0 }", "is a register"),
-    ("P00.03 = { value = 50.00, raw = 5000", "is no TOML"),
-    ("P00.03 { value = 50.00 }", "is no TOML"),
-    ("P00.03 = { value = 50,00, raw = 5000 }", "is no TOML"),
-    ("just words", "is no TOML"),
-    ("[parametres]", "did you mean 'parameters'?"),
+    ("P00.03 = { value = 50.00, raw = 5000", "is not TOML"),
+    ("P00.03 { value = 50.00 }", "is not TOML"),
+    ("P00.03 = { value = 50,00, raw = 5000 }", "is not TOML"),
+    ("just words", "is not TOML"),
+    ("[parametres]", 'did you mean "parameters"?'),
     ("P00.03 = " + "[" * 900, "nested too deeply"),
     ('P00.03 = "' + "x" * 1000 + '"', "more than 1000 characters"),
     ("P00.03 = { value = 1" + "0" * 900 + " }", "P00.03"),
@@ -163,14 +163,14 @@ HEADS: list[tuple[Callable[[str], str], str]] = [
     (lambda head: head.replace("format = 1\n", ""), "1: the file has no line `format = 1`"),
     (lambda head: head.replace("format = 1", "format = 2"), "1: the file has format 2"),
     (lambda head: head.replace("format = 1", "format = true"), "1: format must be a number"),
-    (lambda head: head.replace("format", "fromat"), "did you mean 'format'?"),
+    (lambda head: head.replace("format", "fromat"), 'did you mean "format"?'),
     (lambda head: head.replace('family = "gd350"\n', ""), "does not say whose it is"),
     (lambda head: head.replace('"gd350"', "350"), "4: family must be a text"),
     (lambda head: head.replace("unit = 1", 'unit = "1"'), "5: unit must be a number"),
     (lambda head: head.replace("unit = 1", "unit = 1\nunit = 2"), "6: unit is given twice"),
     (lambda head: head.replace("2026-11-21T12:00:00Z", '"today"'), "7: taken must be a moment"),
-    (lambda head: head.replace("taken", "token"), "did you mean 'taken'?"),
-    (lambda head: head.replace("2026-11-21T12:00:00Z", "0001-01-01T00:00:00+01:00"), "7: taken is no moment"),
+    (lambda head: head.replace("taken", "token"), 'did you mean "taken"?'),
+    (lambda head: head.replace("2026-11-21T12:00:00Z", "0001-01-01T00:00:00+01:00"), "7: taken is not a moment"),
 ]
 
 
@@ -218,7 +218,7 @@ def test_any_edit_is_taken_or_refused_in_words(place: int, length: int, edit: by
     ("data", "said"),
     [
         (b"", "no line `format = 1`"),
-        (b"\x00\x01\x02", "no TOML"),
+        (b"\x00\x01\x02", "not TOML"),
         (HEAD.encode() + b"P00.01 = { value = 2 } # \xff\n", "not UTF-8"),
         (b"#" * ((1 << 20) + 1), "larger than a backup can be"),
     ],
@@ -261,7 +261,7 @@ def test_a_file_of_a_profile_of_somebodys_own_says_so(virtual_bus: Bus, tmp_path
     assert (Backup.load(file, mine).origin.profile, Backup.load(file, mine).origin.profile_version) == ("mine", 3)
     file.write_text(file.read_text() + "P08.09 = { value = 1.0, raw = 10 }\n")
     assert Backup.load(file, mine)["P08.09"] == 1.0
-    with pytest.raises(NotAllowed, match="read with the profile 'mine', and checked against 'gd350'"):
+    with pytest.raises(NotAllowed, match='read with the profile "mine", and checked against "gd350"'):
         Backup.load(file)
 
 

@@ -269,7 +269,7 @@ def test_what_is_no_file_is_never_replaced(simulator: drivebus.Simulator, tmp_pa
     os.mkfifo(place)
     for words in (["backup", place], ["backup", place, "--force"]):
         result = run(simulator, *words)
-        assert (result.exit_code, "is no file" in result.stderr) == (2, True)
+        assert (result.exit_code, "is not a file" in result.stderr) == (2, True)
     assert place.is_fifo()
     assert list(tmp_path.iterdir()) == [place]
 

@@ -215,13 +215,13 @@ class TestOneFault:
     def test_describe_says_where_a_fault_is_told(self) -> None:
         result = run("--profile", "gd350", "describe", "ol1")
         assert (result.exit_code, result.stdout) == (2, "")
-        assert "it is a fault: `drivebus faults OL1`" in result.stderr
+        assert "but a fault: `drivebus faults OL1`" in result.stderr
 
     @pytest.mark.parametrize("unknown", [["999"], ["OLX"], ["1e3"]])
     def test_an_unknown_one_is_said(self, unknown: list[str]) -> None:
         result = run("--profile", "gd350", "faults", *unknown)
         assert (result.exit_code, result.stdout) == (2, "")
-        assert f"gd350 names no fault '{unknown[0]}'" in result.stderr
+        assert f'gd350 names no fault "{unknown[0]}"' in result.stderr
 
 
 def test_the_shell_completes_all_families() -> None:

@@ -24,29 +24,29 @@ def run(*words: str, port: str | None = SIM) -> Result:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--unit", "abc", "status"], "'abc' is no unit address; write 1-247, or a list such as 1-31,40"),
-        (["--unit", "0", "status"], "units '0' are out of range or turned round; allowed is 1-247"),
-        (["--baud", "fast", "status"], "'fast' is no whole number; allowed is 1 or more"),
+        (["--unit", "abc", "status"], '"abc" is not a unit address; write 1-247, or a list such as 1-31,40'),
+        (["--unit", "0", "status"], 'units "0" are out of range, or the first is above the last; allowed is 1 to 247'),
+        (["--baud", "fast", "status"], '"fast" is not a whole number; allowed is 1 or more'),
         (["monitor", "--count", "0"], "0 is out of range; allowed is 1 or more"),
-        (["monitor", "--interval", "often"], "'often' is no number of seconds"),
-        (["monitor", "--interval", "0,5"], "'0,5' is no number of seconds; write 0.5"),
+        (["monitor", "--interval", "often"], '"often" is not a number of seconds'),
+        (["monitor", "--interval", "0,5"], '"0,5" is not a number of seconds; write 0.5'),
         (["jog", "--seconds", "99", "--yes"], "99 is out of range; allowed is 0 to 60"),
-        (["run", "10,5", "--yes"], "'10,5' is no number of Hz; write 10.5"),
-        (["run", "fast", "--yes"], "'fast' is no number of Hz"),
+        (["run", "10,5", "--yes"], '"10,5" is not a number of Hz; write 10.5'),
+        (["run", "fast", "--yes"], '"fast" is not a number of Hz'),
         (["run", "-5.5", "--yes"], "`drivebus run 5.5 --reverse` turns the other way"),
         (["run", "5", "--wait", "-5"], "-5 is out of range; allowed is 0 or more"),
         (["run", "--rverse", "5"], "No such option '--rverse'"),
-        (["run", "", "--yes"], "'' is no number of Hz"),
+        (["run", "", "--yes"], '"" is not a number of Hz'),
         (["write", "P00.11=1,5"], "write 1.5"),
         (["read", "P00.11=1"], "`drivebus write P00.11=1`"),
-        (["read", ""], "an empty text is no name"),
-        (["monitor", " "], "an empty text is no name"),
+        (["read", ""], "an empty text is not a name"),
+        (["monitor", " "], "an empty text is not a name"),
         (["write", "=5"], "write NAME=VALUE"),
-        (["--profile", "", "status"], "profile '' is none; give a name (gd350"),
-        (["backup", ""], "an empty text is no path"),
-        (["restore", ""], "an empty text is no path"),
-        (["profiles", "new", ""], "an empty text is no path"),
-        (["profiles", "check", ""], "an empty text is no path"),
+        (["--profile", "", "status"], '"" is not a profile; give a name (gd350'),
+        (["backup", ""], "an empty text is not a path"),
+        (["restore", ""], "an empty text is not a path"),
+        (["profiles", "new", ""], "an empty text is not a path"),
+        (["profiles", "check", ""], "an empty text is not a path"),
         (["raw", "01 03 21 03 00 01 7E 36"], "it is added: drivebus raw 01 03 21 03 00 01"),
         (["statsu"], "Did you mean 'status'?"),
     ],
@@ -75,7 +75,7 @@ def test_a_frame_whose_end_looks_like_its_crc_can_be_forced() -> None:
 def test_no_profile_is_the_folder_one_happens_to_be_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(Path(__file__).resolve().parent.parent / "vectors/profiles/ex9")
     assert drivebus.Profile.find(".").name == "ex9"
-    with pytest.raises(drivebus.NotAllowed, match="profile '' is none"):
+    with pytest.raises(drivebus.NotAllowed, match='"" is not a profile'):
         drivebus.Profile.find("")
 
 

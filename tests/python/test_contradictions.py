@@ -90,8 +90,8 @@ def test_a_simulator_is_told_each_thing_once(url: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"strict_silence": "no"}, "strict_silence 'no' .*True"),
-        ({"echo": "no"}, "echo 'no' .*True"),
+        ({"strict_silence": "no"}, 'strict_silence "no" .*True'),
+        ({"echo": "no"}, 'echo "no" .*True'),
         ({"echo": None}, "echo None .*True"),
         ({"faults": [1]}, r"faults \[1\] .*mapping"),
         ({"faults": "late"}, "faults 'late' .*mapping"),
@@ -111,12 +111,12 @@ def test_a_simulation_that_cannot_be(options: dict[str, Any], message: str, tmp_
 
 
 CALLS: list[tuple[Callable[[Bus], object], str]] = [
-    (lambda bus: bus.read(1, 0x2100, urgent="no"), "urgent 'no' .*True"),  # type: ignore[arg-type]
+    (lambda bus: bus.read(1, 0x2100, urgent="no"), 'urgent "no" .*True'),  # type: ignore[arg-type]
     (lambda bus: bus.read(1, 0x2100, verify=1), "verify 1 .*True"),  # type: ignore[arg-type]
     (lambda bus: bus.read_stamped(1, 0x2100, verify=None), "verify None .*True"),  # type: ignore[arg-type]
-    (lambda bus: bus.write(1, 0x000B, 20, urgent="no"), "urgent 'no' .*True"),  # type: ignore[arg-type]
+    (lambda bus: bus.write(1, 0x000B, 20, urgent="no"), 'urgent "no" .*True'),  # type: ignore[arg-type]
     (lambda bus: bus.drive(1, trust_profile=True), "trust_profile.*profile"),
-    (lambda bus: bus.drive(1, "gd350", trust_profile="no"), "trust_profile 'no' .*True"),  # type: ignore[arg-type]
+    (lambda bus: bus.drive(1, "gd350", trust_profile="no"), 'trust_profile "no" .*True'),  # type: ignore[arg-type]
 ]
 
 

@@ -193,8 +193,8 @@ def test_a_port_name_says_it_too() -> None:
 @pytest.mark.parametrize(
     ("faults", "transport", "said"),
     [
-        ({"flipbit": 0.1}, "process", "did you mean 'flip_bit'"),
-        ({"late": 1.5}, "process", "allowed is 0..1"),
+        ({"flipbit": 0.1}, "process", 'did you mean "flip_bit"'),
+        ({"late": 1.5}, "process", "allowed is 0 to 1"),
         ({"late": "often"}, "process", "not a number"),
         ({"unplug": 0.1}, "tcp", 'needs transport "process"'),
     ],

@@ -233,7 +233,7 @@ def test_no_drive_takes_what_another_family_is_told() -> None:
                     attempt()
         with pytest.raises(drivebus.NotAllowed, match="force=True"):
             bus.broadcast(0x2000, 5)  # the VFD500 is on this line too
-        with pytest.raises(drivebus.NotAllowed, match="no command of unit 4"):
+        with pytest.raises(drivebus.NotAllowed, match="not a command of unit 4"):
             bus.drive(4, "vfd500").write_words(0x7000, 9)
         assert simulator.line.requests == before
         bus.write(1, 0x2000, 5)

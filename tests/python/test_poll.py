@@ -392,8 +392,8 @@ class TestBadInput:
             (None, {}, "poll\\(\\) takes {drive: names"),
             ({"drive": ["output_curent"]}, {}, "output_current"),
             ({"drive": []}, {}, "nothing is asked of unit 1"),
-            ({"drive": 5}, {}, "5 are no names"),
-            ({"drive": [["output_current"]]}, {}, "no text"),
+            ({"drive": 5}, {}, "5 is not a list of names"),
+            ({"drive": [["output_current"]]}, {}, "a name is a text"),
             ({"drive": None, 1: [(0x2100, 1)]}, {}, "unit 1 is there twice"),
             ({"foreign": None}, {}, "another bus"),
             ({0: [(0x2100, 1)]}, {}, "unit 0"),
@@ -407,10 +407,10 @@ class TestBadInput:
             ({"drive": None}, {"interval": 0}, "interval 0 is out of range"),
             ({"drive": None}, {"interval": -1.0}, "interval -1.0 is out of range"),
             ({"drive": None}, {"interval": math.nan}, "interval nan is out of range"),
-            ({"drive": None}, {"interval": "1"}, "interval '1' is not a number"),
+            ({"drive": None}, {"interval": "1"}, 'interval "1" is not a number'),
             ({"drive": None}, {"interval": 0.03}, "at 19200 8E1 one cycle of this poll .* at least 0.0492.. s"),
             ({"drive": None}, {"size": 0}, "size 0 is out of range"),
-            ({"drive": None}, {"callback": 3}, "callback 3 cannot be called"),
+            ({"drive": None}, {"callback": 3}, "callback is 3, which cannot be called"),
         ],
     )
     def test_it_is_refused_before_anything_is_sent(

@@ -15,7 +15,7 @@ SILENT = 9
 
 
 @pytest.mark.parametrize(
-    ("queue", "message"), [(0, "queue 0 "), (-1, "queue -1 "), (1.5, "queue 1.5 "), ("9", "queue '9' ")]
+    ("queue", "message"), [(0, "queue 0 "), (-1, "queue -1 "), (1.5, "queue 1.5 "), ("9", 'queue "9" ')]
 )
 def test_a_bound_that_is_none_is_refused_before_anything_opens(queue: Any, message: str) -> None:
     for port in ("/dev/drivebus-is-not-here", "socket://127.0.0.1:1"):

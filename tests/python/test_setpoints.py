@@ -134,7 +134,7 @@ def test_what_the_family_does_not_have_is_said(bus: Bus, simulator: Simulator) -
     for attempt in attempts:
         with pytest.raises(NotAllowed, match="of Veikong VFD500 is known, only frequency, torque"):
             attempt()
-    with pytest.raises(NotAllowed, match="setpoint 'speed' is unknown"):
+    with pytest.raises(NotAllowed, match='setpoint "speed" is unknown'):
         drive.check_control("speed")
     assert taken(simulator, 2) == []
 
@@ -182,7 +182,7 @@ class TestWhatTheDriveHeeds:
     def test_a_setpoint_that_would_be_ignored_is_not_sent(
         self, simulator: Simulator, drive: Drive, name: str, source: str, number: int, register: int
     ) -> None:
-        with pytest.raises(NotAllowed, match=rf"would not heed.*\n{source}.*needs {number}.*\n.*setpoint='{name}'"):
+        with pytest.raises(NotAllowed, match=rf'would not heed.*\n{source}.*needs {number}.*\n.*setpoint="{name}"'):
             setattr(drive, name, 50.0)
         assert taken(simulator) == []
         assert not drive.check_control(name)
@@ -234,10 +234,10 @@ class TestBits:
     @pytest.mark.parametrize(
         ("given", "message"),
         [
-            ({"engine": 1}, "'engine' is unknown"),
-            ({"motor": 5}, "motor 5 is nothing that .*3 = motor 4"),
-            ({"motor": True}, "motor True"),
-            ({"dc_brake": "maybe"}, "dc_brake 'maybe'"),
+            ({"engine": 1}, '"engine" is unknown'),
+            ({"motor": 5}, "motor is 5, which .*3 = motor 4"),
+            ({"motor": True}, "motor is True"),
+            ({"dc_brake": "maybe"}, 'dc_brake is "maybe"'),
             ({}, "nothing to set"),
         ],
     )

@@ -367,7 +367,7 @@ class TestHostileGuests:
                     path.chmod(0o755)
             the_socket(folder).chmod(0o666)
             Path(line.port).chmod(0o666)
-            become = "import os, socket, drivebus; os.setgid(65534); os.setuid(65534)\n"
+            become = "import os, socket, drivebus; drivebus.Bus; os.setgid(65534); os.setuid(65534)\n"
             knock = f"""
 guest = socket.socket(socket.AF_UNIX)
 guest.connect({str(the_socket(folder))!r})

@@ -97,7 +97,7 @@ def test_drives_are_chosen_by_name_and_by_group_each_once(tmp_path: Path) -> Non
             '[lines.hall]\nprot = "a"',
             [
                 "1: lines.hall has no port",
-                '2: "prot" is not known here; did you mean \'port\'?; allowed is "port", "baud", "format", "rs485"',
+                '2: "prot" is not known here; did you mean "port"?; allowed is "port", "baud", "format", "rs485"',
             ],
         ),
         ('[drives.pump1]\nline = "hall"\nunit = 1', ['2: there is no line "hall"; there are none']),
@@ -114,7 +114,7 @@ def test_drives_are_chosen_by_name_and_by_group_each_once(tmp_path: Path) -> Non
         ('[groups]\npumps = ["pump1"]', ['2: there is no drive "pump1"']),
         (
             "[drive.pump1]",
-            ['1: "drive" is not known here; did you mean \'drives\'?; allowed is "lines", "drives", "groups"'],
+            ['1: "drive" is not known here; did you mean "drives"?; allowed is "lines", "drives", "groups"'],
         ),
         ("lines = 3", ["1: lines is a table of tables, such as [lines.NAME]"]),
         ("[lines]\nhall = 3", ["2: lines.hall is a table: [lines.hall]"]),

@@ -28,7 +28,7 @@ def test_a_snapshot_is_a_mapping_with_attributes() -> None:
     assert (snapshot.time, snapshot.duration, snapshot.units["speed"]) == (10.0, 0.02, "rpm")
     assert repr(snapshot) == "Snapshot(current=1.5 A, speed=300 rpm)"
     assert "current" in dir(snapshot)
-    with pytest.raises(AttributeError, match="holds no 'voltage', only current, speed"):
+    with pytest.raises(AttributeError, match='does not hold "voltage", only current, speed'):
         _ = snapshot.voltage
     assert pickle.loads(pickle.dumps(snapshot)) == snapshot
 
@@ -38,7 +38,7 @@ def test_statistics_nest() -> None:
     assert stats.requests == stats["requests"] == 3
     assert stats.units[1].requests == 2
     assert repr(stats) == "Stats(requests=3, units={1: Stats(requests=2)})"
-    with pytest.raises(AttributeError, match="holds no 'answers', only requests, units"):
+    with pytest.raises(AttributeError, match='does not hold "answers", only requests, units'):
         _ = stats.answers
 
 

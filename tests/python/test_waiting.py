@@ -39,7 +39,7 @@ def test_a_unit_can_be_given_its_own_time_out(bus: drivebus.Bus) -> None:
     ("arguments", "message"),
     [
         ({"unit": 0}, "unit"),
-        ({"unit": 248}, "1..247"),
+        ({"unit": 248}, "1 to 247"),
         ({"unit": 1, "timeout": 0}, "timeout"),
         ({"unit": 1, "timeout": float("nan")}, "timeout"),
         ({"unit": 1, "gap": -1}, "gap"),

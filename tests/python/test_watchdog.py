@@ -110,7 +110,7 @@ def test_a_time_out_that_the_drive_does_not_have_sends_nothing(
 
 def test_an_action_that_the_drive_does_not_have_is_named(virtual: Simulator, virtual_drive: Drive) -> None:
     asked = virtual.line.requests
-    with pytest.raises(drivebus.NotAllowed, match=r"action 'halt' .*coast, stop"):
+    with pytest.raises(drivebus.NotAllowed, match=r'action "halt" .*coast, stop'):
         virtual_drive.watchdog(1.0, "halt", unverified=True)
     assert virtual.line.requests == asked
 

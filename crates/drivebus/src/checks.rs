@@ -36,7 +36,7 @@ pub(crate) fn write<'a>(address: u16, payload: &'a Payload<'_>) -> Result<Reques
 /// A time-out: more than nothing, an hour at most.
 pub(crate) fn timeout(given: Duration) -> Result<(), Error> {
     if given.is_zero() || given > LONGEST {
-        return Err(out_of_range("timeout", given.as_secs_f64(), format!("more than 0..{}", LONGEST.as_secs())));
+        return Err(out_of_range("timeout", given.as_secs_f64(), format!("more than 0 to {}", LONGEST.as_secs())));
     }
     Ok(())
 }
@@ -44,14 +44,14 @@ pub(crate) fn timeout(given: Duration) -> Result<(), Error> {
 /// A time that may be nothing, an hour at most.
 pub(crate) fn time(what: &str, given: Duration) -> Result<(), Error> {
     if given > LONGEST {
-        return Err(out_of_range(what, given.as_secs_f64(), format!("0..{}", LONGEST.as_secs())));
+        return Err(out_of_range(what, given.as_secs_f64(), format!("0 to {}", LONGEST.as_secs())));
     }
     Ok(())
 }
 
 pub(crate) fn within<T: PartialOrd + Display + Copy>(what: &str, given: T, low: T, high: T) -> Result<(), Error> {
     if given < low || given > high {
-        return Err(out_of_range(what, given, format!("{low}..{high}")));
+        return Err(out_of_range(what, given, format!("{low} to {high}")));
     }
     Ok(())
 }

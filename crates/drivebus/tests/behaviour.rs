@@ -102,16 +102,16 @@ fn what_cannot_be_asked_is_refused_before_anything_is_sent() {
         assert_eq!((error.kind(), error.to_string()), (ErrorKind::NotAllowed, message.to_owned()));
         assert!(!error.may_have_acted());
     };
-    let broadcast = "unit 0 is the broadcast address, which nobody answers; allowed is 1..247, or use broadcast()";
+    let broadcast = "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()";
     refused(bus.read(0, 0, 1).unwrap_err(), broadcast);
-    refused(bus.write(248, 0, 1).unwrap_err(), "unit 248 is out of range; allowed is 1..247");
-    refused(bus.read(1, 0, 126).unwrap_err(), "count 126 is out of range; allowed is 1..125");
-    refused(bus.write(1, 0, []).unwrap_err(), "number of values 0 is out of range; allowed is 1..123");
+    refused(bus.write(248, 0, 1).unwrap_err(), "unit 248 is out of range; allowed is 1 to 247");
+    refused(bus.read(1, 0, 126).unwrap_err(), "count 126 is out of range; allowed is 1 to 125");
+    refused(bus.write(1, 0, []).unwrap_err(), "number of values 0 is out of range; allowed is 1 to 123");
     let never = CallOptions::new().timeout(Duration::ZERO);
-    refused(bus.read_with(1, 0, 1, never).unwrap_err(), "timeout 0 is out of range; allowed is more than 0..3600");
+    refused(bus.read_with(1, 0, 1, never).unwrap_err(), "timeout 0 is out of range; allowed is more than 0 to 3600");
     refused(
         bus.configure(1, UnitOptions::new().gap(Duration::from_secs(3601))).unwrap_err(),
-        "gap 3601 is out of range; allowed is 0..3600",
+        "gap 3601 is out of range; allowed is 0 to 3600",
     );
     assert_eq!(bus.stats().total.requests, 0);
 }
@@ -120,9 +120,9 @@ fn what_cannot_be_asked_is_refused_before_anything_is_sent() {
 fn a_bus_is_opened_only_as_it_can_be() {
     let opened = |builder: drivebus::Builder| builder.open(LINE).map(drop).map_err(|error| error.to_string());
     let refused = |message: &str| Err(message.to_owned());
-    assert_eq!(opened(Bus::builder().retries(101)), refused("retries 101 is out of range; allowed is 0..100"));
-    assert_eq!(opened(Bus::builder().queue(0)), refused("queue 0 is out of range; allowed is 1..1000000"));
-    assert_eq!(opened(Bus::builder().baudrate(1)), refused("baud rate 1 is not in 50..10000000 bit/s"));
+    assert_eq!(opened(Bus::builder().retries(101)), refused("retries 101 is out of range; allowed is 0 to 100"));
+    assert_eq!(opened(Bus::builder().queue(0)), refused("queue 0 is out of range; allowed is 1 to 1000000"));
+    assert_eq!(opened(Bus::builder().baudrate(1)), refused("baud rate 1 is not a number from 50 to 10000000 bit/s"));
     assert_eq!(opened(Bus::builder().baudrate(9_600).queue(1).retries(0)), Ok(()));
     let echo = Bus::builder().echo(AdapterEcho::Present).open("tcp://127.0.0.1").unwrap_err().to_string();
     assert!(echo.starts_with("echo \"yes\" is for an adapter that hands back what it sends"), "{echo}");

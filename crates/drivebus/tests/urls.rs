@@ -99,5 +99,5 @@ fn a_simulator_is_what_its_url_asks_for() {
         assert_ne!(kind, FaultKind::Unplug, "nobody asked for that");
     }
     let too_often = Bus::open("sim://gd350?late=2").unwrap_err();
-    assert_eq!(too_often.to_string(), "rate 2 of late is not in 0.0..=1.0");
+    assert_eq!(too_often.to_string(), "rate 2 of late is not a number from 0.0 to 1.0");
 }

@@ -331,7 +331,7 @@ fn read(folder: &Path, name: &str) -> Result<File, ProfileError> {
     // A pipe or a device would be read for ever, or not at all.
     let is_file = std::fs::metadata(&path).map_err(|error| unreadable(error.to_string()))?.is_file();
     if !is_file {
-        return Err(unreadable("this is no file".to_owned()));
+        return Err(unreadable("this is not a file".to_owned()));
     }
     let mut bytes = Vec::new();
     let opened = std::fs::File::open(&path).map_err(|error| unreadable(error.to_string()))?;

@@ -111,7 +111,7 @@ fn every_mistake_names_file_line_and_reason() {
         ("registers.csv", "Hz,100,no,0.00,630.00", "Hz,100,no,0.00,1e99", "does not fit a word"),
         ("registers.csv", "Hz,100,no,0.00,630.00", "Hz,100,no,0.001,630.00", "more digits than the scale"),
         ("registers.csv", "Hz,100,no,0.00,630.00", "Hz,100,no,630.01,630.00", "above"),
-        ("registers.csv", "Hz,100,no,0.00,630.00", "Hz,100,no,low,630.00", "no number"),
+        ("registers.csv", "Hz,100,no,0.00,630.00", "Hz,100,no,low,630.00", "not a number"),
         ("registers.csv", "P00.03,rw", "P00.33,rw", "P00.33"),
         ("registers.csv", "P00.03,rw", "P00.03,rx", "rw, ro, wo"),
         ("parameters.csv", "P00.11,", "P99.11,", "closed"),

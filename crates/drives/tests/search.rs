@@ -126,11 +126,9 @@ fn what_is_not_there_stands_for_nothing_else() -> Outcome {
 #[test]
 fn a_name_that_is_none_names_what_was_meant() -> Outcome {
     let gd350 = Profile::builtin("gd350")?;
-    for (name, meant) in [
-        ("output_curent", "\"output_current\""),
-        ("ramp", "\"acceleration_time_1\""),
-        ("baud", "\"baud_rate\""),
-    ] {
+    for (name, meant) in
+        [("output_curent", "\"output_current\""), ("ramp", "\"acceleration_time_1\""), ("baud", "\"baud_rate\"")]
+    {
         let error = gd350.find(name).err().map(|error| error.to_string()).unwrap_or_default();
         assert!(error.ends_with(meant), "{name}: {error}");
     }

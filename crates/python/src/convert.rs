@@ -9,19 +9,19 @@ use crate::errors::not_allowed;
 /// A word: 0..=0xFFFF. A bool is none, although Python counts it as a number: it was meant for something else.
 pub(crate) fn one_word(what: &str, given: &Bound<'_, PyAny>) -> PyResult<u16> {
     let word = if given.is_instance_of::<PyBool>() { None } else { given.extract().ok() };
-    word.ok_or_else(|| not_allowed(format!("{what} {} is not in 0..65535", shown(given))))
+    word.ok_or_else(|| not_allowed(format!("{what} {} is not a number from 0 to 65535", shown(given))))
 }
 
 /// A unit that can answer.
 pub(crate) fn unit_address(given: &Bound<'_, PyAny>) -> PyResult<UnitAddress> {
     let raw = given.extract::<u8>().ok().and_then(|raw| UnitAddress::new(raw).ok());
-    raw.ok_or_else(|| not_allowed(format!("unit {} is not in 1..247", shown(given))))
+    raw.ok_or_else(|| not_allowed(format!("unit {} is not a number from 1 to 247", shown(given))))
 }
 
 /// A unit, or 0 for all of them.
 pub(crate) fn destination(given: &Bound<'_, PyAny>) -> PyResult<Destination> {
     let raw = given.extract::<u8>().ok().and_then(|raw| Destination::from_wire(raw).ok());
-    raw.ok_or_else(|| not_allowed(format!("unit {} is not in 1..247, or 0 for broadcast", shown(given))))
+    raw.ok_or_else(|| not_allowed(format!("unit {} is not a number from 1 to 247, or 0 for broadcast", shown(given))))
 }
 
 /// A sequence of words, or else one word.
@@ -45,7 +45,10 @@ pub(crate) fn bytes_of<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Py
         .map_err(|_| not_allowed(format!("{} is not bytes", shown(given))))
 }
 
-/// A value as Python shows it.
+/// A value as Python shows it, a text in double quotes.
 pub(crate) fn shown(given: &Bound<'_, PyAny>) -> String {
+    if let Ok(text) = given.extract::<&str>() {
+        return format!("{text:?}");
+    }
     given.repr().map_or_else(|_| String::from("?"), |text| text.to_string())
 }

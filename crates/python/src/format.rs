@@ -33,7 +33,7 @@ impl SerialFormat {
             None => rtu::SerialFormat::DEFAULT.baud_rate(),
             Some(given) => no_bool(given).and_then(|given| given.extract().ok()).ok_or_else(|| {
                 let (low, high) = (rtu::SerialFormat::MIN_BAUD_RATE, rtu::SerialFormat::MAX_BAUD_RATE);
-                not_allowed(format!("baudrate {} is not in {low}..{high} bit/s", shown(given)))
+                not_allowed(format!("baudrate {} is not a number from {low} to {high} bit/s", shown(given)))
             })?,
         };
         let parity = match text(parity, "E").as_str() {
@@ -139,7 +139,7 @@ fn silence_rule(given: &Bound<'_, PyAny>) -> PyResult<Silence> {
         return Ok(Silence::Fixed(time));
     }
     let longest = rtu::SerialFormat::MAX_SILENCE.as_secs();
-    Err(not_allowed(format!("silence {} is not \"spec\", \"characters\" or 0..{longest} seconds", shown(given))))
+    Err(not_allowed(format!("silence {} is not \"spec\", \"characters\" or 0 to {longest} seconds", shown(given))))
 }
 
 /// A text argument in capitals, or its default; what is no text as it shows itself.

@@ -118,7 +118,7 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
     for (key, value) in given {
         let key: String = key.extract().map_err(|_| not_allowed(format!("rs485: {key} is not known")))?;
         let bad = |_| not_allowed(format!("rs485: {key} cannot be {value}"));
-        let too_long = || not_allowed(format!("rs485: {key} cannot be {value}; allowed is 0..{MAX_DELAY_MS}"));
+        let too_long = || not_allowed(format!("rs485: {key} cannot be {value}; allowed is 0 to {MAX_DELAY_MS}"));
         match key.as_str() {
             "mode" => {}
             "enabled" => options.enabled = value.extract().map_err(bad)?,

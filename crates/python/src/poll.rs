@@ -214,7 +214,7 @@ impl Batch {
 /// Address and number of words.
 fn one_read(given: &Bound<'_, PyAny>) -> PyResult<(u16, u16)> {
     let pair: Result<(Bound<'_, PyAny>, Bound<'_, PyAny>), _> = given.extract();
-    let (address, count) = pair.map_err(|_| not_allowed(format!("{} is no (address, count)", shown(given))))?;
+    let (address, count) = pair.map_err(|_| not_allowed(format!("{} is not an (address, count)", shown(given))))?;
     Ok((one_word("address", &address)?, one_word("count", &count)?))
 }
 

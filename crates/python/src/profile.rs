@@ -195,8 +195,9 @@ impl Profile {
         if entry.words() == 1 {
             return Ok(number(name.py(), quantity, entry.decode(one_word("raw", raw)?)));
         }
-        let both: u32 =
-            raw.extract().map_err(|_| not_allowed(format!("raw {} is not in 0..4294967295", shown(raw))))?;
+        let both: u32 = raw
+            .extract()
+            .map_err(|_| not_allowed(format!("raw {} is not a number from 0 to 4294967295", shown(raw))))?;
         let words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
         let value = quantity.decode_words(&words);
         value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| not_allowed("no words".to_owned()))
@@ -366,7 +367,8 @@ impl Profile {
 
     #[pyo3(signature = (code, /))]
     fn exception(&self, code: &Bound<'_, PyAny>) -> PyResult<(String, String)> {
-        let code = code.extract().map_err(|_| not_allowed(format!("code {} is not in 0..255", shown(code))))?;
+        let code =
+            code.extract().map_err(|_| not_allowed(format!("code {} is not a number from 0 to 255", shown(code))))?;
         let exception = self.0.exception(code).into_owned();
         Ok((exception.name, exception.meaning))
     }
@@ -380,7 +382,7 @@ impl Profile {
 }
 
 fn path(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
-    given.extract().map_err(|_| not_allowed(format!("folder {} is no path", shown(given))))
+    given.extract().map_err(|_| not_allowed(format!("folder {} is not a path", shown(given))))
 }
 
 fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
@@ -393,5 +395,5 @@ fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
 
 /// A `str`.
 fn text(what: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
-    given.extract().map_err(|_| not_allowed(format!("{what} {} is no text", shown(given))))
+    given.extract().map_err(|_| not_allowed(format!("{what} {} is not a text", shown(given))))
 }

@@ -192,7 +192,7 @@ fn look_at(port: &Bound<'_, PyAny>, asked: &SerialFormat) -> Result<(String, Wai
         // `in_waiting` of a closed port exists and raises, which is not what is looked for here.
         if !port.get_type().hasattr(attribute).unwrap_or(false) && !port.hasattr(attribute).unwrap_or(true) {
             let message = format!(
-                "it has no `{attribute}`, so it is no port; give a path, a URL or an object like serial.Serial"
+                "it has no `{attribute}`, so it is not a port; give a path, a URL or an object like serial.Serial"
             );
             return Err(PortError::new(PortErrorKind::Unsupported, name, message));
         }

@@ -295,5 +295,5 @@ pub(crate) fn seconds(moment: drivebus_rtu::Instant) -> f64 {
 }
 
 pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is no time to wait")))
+    Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is not a time to wait")))
 }

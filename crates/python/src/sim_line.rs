@@ -87,7 +87,7 @@ impl SimulatedLine {
     #[pyo3(signature = (faults, /))]
     fn script(&self, faults: &Bound<'_, PyAny>) -> PyResult<()> {
         let mistake =
-            || not_allowed(format!("script {} is no list of (answer number from 1, kind or bytes)", shown(faults)));
+            || not_allowed(format!("script {} is not a list of (answer number from 1, kind or bytes)", shown(faults)));
         let (mut kinds, mut instead) = (Vec::new(), Vec::new());
         for item in faults.try_iter().map_err(|_| mistake())? {
             let (answer, what): (u64, Bound<'_, PyAny>) = item?.extract().map_err(|_| mistake())?;
@@ -179,7 +179,7 @@ fn rates_of(rates: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(Option<FaultKind
             let name: String = name.extract()?;
             let kind = if name == "all" { None } else { Some(kind_of(&name)?) };
             let rate = rate.extract().ok().filter(|rate| (0.0..=1.0).contains(rate));
-            let mistake = || not_allowed(format!("a rate of {name} is not in 0.0..1.0"));
+            let mistake = || not_allowed(format!("a rate of {name} is not a number from 0.0 to 1.0"));
             Ok((kind, rate.ok_or_else(mistake)?))
         })
         .collect()
@@ -198,6 +198,8 @@ fn kind_of(name: &str) -> PyResult<FaultKind> {
 /// How many answers a fault is for: one, unless it is said.
 fn answers(count: Option<&Bound<'_, PyAny>>) -> PyResult<u32> {
     count.map_or(Ok(1), |count| {
-        count.extract().map_err(|_| not_allowed(format!("count {} is not in 0..{}", shown(count), u32::MAX)))
+        count
+            .extract()
+            .map_err(|_| not_allowed(format!("count {} is not a number from 0 to {}", shown(count), u32::MAX)))
     })
 }

@@ -87,7 +87,7 @@ pub struct AddressError {
 
 impl fmt::Display for AddressError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "unit address {} is not in 1..=247", self.raw)
+        write!(f, "unit address {} is not a number from 1 to 247", self.raw)
     }
 }
 

@@ -90,8 +90,8 @@ pub enum FrameError {
 impl fmt::Display for FrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooShort { len } => write!(f, "{len} bytes are no frame: at least {MIN_ADU} are needed"),
-            Self::TooLong { len } => write!(f, "{len} bytes are no frame: at most {MAX_ADU} can be"),
+            Self::TooShort { len } => write!(f, "{len} bytes are not a frame: at least {MIN_ADU} are needed"),
+            Self::TooLong { len } => write!(f, "{len} bytes are not a frame: at most {MAX_ADU} can be"),
             Self::Crc { computed, received } => {
                 let ([c0, c1], [r0, r1]) = (computed.to_le_bytes(), received.to_le_bytes());
                 write!(f, "the CRC of the bytes is {c0:02X} {c1:02X}, with them came {r0:02X} {r1:02X}")

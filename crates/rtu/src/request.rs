@@ -256,16 +256,16 @@ pub enum RequestError {
 impl fmt::Display for RequestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Count { count, max } => write!(f, "{count} words in one request: 1..={max} can be carried"),
+            Self::Count { count, max } => write!(f, "{count} words in one request: 1 to {max} can be carried"),
             Self::Range { address, count } => {
                 write!(f, "{count} words from {address:04X}H end beyond the last register FFFFH")
             }
             Self::ByteCount { count, bytes, came } => {
                 write!(f, "{count} words and {bytes} bytes announced, {came} bytes of data")
             }
-            Self::PduLength { len } => write!(f, "a PDU of {len} bytes does not fit its function (1..={MAX_PDU})"),
+            Self::PduLength { len } => write!(f, "a PDU of {len} bytes does not fit its function (1 to {MAX_PDU})"),
             Self::Function { function } => write!(f, "function {function:02X}H cannot be asked for (01H..=7FH)"),
-            Self::AnswerLength { len } => write!(f, "an answer's PDU of {len} bytes cannot be (1..={MAX_PDU})"),
+            Self::AnswerLength { len } => write!(f, "an answer's PDU of {len} bytes cannot be (1 to {MAX_PDU})"),
         }
     }
 }

@@ -248,7 +248,7 @@ impl fmt::Display for SerialFormatError {
         match self {
             Self::BaudRate { baud_rate } => write!(
                 f,
-                "baud rate {baud_rate} is not in {}..{} bit/s",
+                "baud rate {baud_rate} is not a number from {} to {} bit/s",
                 SerialFormat::MIN_BAUD_RATE,
                 SerialFormat::MAX_BAUD_RATE
             ),

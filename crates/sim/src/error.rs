@@ -43,7 +43,7 @@ pub enum SimError {
     #[error("this simulation runs in virtual time; a port that other programs open needs real time")]
     VirtualTime,
     /// The load is not a share of 0.0..=4.0.
-    #[error("load {load} is not in 0.0..=4.0 of the motor's rated torque")]
+    #[error("load {load} is not a number from 0.0 to 4.0 of the motor's rated torque")]
     Load {
         /// What was given.
         load: f64,
@@ -61,19 +61,19 @@ pub enum SimError {
         unit: u8,
     },
     /// The digital inputs are six bits.
-    #[error("inputs {inputs:#x} are not in 0x00..=0x3f; bit 0 is S1, bit 5 HDIB")]
+    #[error("inputs {inputs:#x} is not a number from 0x00 to 0x3f; bit 0 is S1, bit 5 HDIB")]
     Inputs {
         /// What was given.
         inputs: u16,
     },
     /// There are four analog inputs.
-    #[error("analog input {input} is not in 1..=4")]
+    #[error("analog input {input} is not a number from 1 to 4")]
     Analog {
         /// What was given.
         input: u8,
     },
     /// 0 is no fault.
-    #[error("0 is no fault; fault numbers are 1..=65535")]
+    #[error("0 is not a fault; fault numbers are 1 to 65535")]
     NoFault,
     /// There is no such kind of fault.
     #[error("fault {name:?} is unknown; there are {}", FaultKind::ALL.map(FaultKind::name).join(", "))]
@@ -82,7 +82,7 @@ pub enum SimError {
         name: String,
     },
     /// The rate is not a share of 0.0..=1.0.
-    #[error("rate {share} of {kind} is not in 0.0..=1.0")]
+    #[error("rate {share} of {kind} is not a number from 0.0 to 1.0")]
     Rate {
         /// What was to happen.
         kind: FaultKind,

@@ -131,7 +131,7 @@ impl Link {
     fn new(path: PathBuf, target: &Path) -> io::Result<Self> {
         match fs::symlink_metadata(&path) {
             Ok(there) if !there.is_symlink() => {
-                let message = format!("{} is there and is no link; give another name", path.display());
+                let message = format!("{} is there and is not a link; give another name", path.display());
                 return Err(io::Error::new(io::ErrorKind::AlreadyExists, message));
             }
             _ => {}

@@ -34,7 +34,7 @@ def read(path: Path) -> bytes:
     """
     try:
         if not path.is_file():
-            raise NotAllowed(f"{path} is no file" if path.exists() else f"there is no file {path}")
+            raise NotAllowed(f"{path} is not a file" if path.exists() else f"there is no file {path}")
         with path.open("rb") as file:
             data = file.read(_MOST + 1)
     except (OSError, ValueError) as error:
@@ -56,7 +56,7 @@ def write(path: Path, text: str) -> None:
         # A link goes on leading to the file, and the file is replaced.
         path = Path(os.path.realpath(path))
         if path.exists() and not path.is_file():
-            raise NotAllowed(f"{path} is no file, and a backup cannot take its place")
+            raise NotAllowed(f"{path} is not a file, and a backup cannot take its place")
         # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
         passing = path.with_name(f"{path.name}.tmp")
         passing.unlink(missing_ok=True)

@@ -30,12 +30,12 @@ def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
         raise Wrong(f"{code} must be {_example(profile, known)}, and is {_shown(fields)}")
     for key in fields:
         if key not in FIELDS:
-            raise Wrong(f"{code} has no field {key!r}{checks.closest(key, FIELDS)}")
+            raise Wrong(f'{code} has no field "{key}"{checks.closest(key, FIELDS)}')
     if "value" not in fields:
         raise Wrong(f"{code} lacks its value; write {_example(profile, known)}")
     value, unit, raw, told, beyond = (fields.get(key) for key in FIELDS)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise Wrong(f"{code}: value {_shown(value)} is no number")
+        raise Wrong(f"{code}: value {_shown(value)} is not a number")
     if "unit" in fields and unit != known.unit:
         raise Wrong(f"{code} is in {known.unit or 'a plain number'}, not in {_shown(unit)}")
     if "beyond" in fields and not isinstance(beyond, bool):
@@ -44,7 +44,7 @@ def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
     for key in ("raw", "told"):
         given = fields.get(key, 0)
         if isinstance(given, bool) or not isinstance(given, int) or not 0 <= given <= most:
-            raise Wrong(f"{code}: {key} {_shown(given)} is no whole number in 0..{most}")
+            raise Wrong(f"{code}: {key} {_shown(given)} is not a whole number from 0 to {most}")
     return _meant(profile, known, value, raw, beyond is True), told
 
 
@@ -74,7 +74,7 @@ def _known(profile: Profile, code: str) -> Description:
     if known.kind != "parameter" or known.code is None:
         raise Wrong(f"{code} is a register, and no parameter that a drive keeps")
     if known.code != code:
-        raise Wrong(f"{code!r} must be written as its code, {known.code}")
+        raise Wrong(f'"{code}" must be written as its code, {known.code}')
     return known
 
 

@@ -34,7 +34,7 @@ _SHOWN = 100
 _SHOWN_OF_NO_BACKUP = 20
 """The same where no line says that it is one: it may be anything."""
 
-_ANYBODYS = "no TOML, or nothing that a backup has"
+_ANYBODYS = "not TOML, or nothing that a backup has"
 """Said of a line where nothing says that the file is a backup: it may be anybody's, and none of it is repeated."""
 
 _TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
@@ -104,7 +104,7 @@ class _File:
         read_with = self.drive.get("profile")
         if profile is not None and read_with not in (None, profile.name):
             lines.append(
-                f"it was read with the profile {read_with!r}, and checked against {profile.name!r}; to use it "
+                f'it was read with the profile "{read_with}", and checked against "{profile.name}"; to use it '
                 "as it is, give the profile that it was read with (`--profile`)"
             )
         count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
@@ -189,7 +189,7 @@ def _toml(text: str) -> dict[str, Any]:
     except ValueError as error:
         # The line is the parser's whole document; which line of the file it is, is said elsewhere.
         reason = re.sub(r"at line 1, column", "at column", str(error)).replace("end of document", "end of line")
-        raise Wrong(f"{text if len(text) <= 80 else f'{text[:77]}...'} is no TOML: {reason}") from None
+        raise Wrong(f"{text if len(text) <= 80 else f'{text[:77]}...'} is not TOML: {reason}") from None
 
 
 def _head(file: _File, key: str, value: object) -> None:
@@ -198,7 +198,7 @@ def _head(file: _File, key: str, value: object) -> None:
     known, place = (_DRIVE, file.drive) if file.section else (_TOP, file.top)
     where = f"[{file.section}]" if file.section else "the beginning"
     if key not in known:
-        raise Wrong(f"{where} has no {key!r}{checks.closest(key, known)}")
+        raise Wrong(f'{where} has no "{key}"{checks.closest(key, known)}')
     kind, wanted = known[key]
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise Wrong(f"{key} must be {wanted}")
@@ -208,14 +208,14 @@ def _head(file: _File, key: str, value: object) -> None:
         try:
             value = (value if value.tzinfo else value.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
         except OverflowError:
-            raise Wrong(f"{key} is no moment that can be told") from None
+            raise Wrong(f"{key} is not a moment in time") from None
     place[key] = value
 
 
 def _check_head(file: _File) -> None:
     given = file.top.get("format")
     if given != FORMAT and (given is not None or "format" not in file.tried):
-        what = "no line `format = 1`: it is no backup" if given is None else f"format {given}, which is not known"
+        what = "no line `format = 1`: it is not a backup" if given is None else f"format {given}, which is not known"
         file.lack(f"the file has {what}")
     if "family" not in file.drive and "family" not in file.tried:
         file.lack('the file does not say whose it is: [drive] lacks a line such as family = "gd350"')

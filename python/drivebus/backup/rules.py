@@ -83,13 +83,13 @@ class Rules:
         if groups is None:
             return codes
         if isinstance(groups, str) or not all(isinstance(group, str) for group in groups):
-            raise NotAllowed(f'groups {groups!r} are no list of groups; give one such as ["P00", "P09"]')
+            raise NotAllowed(f'groups is {checks.shown(groups)}, not a list of groups; give one such as ["P00", "P09"]')
         every = self.codes()
         known = {group_of(code) for code in every} | set(every)
         for group in groups:
             if group not in known:
                 near = checks.closest(group, known)
-                raise NotAllowed(f"{self.profile.name} has no group {group!r}{near}")
+                raise NotAllowed(f"{self.profile.name} has no group {checks.shown(group)}{near}")
         return [code for code in codes if _among(code, frozenset(groups))]
 
     def last(self) -> list[str]:

@@ -127,7 +127,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
 def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
     if disk.is_there(path) and not path.is_file():
-        raise NotAllowed(f"{path} is no file, and a backup cannot take its place; nothing was read")
+        raise NotAllowed(f"{path} is not a file, and a backup cannot take its place; nothing was read")
     if force or not disk.is_there(path):
         return
     try:

@@ -36,7 +36,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
         shown = next((fault.mnemonic for fault in profile.faults() if fault.mnemonic.lower() == wanted.lower()), "")
         if shown:
             raise drivebus.NotAllowed(
-                f"{wanted!r} is no register or parameter of {profile.name}; it is a fault: `drivebus faults {shown}`"
+                f'"{wanted}" is not a register or parameter of {profile.name}, but a fault: `drivebus faults {shown}`'
             ) from None
         found = profile.search(wanted, limit=10_000)
         if not found:
@@ -218,7 +218,7 @@ def _show_known(session: Session, text: str) -> None:
     known = _meant(profile.faults(), text) if text else profile.faults()
     if text and not known:
         raise drivebus.NotAllowed(
-            f"{profile.name} names no fault {text!r}; `drivebus faults --all` lists those it names"
+            f'{profile.name} names no fault "{text}"; `drivebus faults --all` lists those it names'
         )
     if text and len(known) == 1 and not session.out.as_json:
         [fault] = known

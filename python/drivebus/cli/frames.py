@@ -63,10 +63,12 @@ def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None
     """
     body = names.parse_hex(data)
     if not 2 <= len(body) <= 254:
-        raise click.UsageError(f"{len(body)} bytes is no request; give the unit, then 1..253 bytes of PDU, and no CRC")
+        raise click.UsageError(
+            f"{len(body)} bytes are not a request; give the unit, then 1 to 253 bytes of PDU, and no CRC"
+        )
     unit, pdu = body[0], body[1:]
     if not 1 <= unit <= 247:
-        raise click.UsageError(f"unit {unit:02X} is nobody who answers; the first byte is the unit, 01..F7")
+        raise click.UsageError(f"no unit {unit:02X} answers; the first byte is the unit, 01 to F7")
     if not force and len(body) > 4 and _framed(body[:-2]) == body:
         asked = body[:-2].hex(" ").upper()
         raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added: drivebus raw {asked}")
@@ -120,7 +122,7 @@ def _check_commands(unit: int, body: bytes) -> None:
         there = [family for family in families if family.command_address == address]
         if there and not any(word in family.command_codes() for family in there):
             raise drivebus.NotAllowed(
-                f"{word} at {address:04X}H is no command of any family whose commands stand there "
+                f"{word} at {address:04X}H is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {unit}. With --profile the "
                 "family is known; with --force it is sent all the same"
             )

@@ -27,7 +27,7 @@ class _Run(click.Command):
         for before, word in zip(["", *args], args, strict=False):
             if before != "--wait" and re.fullmatch(r"-\d+(\.\d*)?", word):
                 raise click.UsageError(
-                    f"{word} Hz is no speed; `drivebus run {word[1:]} --reverse` turns the other way", context
+                    f"A speed cannot be {word} Hz; `drivebus run {word[1:]} --reverse` turns the other way", context
                 )
         return super().parse_args(context, args)
 
@@ -202,7 +202,9 @@ def _word(drive: drivebus.Drive, place: int, value: float | str, force: bool) ->
             f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; --force writes a word there"
         )
     if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
-        raise drivebus.NotAllowed(f"{value!r} is no word of 0 to 65535, as an address takes it; nothing was sent")
+        raise drivebus.NotAllowed(
+            f'"{value}" is not a word from 0 to 65535, which is what an address takes; nothing was sent'
+        )
     return value
 
 

@@ -36,9 +36,9 @@ def resolve(profile: drivebus.Profile, text: str) -> str | int:
     An unknown name stays what it is: the profile refuses it and names the closest.
     """
     if not text.strip():
-        raise click.UsageError("an empty text is no name; give one such as output_current, P00.11 or 3004H")
+        raise click.UsageError("an empty text is not a name; give one such as output_current, P00.11 or 3004H")
     if "=" in text:
-        raise click.UsageError(f"{text!r} is no name; `drivebus write {text}` gives something a value")
+        raise click.UsageError(f'"{text}" is not a name; `drivebus write {text}` gives something a value')
     match = _ADDRESS.fullmatch(text)
     if match:
         address = int(match[1] or match[2], 16)
@@ -66,9 +66,9 @@ def parse_assignment(text: str) -> tuple[str, int | float | str]:
     name, equals, value = text.partition("=")
     name, value = name.strip(), value.strip()
     if not equals or not name or not value:
-        raise click.UsageError(f"{text!r} is no assignment; write NAME=VALUE, such as P00.11=5.0")
+        raise click.UsageError(f'"{text}" is not an assignment; write NAME=VALUE, such as P00.11=5.0')
     if with_a_point(value):
-        raise click.UsageError(f"{text!r} has a comma in its number{with_a_point(value)}")
+        raise click.UsageError(f'"{text}" has a comma in its number{with_a_point(value)}')
     for kind in (lambda digits: int(digits, 0), float):
         try:
             return name, kind(value)
@@ -94,7 +94,7 @@ def parse_hex(parts: tuple[str, ...]) -> bytes:
         return bytes.fromhex(text)
     except ValueError:
         raise click.UsageError(
-            f"{' '.join(parts)!r} is not hexadecimal bytes; write two digits each, such as 01 03 21 00 00 01"
+            f'"{" ".join(parts)}" is not hexadecimal bytes; write two digits each, such as 01 03 21 00 00 01'
         ) from None
 
 
@@ -104,10 +104,12 @@ def parse_units(text: str) -> list[int]:
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,20})\s*(?:-\s*(\d{1,20})\s*)?", part)
         if match is None:
-            raise click.UsageError(f"{part!r} is no unit address; write 1-247, or a list such as 1-31,40")
+            raise click.UsageError(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
         first, last = int(match[1]), int(match[2] or match[1])
         if not 1 <= first <= last <= 247:
-            raise click.UsageError(f"units {part.strip()!r} are out of range or turned round; allowed is 1-247")
+            raise click.UsageError(
+                f'units "{part.strip()}" are out of range, or the first is above the last; allowed is 1 to 247'
+            )
         units.extend(range(first, last + 1))
     return units
 
@@ -118,7 +120,7 @@ def parse_variants(_context: click.Context, _parameter: click.Parameter, texts: 
     for text in texts:
         name, equals, choice = (part.strip() for part in text.partition("="))
         if not equals or not name or not choice:
-            raise click.BadParameter(f"{text!r} is no choice; write NAME=CHOICE, such as speed_unit=Hz")
+            raise click.BadParameter(f'"{text}" is not a choice; write NAME=CHOICE, such as speed_unit=Hz')
         if chosen.setdefault(name, choice) != choice:
             raise click.BadParameter(f"{name} is given twice, as {chosen[name]} and as {choice}")
     return chosen

@@ -326,7 +326,8 @@ def parse_format(context: click.Context, parameter: click.Parameter, value: str)
     match = re.fullmatch(r"([78])([NEO])([12])", value.strip().upper())
     if match is None:
         raise click.BadParameter(
-            f"{value!r} is no character format; give data bits (7, 8), parity (N, E, O) and stop bits (1, 2): 8E1, 8N1",
+            f'"{value}" is not a character format; give data bits (7, 8), parity (N, E, O) and stop bits (1, 2), '
+            "such as 8E1 or 8N1",
             context,
             parameter,
         )

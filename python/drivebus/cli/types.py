@@ -22,9 +22,9 @@ class Number(click.FloatRange):
         try:
             number = float(value)
         except ValueError:
-            self.fail(f"{value!r} is no number of {self.what}{with_a_point(value)}.", parameter, context)
+            self.fail(f'"{value}" is not a number of {self.what}{with_a_point(value)}.', parameter, context)
         if not math.isfinite(number):
-            self.fail(f"{value} is no number of {self.what}.", parameter, context)
+            self.fail(f"{value} is not a number of {self.what}.", parameter, context)
         if _is_outside(number, self.min, self.max):
             self.fail(f"{value} is out of range; allowed is {_allowed(self.min, self.max)}.", parameter, context)
         return number
@@ -51,7 +51,7 @@ class Whole(click.IntRange):
         try:
             number = int(value)
         except ValueError:
-            self.fail(f"{value!r} is no whole number; allowed is {allowed}.", parameter, context)
+            self.fail(f'"{value}" is not a whole number; allowed is {allowed}.', parameter, context)
         if _is_outside(number, self.min, self.max):
             self.fail(f"{value} is out of range; allowed is {allowed}.", parameter, context)
         return number
@@ -63,13 +63,13 @@ class Place(click.Path):
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
         """*value* as a path."""
         if not str(value).strip():
-            self.fail("an empty text is no path.", parameter, context)
+            self.fail("an empty text is not a path.", parameter, context)
         try:
             nameless = b"\0" in os.fsencode(value)
         except UnicodeError:
             nameless = True
         if nameless:
-            self.fail(f"{str(value)!r} is no path.", parameter, context)
+            self.fail(f'"{value}" is not a path.', parameter, context)
         return super().convert(value, parameter, context)
 
 

@@ -26,7 +26,9 @@ async def profile_of(
 ) -> tuple[Profile, int | None]:
     """The profile that *profile* means, or else that of the drive at *unit*, and the code that it gave if asked."""
     if variants is not None and not isinstance(variants, Mapping):
-        raise NotAllowed(f'variants {variants!r} are none; give a mapping, such as {{"speed_unit": "Hz"}}')
+        raise NotAllowed(
+            f'variants is {checks.shown(variants)}, not a mapping; give one, such as {{"speed_unit": "Hz"}}'
+        )
     code: int | None = None
     if profile is None:
         found = await identify(bus.read, unit)

@@ -22,7 +22,7 @@ _TIMEOUT = 0.1
 def units(given: Iterable[int]) -> list[int]:
     """The units of a scan."""
     if not isinstance(given, Iterable):
-        raise NotAllowed(f"units {given!r} are no units; give several of 1..247, such as range(1, 248) or [5]")
+        raise NotAllowed(f"units is {checks.shown(given)}; give addresses from 1 to 247, such as range(1, 248) or [5]")
     return [checks.unit(unit) for unit in given]
 
 

@@ -211,9 +211,11 @@ def transact_of(
     try:
         body = bytes(memoryview(pdu))
     except TypeError:
-        raise NotAllowed(f"PDU {pdu!r} is not bytes; give 1..253 bytes, function code first") from None
+        raise NotAllowed(
+            f"a PDU is bytes, and {checks.shown(pdu)} is not; give 1 to 253 bytes, function code first"
+        ) from None
     if not 1 <= len(body) <= 253:
-        raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1..253 bytes, function code first")
+        raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1 to 253 bytes, function code first")
     if reply_length is not None:
         reply_length = checks.whole("reply_length", reply_length, 1, 253)
     unit = checks.unit(unit)

@@ -296,7 +296,7 @@ def seconds(timeout: float | None) -> float | None:
 
 def _targets(bus: object, wanted: object) -> tuple[Target, ...]:
     if not isinstance(wanted, Mapping):
-        raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}; {wanted!r} is none")
+        raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}, and not {checks.shown(wanted)}")
     if not wanted:
         raise NotAllowed("there is nobody to poll: give {drive: names, …}, such as {drive: None}")
     targets = tuple(_target(bus, key, names) for key, names in wanted.items())
@@ -315,17 +315,19 @@ def _target(bus: object, key: Any, names: object) -> Target:
     if drive.bus is not bus:
         raise NotAllowed(f"unit {unit} is a drive of another bus; poll it there", unit=unit)
     if not isinstance(profile, Profile):
-        raise NotAllowed(f"the profile of unit {unit} is none of this package's; poll it by addresses", unit=unit)
+        raise NotAllowed(f"the profile of unit {unit} is not of this package; poll the unit by addresses", unit=unit)
     if names is None:
         names = drive.readable()
     elif isinstance(names, str):
         names = [names]
     elif not isinstance(names, Iterable):
-        raise NotAllowed(f"{names!r} are no names; give several, or None for the monitor registers", unit=unit)
+        raise NotAllowed(
+            f"{checks.shown(names)} is not a list of names; give one, or None for the monitor registers", unit=unit
+        )
     wanted = list(names)
     unfit = next((name for name in wanted if not isinstance(name, str)), None)
     if unfit is not None:
-        raise NotAllowed(f"name {unfit!r} of unit {unit} is no text", unit=unit)
+        raise NotAllowed(f"a name is a text, and {checks.shown(unfit)} of unit {unit} is not", unit=unit)
     asked = list(dict.fromkeys(wanted))
     plan = profile.compile(drive.readable(*asked) if asked else asked)
     if not plan.names:

@@ -49,7 +49,9 @@ class Opening:
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
-            raise NotAllowed(f'rs485 {rs485!r} is no mapping; give one such as {{"mode": "kernel"}}, or None')
+            raise NotAllowed(
+                f'rs485 is {checks.shown(rs485)}, not a mapping; give one such as {{"mode": "kernel"}}, or None'
+            )
         self.keywords: dict[str, Any] = {
             "timeout": self.timeout,
             "retries": checks.whole("retries", retries, 0, 100),

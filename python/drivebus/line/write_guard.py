@@ -65,7 +65,7 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 def _undefined(family: Profile, unit: int, address: int, word: int) -> NotAllowed:
     codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(family.command_codes().items()))
     return NotAllowed(
-        f"{word} at {address:04X}H is no command of unit {unit}, which is known as {family.title}: its codes are "
+        f"{word} at {address:04X}H is not a command of unit {unit}, which is known as {family.title}: its codes are "
         f"{codes or 'not known'}; {_HINT}",
         unit=unit,
     )

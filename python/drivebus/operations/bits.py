@@ -160,4 +160,4 @@ def _bits(known: Description, name: str, value: object) -> int:
         if called in choices:
             return called
     allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
-    raise NotAllowed(f"{name} {value!r} is nothing that {known.name} can be; allowed is {allowed}")
+    raise NotAllowed(f"{name} is {checks.shown(value)}, which {known.name} cannot be; allowed is {allowed}")

@@ -79,7 +79,7 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
     if not control:
         raise NotAllowed(
             f"unit {unit.address} would not heed its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
-            f"sent. prepare_control(setpoint={setpoint!r}) sets what is needed; write({register!r}, …) writes it "
+            f'sent. prepare_control(setpoint="{setpoint}") sets what is needed; write("{register}", …) writes it '
             "all the same",
             unit=unit.address,
         )

@@ -84,11 +84,14 @@ async def write(
     Where one of several fails, those before it were written; the error's note names them.
     """
     if not isinstance(name, (str, Mapping)):
-        raise NotAllowed(f"name {name!r} is no text, nor names with values; nothing was sent", unit=unit.address)
+        raise NotAllowed(
+            f"a name is a text, or a mapping of names to values, and {checks.shown(name)} is neither; nothing was sent",
+            unit=unit.address,
+        )
     store = checks.flag("store", store)
     wanted = name if isinstance(name, Mapping) else {name: value}
     if not isinstance(name, Mapping) and value is None:
-        raise NotAllowed(f"no value given for {name!r}; say write({name!r}, value)")
+        raise NotAllowed(f'no value is given for "{name}"; say write("{name}", value)')
     _check_deciding(unit, wanted)
     unit = await variants.settled(unit.trusting(unverified), *wanted)
     planned = [plan_write(unit, key, asked, store) for key, asked in wanted.items()]
@@ -121,8 +124,8 @@ def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
         chosen = unit.profile.variants_chosen.get(variant)
         if chosen is not None and unit.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
             raise NotAllowed(
-                f"{name} = {wanted[name]!r} would change the {variant} of unit {unit.address}, which was said to be "
-                f"{chosen}; nothing was sent. Write it by a drive without variants=…",
+                f"{name} = {checks.shown(wanted[name])} would change the {variant} of unit {unit.address}, which was "
+                f"said to be {chosen}; nothing was sent. Write it by a drive without variants=…",
                 unit=unit.address,
             )
 

@@ -127,7 +127,10 @@ async def with_setpoint(unit: Unit, setpoint: str) -> Unit:
 def register_of(unit: Unit, setpoint: str) -> str:
     """The register of *setpoint*. Raises `NotAllowed` where the family has none that is known."""
     if not isinstance(setpoint, str):
-        raise NotAllowed(f"setpoint {setpoint!r} is no text; nothing was sent", unit=unit.address)
+        raise NotAllowed(
+            f"a setpoint is named by a text, and {checks.shown(setpoint)} is not one; nothing was sent",
+            unit=unit.address,
+        )
     register = unit.profile.role(f"setpoints.{setpoint}")
     if register is None:
         known = ", ".join(unit.profile.setpoint_names())
@@ -146,7 +149,7 @@ def _frequency_in_hz(unit: Unit) -> str:
     if counted_in != "Hz":
         raise NotAllowed(
             f"the setpoint of unit {unit.address} is in {counted_in or 'a unit that is not known'}, not in Hz; "
-            f"nothing was sent. write({register!r}, …) takes it as it is",
+            f'nothing was sent. write("{register}", …) takes it as it is',
             unit=unit.address,
         )
     return register
@@ -170,7 +173,7 @@ async def word_of(unit: Unit, hz: float) -> int:
         if hz > highest:
             raise NotAllowed(
                 f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
-                f"allowed is 0..{highest:g} Hz. No setpoint was sent to unit {unit.address}",
+                f"allowed is 0 to {highest:g} Hz. No setpoint was sent to unit {unit.address}",
                 unit=unit.address,
             )
     return raw

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+from drivebus import checks
 from drivebus.errors import NotAllowed
 from drivebus.profile.profile import Profile
 
@@ -66,7 +67,10 @@ class Evidence:
         """Raises `NotAllowed` if one of *names* may not be read."""
         for name in names:
             if not isinstance(name, str):
-                raise NotAllowed(f"name {name!r} is no text; nothing was sent to unit {self.unit}", unit=self.unit)
+                raise NotAllowed(
+                    f"a name is a text, and {checks.shown(name)} is not; nothing was sent to unit {self.unit}",
+                    unit=self.unit,
+                )
             # Programs read the same few names again and again.
             if name in self._readable:
                 continue

@@ -68,7 +68,7 @@ class Profile:
         if isinstance(profile, os.PathLike):
             return cls.load(profile)
         raise NotAllowed(
-            f"profile {checks.shown(profile)} is none; give a name ({', '.join(profiles())}), a folder, or a Profile"
+            f"{checks.shown(profile)} is not a profile; give a name ({', '.join(profiles())}), a folder, or a Profile"
         )
 
     @property

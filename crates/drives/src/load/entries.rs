@@ -61,7 +61,8 @@ impl Entries {
             let known = self.list.iter().any(|entry| entry.kind == Kind::Parameter && entry.name == *bound);
             if !known && !self.incomplete && !problems.is_full() {
                 let closest = closest(bound, self.codes()).unwrap_or("nothing at all");
-                let reason = format!("bound \"{bound}\" is no parameter of this profile; the closest is \"{closest}\"");
+                let reason =
+                    format!("bound \"{bound}\" is not a parameter of this profile; the closest is \"{closest}\"");
                 problems.add(file, *line, reason);
             }
         }

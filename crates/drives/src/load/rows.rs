@@ -320,7 +320,7 @@ fn count(row: &Row<'_>, column: &str, text: &str, quantity: &Quantity) -> Result
             Err(row.broken(format!("\"{column}\" {text} does not fit a word with this scale and sign")))
         }
         Some(Counts::Above(_)) => Err(row.broken(format!("\"{column}\" {text} has more digits than the scale"))),
-        None => Err(row.broken(format!("\"{column}\" is \"{text}\", which is no number"))),
+        None => Err(row.broken(format!("\"{column}\" is \"{text}\", which is not a number"))),
     }
 }
 

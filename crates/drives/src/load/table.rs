@@ -67,7 +67,9 @@ fn headers(file: &File, columns: &Columns, reader: &mut csv::Reader<&[u8]>) -> R
     let known = headers.iter().filter(|header| all().any(|column| column == header)).count();
     if known < 2 || 2 * known < headers.len() {
         let columns = columns.required.join(", ");
-        return Err(file.broken(1, format!("this is no such table: its first line has to name its columns, {columns}")));
+        return Err(
+            file.broken(1, format!("this is not such a table: its first line has to name its columns, {columns}"))
+        );
     }
     if let Some(surplus) = headers.iter().find(|header| !all().any(|known| known == header)) {
         let closest = closest(surplus, all().copied()).unwrap_or_default();

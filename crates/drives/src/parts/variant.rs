@@ -45,7 +45,7 @@ pub enum VariantError {
         known: String,
     },
     /// The variant has no choice of this name.
-    #[error("{name} = \"{choice}\" is no choice of {profile}; the closest is \"{closest}\"")]
+    #[error("{name} = \"{choice}\" is not a choice of {profile}; the closest is \"{closest}\"")]
     UnknownChoice {
         /// The profile that was asked.
         profile: String,

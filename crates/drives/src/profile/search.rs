@@ -30,16 +30,17 @@ impl Profile {
         if let Some(entry) = self.find_loosely(text) {
             return std::iter::once(entry).take(limit).collect();
         }
-        self.search_words(words(text).take(MOST_WORDS).map(|word| self.corrected(word)).collect(), limit)
+        let corrected: Vec<String> = words(text).take(MOST_WORDS).map(|word| self.corrected(word)).collect();
+        self.search_words(&corrected, limit)
     }
 
     /// The entries in which all words of `text` occur as they are typed.
     pub(crate) fn search_exactly(&self, text: &str, limit: usize) -> Vec<&Entry> {
-        self.search_words(words(text).take(MOST_WORDS).collect(), limit)
+        self.search_words(&words(text).take(MOST_WORDS).collect::<Vec<String>>(), limit)
     }
 
-    fn search_words(&self, words: Vec<String>, limit: usize) -> Vec<&Entry> {
-        let terms = terms(&words);
+    fn search_words(&self, words: &[String], limit: usize) -> Vec<&Entry> {
+        let terms = terms(words);
         if terms.is_empty() {
             return Vec::new();
         }

@@ -214,7 +214,7 @@ fn let_in(
     if !peer.is_this_user {
         return Err("this port is open in a program of another user".to_owned());
     }
-    let no_greeting = || "this is a port of drivebus, and what came is no greeting of it".to_owned();
+    let no_greeting = || "this is a port of drivebus, and what came is not its greeting".to_owned();
     let Some(greeting) = channel.hear_bytes(monotonic() + HURRY).map_err(|_| no_greeting())? else { return Ok(None) };
     let own = format!("{} (process {})", process::own_name(), std::process::id());
     let (version, hello) = greeting.strip_prefix(GREETING).and_then(<[u8]>::split_first).ok_or_else(no_greeting)?;

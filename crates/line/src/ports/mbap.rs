@@ -85,7 +85,7 @@ impl ModbusTcp {
             if [protocol_high, protocol_low] != [0, 0] || !(MIN_BODY..=MAX_BODY).contains(&length) {
                 // Nothing tells where the next header begins, so nothing after this can be trusted.
                 return Err(self.connection.lost(format_args!(
-                    "{:02X?} is no Modbus TCP header (a server that passes RTU through is opened as socket://)",
+                    "{:02X?} is not a Modbus TCP header (a server that passes RTU through is opened as socket://)",
                     &self.incoming[..PREFIX]
                 )));
             }
@@ -122,7 +122,7 @@ impl Line for ModbusTcp {
         let body = bytes.len().checked_sub(CRC).filter(|length| (MIN_BODY..=MAX_BODY).contains(length));
         let Some(body) = body.map(|length| &bytes[..length]) else {
             let message = format!(
-                "{} bytes are no RTU frame of {}..={}; Modbus TCP carries whole frames only",
+                "{} bytes are not an RTU frame, which has {} to {}; Modbus TCP carries whole frames only",
                 bytes.len(),
                 MIN_BODY + CRC,
                 MAX_BODY + CRC

@@ -128,7 +128,7 @@ impl Rs485 {
         for (which, delay) in [("before", self.delay_before_ms), ("after", self.delay_after_ms)] {
             if delay > MAX_DELAY_MS {
                 return Err(unsupported(format!(
-                    "the RS-485 delay {which} sending is {delay} ms; 0..={MAX_DELAY_MS} ms can be kept"
+                    "the RS-485 delay {which} sending is {delay} ms; 0 to {MAX_DELAY_MS} ms can be kept"
                 )));
             }
         }

@@ -281,7 +281,7 @@ fn open_error(path: &str, error: &io::Error) -> PortError {
             "this user may not open it ({error}); join the group that owns it, usually `sudo usermod -aG dialout \
              $USER`, and log in again"
         ),
-        PortErrorKind::Unsupported => format!("it is no serial port ({error}); {}", present_ports()),
+        PortErrorKind::Unsupported => format!("it is not a serial port ({error}); {}", present_ports()),
         _ => format!("it does not open: {error}"),
     };
     PortError::new(kind, path, message)
@@ -327,7 +327,7 @@ mod tests {
             (Errno::WOULDBLOCK, PortErrorKind::Busy, "another program has it"),
             (Errno::ACCESS, PortErrorKind::Denied, "dialout"),
             (Errno::PERM, PortErrorKind::Denied, "dialout"),
-            (Errno::NOTTY, PortErrorKind::Unsupported, "no serial port"),
+            (Errno::NOTTY, PortErrorKind::Unsupported, "not a serial port"),
             (Errno::MFILE, PortErrorKind::Other, "does not open"),
         ] {
             let error = open_error("/dev/ttyX", &errno.into());

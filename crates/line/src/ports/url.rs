@@ -116,7 +116,7 @@ mod tests {
         let foreign = PortUrl::parse("spy:///dev/ttyUSB0", &known);
         assert_eq!(foreign, Ok(PortUrl::Foreign { scheme: "spy".to_owned() }));
         let unknown = PortUrl::parse("spy:///dev/ttyUSB0", &Known::default()).unwrap_err().to_string();
-        assert_eq!(unknown, "port 'spy:///dev/ttyUSB0' has an unknown scheme; known are socket://, tcp://, sim://");
+        assert_eq!(unknown, "port \"spy:///dev/ttyUSB0\" has an unknown scheme; known are socket://, tcp://, sim://");
     }
 
     #[test]

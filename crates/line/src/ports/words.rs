@@ -22,7 +22,7 @@ pub enum WordError {
     },
     /// A delay of RS-485 that cannot be kept.
     #[cfg(feature = "serial")]
-    #[error("rs485: {which} cannot be {delay}; allowed is 0..{MAX_DELAY_MS}")]
+    #[error("rs485: {which} cannot be {delay}; allowed is 0 to {MAX_DELAY_MS}")]
     Delay {
         /// `delay_before_ms` or `delay_after_ms`.
         which: &'static str,
@@ -159,7 +159,7 @@ mod tests {
         let mode = "driver".parse::<Rs485>().unwrap_err().to_string();
         assert_eq!(mode, "rs485: mode \"driver\" is not \"kernel\", \"rts\" or \"auto\"");
         let late = Rs485 { delay_after_ms: 101, ..Rs485::default() }.checked().unwrap_err().to_string();
-        assert_eq!(late, "rs485: delay_after_ms cannot be 101; allowed is 0..100");
+        assert_eq!(late, "rs485: delay_after_ms cannot be 101; allowed is 0 to 100");
     }
 
     #[test]

@@ -66,7 +66,7 @@ fn a_pseudo_terminal_that_is_plugged_in_again_has_another_name_and_its_link_lead
     std::fs::create_dir_all(&folder).unwrap();
     let link = folder.join("drive");
     std::fs::write(&link, "precious").unwrap();
-    assert!(simulator.serve_pty_linked(&link).unwrap_err().to_string().contains("is no link"));
+    assert!(simulator.serve_pty_linked(&link).unwrap_err().to_string().contains("is not a link"));
     std::fs::remove_file(&link).unwrap();
 
     let server = simulator.serve_pty_linked(&link).unwrap();

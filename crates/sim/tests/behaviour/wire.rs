@@ -239,8 +239,8 @@ fn impossible_simulations_are_refused_in_words() {
     let refused = |units: &[(u8, &str)]| {
         Simulator::new(units.iter().copied(), Options::default()).map(|_| ()).unwrap_err().to_string()
     };
-    assert_eq!(refused(&[(0, "gd350")]), "unit address 0 is not in 1..=247");
-    assert_eq!(refused(&[(248, "gd350")]), "unit address 248 is not in 1..=247");
+    assert_eq!(refused(&[(0, "gd350")]), "unit address 0 is not a number from 1 to 247");
+    assert_eq!(refused(&[(248, "gd350")]), "unit address 248 is not a number from 1 to 247");
     assert_eq!(refused(&[(1, "gd350"), (1, "gd350")]), "unit 1 is there twice; give each unit an address of its own");
     assert!(refused(&[(1, "gd35O")]).contains("gd350"), "the closest name is given");
     let simulator = Simulator::new([(1, "gd350"), (7, "gd350")], Options::default()).unwrap();

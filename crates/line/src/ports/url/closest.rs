@@ -6,9 +6,9 @@
 /// Names less alike than this are not meant.
 const ALIKE: f64 = 0.5;
 
-/// `; did you mean 'seed'?` for a misspelt `name`, or nothing where nothing is near.
+/// `; did you mean "seed"?` for a misspelt `name`, or nothing where nothing is near.
 pub(super) fn hint(name: &str, known: &[&str]) -> String {
-    closest(name, known).map_or_else(String::new, |meant| format!("; did you mean '{meant}'?"))
+    closest(name, known).map_or_else(String::new, |meant| format!("; did you mean \"{meant}\"?"))
 }
 
 fn closest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {

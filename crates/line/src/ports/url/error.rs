@@ -7,7 +7,7 @@ use super::quoted::Quoted;
 #[non_exhaustive]
 pub enum UrlError {
     /// There is nothing to open.
-    #[error("port {} is no port; give a path such as /dev/ttyUSB0 or COM3, or a URL", Quoted(port))]
+    #[error("{} is not a port; give a path such as /dev/ttyUSB0 or COM3, or a URL", Quoted(port))]
     NoPort {
         /// The port as given.
         port: String,
@@ -19,17 +19,17 @@ pub enum UrlError {
         port: String,
         /// The schemes that there are.
         known: Vec<String>,
-        /// `; did you mean 'socket'?`, or nothing where none is near.
+        /// `; did you mean "socket"?`, or nothing where none is near.
         hint: String,
     },
     /// A server needs a host and a port.
-    #[error("port {port:?} is not scheme://host:port with a port in 0..65535")]
+    #[error("port {port:?} is not scheme://host:port with a port from 0 to 65535")]
     Server {
         /// The port as given.
         port: String,
     },
     /// The unit is no number.
-    #[error("unit {} in {} is not a whole number; allowed is 1..247, as in sim://1=gd350", Quoted(unit), Quoted(url))]
+    #[error("unit {} in {} is not a whole number; allowed is 1 to 247, as in sim://1=gd350", Quoted(unit), Quoted(url))]
     UnitNumber {
         /// The URL as given.
         url: String,
@@ -56,7 +56,7 @@ pub enum UrlError {
         given: String,
         /// The names that there are.
         known: Vec<String>,
-        /// `; did you mean 'seed'?`, or nothing where none is near.
+        /// `; did you mean "seed"?`, or nothing where none is near.
         hint: String,
     },
     /// One thing is said twice.
@@ -68,7 +68,7 @@ pub enum UrlError {
         option: String,
     },
     /// The share of answers that a fault hits is no number.
-    #[error("rate {} of {kind} in {} is not a number; allowed is 0..1", Quoted(rate), Quoted(url))]
+    #[error("rate {} of {kind} in {} is not a number; allowed is 0 to 1", Quoted(rate), Quoted(url))]
     Rate {
         /// The URL as given.
         url: String,
@@ -86,7 +86,7 @@ pub enum UrlError {
         seed: String,
     },
     /// The seed has more than 64 bits.
-    #[error("seed {seed} is out of range; allowed is 0..{}", u64::MAX)]
+    #[error("seed {seed} is out of range; allowed is 0 to {}", u64::MAX)]
     Seed {
         /// What was given.
         seed: String,
@@ -104,10 +104,10 @@ pub enum UrlError {
 #[non_exhaustive]
 pub enum UnitError {
     /// 0 is everybody.
-    #[error("unit 0 is the broadcast address, which nobody answers; allowed is 1..247, or use broadcast()")]
+    #[error("unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()")]
     Broadcast,
     /// There are 247.
-    #[error("unit {unit} is out of range; allowed is 1..247")]
+    #[error("unit {unit} is out of range; allowed is 1 to 247")]
     OutOfRange {
         /// What was given.
         unit: u64,

@@ -2,21 +2,20 @@
 
 use std::fmt;
 
-/// `'as it was given'`, with what cannot be printed escaped. In double quotes where it holds a single one only.
+/// `"as it was given"`, with what cannot be printed escaped.
 pub(super) struct Quoted<'a>(pub(super) &'a str);
 
 impl fmt::Display for Quoted<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let quote = if self.0.contains('\'') && !self.0.contains('"') { '"' } else { '\'' };
-        write!(f, "{quote}")?;
+        f.write_str("\"")?;
         for letter in self.0.chars() {
             match letter {
                 '\\' => f.write_str(r"\\")?,
                 '\n' => f.write_str(r"\n")?,
                 '\r' => f.write_str(r"\r")?,
                 '\t' => f.write_str(r"\t")?,
-                _ if letter == quote => write!(f, "\\{letter}")?,
-                '"' | '\'' => write!(f, "{letter}")?,
+                '"' => f.write_str("\\\"")?,
+                '\'' => f.write_str("'")?,
                 // Rust knows what cannot be printed, and escapes it in its own way.
                 _ if letter.escape_debug().len() == 1 => write!(f, "{letter}")?,
                 _ => match u32::from(letter) {
@@ -26,7 +25,7 @@ impl fmt::Display for Quoted<'_> {
                 },
             }
         }
-        write!(f, "{quote}")
+        f.write_str("\"")
     }
 }
 
@@ -37,11 +36,11 @@ mod tests {
     #[test]
     fn what_cannot_be_printed_is_escaped() {
         for (text, shown) in [
-            ("sim://x", "'sim://x'"),
+            ("sim://x", "\"sim://x\""),
             ("it's", "\"it's\""),
-            ("'\"", "'\\'\"'"),
-            ("a\u{1b}[31m\\\n", r"'a\x1b[31m\\\n'"),
-            ("é\u{200b}\u{e0001}", r"'é\u200b\U000e0001'"),
+            ("'\"", "\"'\\\"\""),
+            ("a\u{1b}[31m\\\n", r#""a\x1b[31m\\\n""#),
+            ("é\u{200b}\u{e0001}", r#""é\u200b\U000e0001""#),
         ] {
             assert_eq!(Quoted(text).to_string(), shown);
         }
