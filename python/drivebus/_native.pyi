@@ -548,7 +548,7 @@ class Simulator:
 
     def __new__(
         cls,
-        units: Mapping[int, str],
+        units: Mapping[int, str | Profile],
         format: SerialFormat,  # noqa: A002
         *,
         seed: int = 0,

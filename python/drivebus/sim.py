@@ -18,7 +18,7 @@ from typing import TypeVar
 from drivebus import _native, checks
 from drivebus._native import SerialFormat, SimulatedLine
 from drivebus.errors import DrivebusWarning, NotAllowed, PortError, level_of_the_program
-from drivebus.profile import Profile, profiles
+from drivebus.profile import Profile, native_of
 
 __all__ = ["FAULT_KINDS", "SimulatedDrive", "SimulatedLine", "Simulator", "check_faults"]
 
@@ -40,9 +40,9 @@ class SimulatedDrive:
 
     __slots__ = ("_native", "_profile")
 
-    def __init__(self, native: _native.SimulatedDrive) -> None:
+    def __init__(self, native: _native.SimulatedDrive, profile: Profile) -> None:
         self._native = native
-        self._profile = Profile.builtin(native.profile)
+        self._profile = profile
 
     @property
     def unit(self) -> int:
@@ -153,7 +153,8 @@ class Simulator:
     """A simulated line with simulated drives on it.
 
     Args:
-        units: The family on each unit address, such as `{1: "gd350", 2: "vfd500"}`: any that has a profile.
+        units: The family on each unit address, such as `{1: "gd350", 2: "vfd500"}`: any that has a profile, the folder
+            of a profile of your own (`"./acme"`, or a path), or a `drivebus.Profile`.
         baudrate: Bits per second on the line.
         parity: `"N"`, `"E"` or `"O"`.
         stopbits: 1 or 2.
@@ -174,7 +175,7 @@ class Simulator:
             of a UART does; the end of an answer comes at once. 1: each character at its moment.
 
     Raises:
-        NotAllowed: An argument is wrong.
+        NotAllowed: An argument is wrong, or a profile lacks what a simulation needs: the message says what, and where.
         PortError: The pseudo-terminal or TCP port could not be opened.
 
     Attributes:
@@ -183,11 +184,11 @@ class Simulator:
         seed: As above: the same seed, arguments and requests give the same run in virtual time.
     """
 
-    __slots__ = ("_native", "format", "seed", "transport")
+    __slots__ = ("_native", "_profiles", "format", "seed", "transport")
 
     def __init__(
         self,
-        units: Mapping[int, str],
+        units: Mapping[int, str | os.PathLike[str] | Profile],
         *,
         baudrate: int = 19200,
         parity: str = "E",
@@ -213,7 +214,8 @@ class Simulator:
             link = checks.path("link", link)
             if transport not in ("auto", "pty"):
                 raise NotAllowed(f'link {link!r} leads to a pseudo-terminal: it needs transport "pty"')
-        _check_units(units)
+        self._profiles = _profiles_of(units)
+        families = {unit: native_of(profile) for unit, profile in self._profiles.items()}
         checks.flag("strict_silence", strict_silence)
         checks.flag("echo", echo)
         rates = check_faults({} if faults is None else faults, transport)
@@ -223,7 +225,7 @@ class Simulator:
 
         def served(by: str) -> _native.Simulator:
             return _native.Simulator(
-                units,
+                families,
                 self.format,
                 seed=self.seed,
                 transport=by,
@@ -250,7 +252,13 @@ class Simulator:
 
     def drive(self, unit: int) -> SimulatedDrive:
         """The simulated drive at *unit*, seen from its shaft and keypad."""
-        return SimulatedDrive(self._native.drive(checks.unit(unit)))
+        native = self._native.drive(checks.unit(unit))
+        return SimulatedDrive(native, self._profiles[native.unit])
+
+    @property
+    def units(self) -> list[int]:
+        """The addresses of its drives, the lowest first."""
+        return sorted(self._profiles)
 
     def now(self) -> float:
         """Seconds since the simulation began."""
@@ -316,10 +324,8 @@ def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float
     return rates
 
 
-def _check_units(units: object) -> None:
+def _profiles_of(units: object) -> dict[int, Profile]:
+    """The profile of each of *units*, if that is what they are."""
     if not isinstance(units, Mapping) or not units:
         raise NotAllowed(f'units {units!r} name no drive; give at least one, such as {{1: "gd350"}}')
-    families = profiles()
-    for unit, family in units.items():
-        checks.unit(unit)
-        checks.one_of("profile", family, families)
+    return {checks.unit(unit): Profile.find(profile) for unit, profile in units.items()}

@@ -81,6 +81,26 @@ def test_from_a_manual_page_to_a_profile(folder: Path) -> None:
     assert profile.state(3) == "stopped"
 
 
+def test_what_the_profile_says_can_be_tried_without_the_drive(folder: Path) -> None:
+    text = section("From a manual page to a profile")
+    assert "drivebus sim --units 1=./ex1" in text
+    follow(text, folder)
+    with (
+        drivebus.Simulator({1: "./ex1"}, transport="process", clock="virtual") as simulator,
+        drivebus.Bus(simulator) as bus,
+    ):
+        drive = bus.drive(1, profile="./ex1")
+        drive.write("acceleration_time_1", 2.0)
+        drive.prepare_control()
+        drive.run(hz=25.0)
+        begun, _, _ = next(write for write in reversed(simulator.drive(1).writes()) if write[1:] == (0x1000, 1))
+        simulator.advance(begun + 0.5 - simulator.now())
+        # From 0 to 50 Hz it would be 2 s.
+        assert simulator.drive(1).frequency == pytest.approx(12.5)
+        simulator.advance(1.0)
+        assert (drive.state(), drive.read("running_frequency")) == ("forward", 25.0)
+
+
 def test_what_the_check_says_of_two_slips(folder: Path) -> None:
     text = section("From a manual page to a profile")
     follow(text, folder)

@@ -17,6 +17,13 @@ use crate::tables::{self, known_as, number};
 #[derive(Debug)]
 pub(crate) struct Profile(Arc<drives::Profile>);
 
+impl Profile {
+    /// What it is in the core.
+    pub(crate) fn core(&self) -> Arc<drives::Profile> {
+        Arc::clone(&self.0)
+    }
+}
+
 #[pymethods]
 impl Profile {
     #[staticmethod]

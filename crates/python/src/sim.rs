@@ -1,16 +1,17 @@
 //! The simulator and its drives for Python.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_line::{Line, PortError, PortErrorKind};
-use drivebus_sim::{self as sim, Options, SimError};
+use drivebus_sim::{self as sim, Model, Options, SimError};
 use pyo3::prelude::*;
 
 use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{not_allowed, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::profile::Profile;
 use crate::sim_line::SimulatedLine;
 
 /// What other programs reach the simulated line by. It is served until this is dropped.
@@ -116,8 +117,8 @@ impl Simulator {
         if let Some(characters) = fifo {
             options = options.fifo(characters);
         }
-        let named = units.iter().map(|(unit, profile)| (*unit, profile.as_str()));
-        let core = sim::Simulator::new(named, options).map_err(refuse)?;
+        let models = units.iter().map(|(unit, behaves_like)| (*unit, behaves_like.model()));
+        let core = sim::Simulator::new(models, options).map_err(refuse)?;
         let server = Server::start(&core, transport, link)?;
         let port = Mutex::new(server.port(&core));
         Ok(Self { core, port, server: Mutex::new(Some(server)) })
@@ -172,7 +173,7 @@ impl SimulatedDrive {
     }
 
     #[getter]
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> String {
         self.0.profile()
     }
 
@@ -274,16 +275,35 @@ pub(crate) fn sim_error(what: &str, error: SimError) -> PyErr {
     }
 }
 
-/// A mapping's items as unit address and profile name.
-fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, String)>> {
-    let mistake = || not_allowed(format!("units {} do not map unit addresses to profile names", shown(units)));
+/// What a unit was said to behave like.
+enum BehavesLike {
+    Name(String),
+    Profile(Arc<drivebus_drives::Profile>),
+}
+
+impl BehavesLike {
+    fn model(&self) -> Model<'_> {
+        match self {
+            Self::Name(name) => name.as_str().into(),
+            Self::Profile(profile) => (&**profile).into(),
+        }
+    }
+}
+
+/// A mapping's items as unit address and what is there.
+fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, BehavesLike)>> {
+    let mistake =
+        || not_allowed(format!("units {} do not map unit addresses to names of profiles or profiles", shown(units)));
     let items = units.call_method0("items").map_err(|_| mistake())?;
     items
         .try_iter()?
         .map(|item| {
             let (unit, profile): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item?.extract().map_err(|_| mistake())?;
-            let profile = profile.extract().map_err(|_| mistake())?;
-            Ok((unit_address(&unit)?.get(), profile))
+            let behaves_like = match profile.cast::<Profile>() {
+                Ok(profile) => BehavesLike::Profile(profile.get().core()),
+                Err(_) => BehavesLike::Name(profile.extract().map_err(|_| mistake())?),
+            };
+            Ok((unit_address(&unit)?.get(), behaves_like))
         })
         .collect()
 }

@@ -26,8 +26,8 @@ use std::time::Duration;
 use drivebus_rtu::{ExceptionCode, Instant, UnitAddress};
 
 pub(crate) use all::Drives;
-pub(crate) use family::Family;
-use family::Kind;
+pub(crate) use family::{Family, own};
+use family::{Kind, OnSilence, Scaled, Silence};
 use machine::{Command, Machine, RunState, Settings};
 pub(crate) use map::Map;
 use refusal::Refusal;
@@ -38,10 +38,6 @@ use store::Store;
 const WRITES_KEPT: usize = 100_000;
 /// Load of a drive nobody has set one for, as a share of rated torque.
 const USUAL_LOAD: f64 = 0.3;
-/// The most words that the bus sets in one drive.
-const CONTROL_WORDS: usize = 15;
-/// How long a drive takes to answer that has no parameter for it. Assumption: what most have from the factory.
-const USUAL_DELAY: u16 = 5;
 
 /// A word that the drive took from the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +58,7 @@ pub(crate) struct Drive {
     map: Arc<Map>,
     store: Store,
     /// The words that the bus sets.
-    control: [u16; CONTROL_WORDS],
+    control: Vec<u16>,
     machine: Machine,
     /// What the machine was last told; compared, so that only a change bends a ramp.
     settings: Settings,
@@ -92,7 +88,7 @@ impl Drive {
     /// A drive fresh from the factory, switched on at `now`.
     pub(crate) fn new(unit: UnitAddress, map: Arc<Map>, now: Instant) -> Self {
         let store = Store::new(map.parameters(), map.factory(unit));
-        let control = [0; CONTROL_WORDS];
+        let control = vec![0; map.control_words()];
         let family = map.family();
         let settings = settings::settings(family, &store, 0);
         let load = if family.kind == Kind::Inverter { USUAL_LOAD } else { 0.0 };
@@ -147,12 +143,12 @@ impl Drive {
     /// Assumption: a fault does not outlive the power, its place in the history does; a password locks again.
     pub(crate) fn power_cycle(&mut self, now: Instant) {
         self.store.power_cycle();
-        self.control = [0; CONTROL_WORDS];
+        self.control.fill(0);
         self.unlocked = false;
         self.last_heard = None;
         self.frames = Frames::default();
         self.machine = self.machine.after_power_loss(now);
-        self.settings = settings::settings(self.family(), &self.store, 0);
+        self.settings = settings::settings(self.map.family(), &self.store, 0);
     }
 
     /// Gives every parameter its factory value, as the keypad does; a password goes too. Nothing else changes.
@@ -163,8 +159,8 @@ impl Drive {
         if self.machine.is_running() {
             return false;
         }
-        let kept = self.family().roles.fault_history.iter().map(|&address| (address, self.parameter(address)));
-        let kept: Vec<(u16, u16)> = kept.collect();
+        let history = &self.family().roles.fault_history;
+        let kept: Vec<(u16, u16)> = history.iter().map(|&address| (address, self.parameter(address))).collect();
         self.store.reset(self.map.factory(self.unit));
         for (address, word) in kept {
             self.store.keep(address, word);
@@ -190,7 +186,7 @@ impl Drive {
     }
 
     /// What is typed of its family; its name is that of the profile.
-    pub(crate) fn family(&self) -> &'static Family {
+    pub(crate) fn family(&self) -> &Family {
         self.map.family()
     }
 
@@ -234,7 +230,7 @@ impl Drive {
     }
 
     pub(crate) fn eeprom_writes_of(&self, address: u16) -> u64 {
-        self.store.eeprom_writes_of(address & !bus::MEMORY_BIT)
+        self.store.eeprom_writes_of(self.plain(address))
     }
 
     pub(crate) fn writes(&self) -> Vec<WriteRecord> {
@@ -256,7 +252,7 @@ impl Drive {
     /// drive's own processing takes no time.
     pub(crate) fn response_delay(&self) -> Duration {
         let delay = self.family().roles.response_delay;
-        Duration::from_millis(u64::from(delay.map_or(USUAL_DELAY, |delay| self.parameter(delay))))
+        Duration::from_millis(u64::from(delay.map_or(self.family().delay, |delay| self.parameter(delay))))
     }
 
     /// Something was on the line that is no frame.
@@ -279,13 +275,12 @@ impl Drive {
     }
 
     fn control_word(&self, address: u16) -> u16 {
-        let place = usize::from(address.wrapping_sub(self.family().control));
-        self.control.get(place).copied().unwrap_or(0)
+        self.map.control(address).and_then(|place| self.control.get(place)).copied().unwrap_or(0)
     }
 
     /// Tells the machine what a parameter or setpoint now asks of it.
     fn settings_may_have_changed(&mut self) {
-        let [_, speed, ..] = self.control;
+        let speed = self.family().roles.speed.as_ref().map_or(0, |speed| self.control_word(speed.register));
         let settings = settings::settings(self.family(), &self.store, speed);
         if settings != self.settings {
             self.settings = settings;
@@ -302,8 +297,8 @@ impl Drive {
     /// Assumption: the newest fault stands first in the history and stays there after its reset.
     fn remember_fault(&mut self, code: u16) {
         let mut newer = code;
-        for &address in self.family().roles.fault_history {
-            let older = self.parameter(address);
+        for &address in &self.map.family().roles.fault_history {
+            let older = self.store.get(address).unwrap_or(0);
             self.store.keep(address, newer);
             newer = older;
         }
@@ -313,23 +308,33 @@ impl Drive {
     ///
     /// Assumption: only frames for this unit count (broadcasts too), and the time runs from the first one on.
     fn bus_timeout_at(&self) -> Option<Instant> {
-        let tenths = self.role(self.family().roles.bus_timeout);
         let last = self.last_heard?;
-        (tenths > 0).then(|| last + Duration::from_millis(u64::from(tenths) * 100))
+        let Scaled { address, counts } = self.family().roles.bus_timeout?;
+        let word = self.parameter(address);
+        (word > 0).then(|| last + Duration::from_secs_f64(f64::from(word) / counts))
     }
 
-    /// What is set to be done about a silent bus: 0 alarm and coast, 1 nothing, 2 and 3 stop without alarm.
+    /// What is set to be done about a silent bus.
     fn miss_the_bus(&mut self) {
-        match self.role(self.family().roles.bus_timeout_action) {
-            0 => self.trip(self.family().faults.silent_bus),
-            2 if self.obeys_bus() => self.machine.command(Command::Stop, &self.settings),
-            3 => self.machine.command(Command::Stop, &self.settings),
-            _ => {}
+        let family = self.family();
+        let action = match &family.roles.on_silence {
+            None => Some(OnSilence::Trip),
+            Some(Silence { parameter, words }) => {
+                let set = self.parameter(*parameter);
+                words.iter().find(|&&(word, _)| word == set).map(|&(_, action)| action)
+            }
+        };
+        match (action, family.faults.silent_bus) {
+            (Some(OnSilence::Trip), Some(code)) => self.trip(code),
+            (Some(OnSilence::Trip), None) => self.machine.command(Command::Coast, &self.settings),
+            (Some(OnSilence::StopIfObeyed), _) if !self.obeys_bus() => {}
+            (Some(OnSilence::StopIfObeyed | OnSilence::Stop), _) => self.machine.command(Command::Stop, &self.settings),
+            (None, _) => {}
         }
     }
 
     /// Whether commands from the bus move the motor.
     fn obeys_bus(&self) -> bool {
-        all_are(&self.store, self.family().roles.obeys)
+        all_are(&self.store, &self.family().roles.obeys)
     }
 }

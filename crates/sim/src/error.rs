@@ -22,6 +22,14 @@ pub enum SimError {
         /// The profile asked for.
         profile: String,
     },
+    /// A profile of somebody's own does not say enough.
+    #[error("profile \"{profile}\" cannot be simulated; it lacks\n  {}", missing.join("\n  "))]
+    Lacking {
+        /// The profile asked for.
+        profile: String,
+        /// What is missing, and in which file and table.
+        missing: Vec<String>,
+    },
     /// Two units were given one address.
     #[error("unit {unit} is there twice; give each unit an address of its own")]
     Twice {
@@ -52,7 +60,7 @@ pub enum SimError {
     #[error("{profile} drives no motor, so it has no load to set")]
     NoMotor {
         /// The family.
-        profile: &'static str,
+        profile: String,
     },
     /// Parameters get their factory values at standstill only.
     #[error("unit {unit} is running; stop it before its parameters get their factory values")]

@@ -31,8 +31,8 @@ impl SimulatedDrive {
     }
 
     /// The name of its profile.
-    pub fn profile(&self) -> &'static str {
-        self.with(|drive| drive.family().name).unwrap_or_default()
+    pub fn profile(&self) -> String {
+        self.with(|drive| drive.family().name.clone().into_owned()).unwrap_or_default()
     }
 
     /// What the motor does: `forward`, `reverse`, `stopped` or `fault`; of a rectifier `running` instead of the first two.

@@ -1,7 +1,7 @@
 //! A simulated RS-485 line with simulated drives on it: everything runs and is tested with no hardware.
 //!
 //! The [`Simulator`] holds one half-duplex wire, on which every character takes its time, and a [`SimulatedDrive`] for
-//! each unit. Masters reach it three ways:
+//! each unit: of a family that is typed here from its manuals, or of a profile of one's own ([`Model`]). Masters reach it three ways:
 //!
 //! - [`SimLine`], in process, for everything that drives a [`Line`](drivebus_line::Line); in virtual time, where the
 //!   clock jumps to what happens next, or in real time;
@@ -82,6 +82,7 @@ mod heard;
 #[cfg(unix)]
 mod lateness;
 mod line;
+mod model;
 mod motor;
 mod outlet;
 #[cfg(unix)]
@@ -108,6 +109,7 @@ pub use error::SimError;
 pub use faults::FaultKind;
 pub use handles::SimulatedDrive;
 pub use line::SimLine;
+pub use model::Model;
 #[cfg(target_os = "linux")]
 pub use pty::PtyServer;
 pub use simulator::{Options, Simulator};

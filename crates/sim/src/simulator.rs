@@ -5,15 +5,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_drives::Profile;
 use drivebus_line::{PortError, PortErrorKind};
 use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 
 use crate::clock::Clock;
-use crate::drive::{Drive, Drives, Family, Map};
+use crate::drive::{Drive, Drives, Map};
 use crate::error::SimError;
 use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
+use crate::model::Model;
 use crate::outlet::Outlets;
 use crate::wire_handle::SimulatedLine;
 use crate::world::World;
@@ -131,19 +131,25 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// A line with these units: address (1..=247) and the name of a profile.
+    /// A line with these units: address (1..=247), and the name of a shipped profile or a profile of one's own.
     ///
     /// # Errors
     ///
-    /// [`SimError`]: an address is impossible or there twice, a profile is unknown or not simulated.
-    pub fn new<'a>(units: impl IntoIterator<Item = (u8, &'a str)>, options: Options) -> Result<Self, SimError> {
-        let mut maps: BTreeMap<&str, Arc<Map>> = BTreeMap::new();
+    /// [`SimError`]: an address is impossible or there twice, a profile is unknown or lacks what a simulation needs.
+    pub fn new<'a, M: Into<Model<'a>>>(
+        units: impl IntoIterator<Item = (u8, M)>,
+        options: Options,
+    ) -> Result<Self, SimError> {
+        let mut maps: Vec<(Model<'a>, Arc<Map>)> = Vec::new();
         let mut drives = BTreeMap::new();
-        for (unit, profile) in units {
-            let address = UnitAddress::new(unit)?;
-            let map = match maps.get(profile) {
-                Some(map) => Arc::clone(map),
-                None => Arc::clone(maps.entry(profile).or_insert(Arc::new(load(profile)?))),
+        for (unit, model) in units {
+            let (address, model) = (UnitAddress::new(unit)?, model.into());
+            let map = if let Some((_, map)) = maps.iter().find(|(known, _)| *known == model) {
+                Arc::clone(map)
+            } else {
+                let map = Arc::new(model.map()?);
+                maps.push((model, Arc::clone(&map)));
+                map
             };
             if drives.insert(unit, Drive::new(address, map, Instant::ZERO)).is_some() {
                 return Err(SimError::Twice { unit });
@@ -277,16 +283,5 @@ impl Simulator {
     #[cfg(unix)]
     fn require_real_time(&self) -> Result<(), SimError> {
         if self.is_realtime() { Ok(()) } else { Err(SimError::VirtualTime) }
-    }
-}
-
-fn load(profile: &str) -> Result<Map, SimError> {
-    match Family::named(profile) {
-        Some(family) => Ok(Map::new(family)?),
-        // The profile's own error says that there is none, and what comes near.
-        None => match Profile::builtin(profile) {
-            Ok(_) => Err(SimError::NotSimulated { profile: profile.to_owned() }),
-            Err(error) => Err(error.into()),
-        },
     }
 }

@@ -25,7 +25,7 @@ __all__ = ["COMMANDS"]
     show_default=True,
     metavar="LIST",
     shell_complete=complete_units,
-    help=f"Such as 1=gd350,2=vfd500. There are {', '.join(drivebus.profiles())}.",
+    help=f"Such as 1=gd350,2=vfd500, or with a profile's folder, 3=./acme. There are {', '.join(drivebus.profiles())}.",
 )
 @click.option(
     "--transport",

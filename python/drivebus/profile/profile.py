@@ -15,7 +15,7 @@ from drivebus.errors import NotAllowed
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
-__all__ = ["Profile", "profiles"]
+__all__ = ["Profile", "native_of", "profiles"]
 
 _PLANS_KEPT = 256
 """Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
@@ -398,6 +398,11 @@ class Profile:
 def profiles() -> list[str]:
     """The names of the profiles that come with the package."""
     return _native.Profile.builtin_names()
+
+
+def native_of(profile: Profile) -> _native.Profile:
+    """What *profile* is in the core."""
+    return profile._native
 
 
 @functools.cache

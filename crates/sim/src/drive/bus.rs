@@ -8,16 +8,10 @@ use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, W
 use super::family::{Memory, Range};
 use super::map::{Access, Word};
 use super::refusal::Refusal;
-use super::settings::is_speed;
 use super::{Drive, WRITES_KEPT, WriteRecord};
 
-/// Most words of one read or write: GD350 operation manual, sections 9.4.1 and 9.4.4; VFD500 manual, appendix A.
-///
-/// Assumption: the same in the families whose manuals at hand do not say.
-const MAX_WORDS: u16 = 16;
-
-/// With it a parameter's address reaches another memory than without.
-pub(super) const MEMORY_BIT: u16 = 0x8000;
+/// The most words that any family takes in one request.
+const MOST_WORDS: usize = 125;
 
 /// Where a word goes.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +40,7 @@ impl Drive {
         let function = *pdu.first().filter(|&&code| code & function::EXCEPTION_BIT == 0)?;
         self.last_heard = Some(now);
         self.frames.received = self.frames.received.wrapping_add(1);
-        let mut words = [0; MAX_WORDS as usize];
+        let mut words = [0; MOST_WORDS];
         let answer = match Request::parse(pdu) {
             _ if !self.family().functions.contains(&function) => Err(Refusal::Function),
             Ok(request) => self.carry_out(now, &request, &mut words),
@@ -81,13 +75,14 @@ impl Drive {
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        words: &'a mut [u16; MAX_WORDS as usize],
+        words: &'a mut [u16; MOST_WORDS],
     ) -> Result<Answer<'a>, Refusal> {
         match *request {
             Request::ReadHolding { address, count, .. } => {
-                check_count(count)?;
+                self.check_count(count)?;
                 self.check_unlocked()?;
-                let words = &mut words[..usize::from(count)];
+                self.check_groups(address, count)?;
+                let words = words.get_mut(..usize::from(count)).ok_or(Refusal::Structure)?;
                 for (word, offset) in words.iter_mut().zip(0..) {
                     *word = self.word(address.wrapping_add(offset))?;
                 }
@@ -95,7 +90,7 @@ impl Drive {
             }
             Request::WriteSingle { address, value, .. } => self.write(now, address, Words::new(&[value]))?,
             Request::WriteMultiple { address, words, .. } => {
-                check_count(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
+                self.check_count(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
                 self.write(now, address, words)?;
             }
             // Assumption: the echo works on a locked drive; it reads and writes nothing.
@@ -105,6 +100,17 @@ impl Drive {
         Answer::confirming(request).ok_or(Refusal::Function)
     }
 
+    fn check_count(&self, count: u16) -> Result<(), Refusal> {
+        if (1..=self.family().max_words).contains(&count) { Ok(()) } else { Err(Refusal::Structure) }
+    }
+
+    /// Whether the read of `count` words from `address` on stays where the family lets one stay.
+    fn check_groups(&self, address: u16, count: u16) -> Result<(), Refusal> {
+        let group = |address: u16| address >> 8;
+        let last = address.wrapping_add(count - 1);
+        if self.family().across_groups || group(address) == group(last) { Ok(()) } else { Err(Refusal::Address) }
+    }
+
     fn write(&mut self, now: Instant, address: u16, words: Words<'_>) -> Result<(), Refusal> {
         match words.get(0) {
             Some(password) if words.len() == 1 && self.is_password(address) => self.check_password(password)?,
@@ -112,7 +118,7 @@ impl Drive {
         }
         for (address, word) in (address..).zip(words.iter()) {
             self.target(address).ok_or(Refusal::Address)?;
-            self.check_word(address & !MEMORY_BIT, word)?;
+            self.check_word(self.plain(address), word)?;
         }
         for (address, word) in (address..).zip(words.iter()) {
             self.take(now, address, word);
@@ -128,7 +134,7 @@ impl Drive {
     }
 
     fn is_password(&self, address: u16) -> bool {
-        self.family().roles.password == Some(address & !MEMORY_BIT)
+        self.family().roles.password == Some(self.plain(address))
     }
 
     fn password(&self) -> u16 {
@@ -143,14 +149,18 @@ impl Drive {
         if self.is_locked() { Err(Refusal::Locked) } else { Ok(()) }
     }
 
+    /// The address without the bit for the other memory.
+    pub(super) fn plain(&self, address: u16) -> u16 {
+        address & !self.family().memory.mask()
+    }
+
     fn target(&self, address: u16) -> Option<Target> {
-        let plain = address & !MEMORY_BIT;
+        let plain = self.plain(address);
         match (self.map.word(plain)?, self.family().memory, address == plain) {
             (Word::Register(_), _, true) => Some(Target::Control),
             (Word::Register(_), _, false) | (Word::Parameter(_), Memory::EepromOnly, false) => None,
-            (Word::Parameter(_), Memory::BitMeansRam, false) | (Word::Parameter(_), Memory::BitMeansEeprom, true) => {
-                Some(Target::Ram)
-            }
+            (Word::Parameter(_), Memory::BitMeansRam(_), false)
+            | (Word::Parameter(_), Memory::BitMeansEeprom(_), true) => Some(Target::Ram),
             (Word::Parameter(_), _, _) => Some(Target::Eeprom),
         }
     }
@@ -165,13 +175,17 @@ impl Drive {
         }
         let family = self.family();
         let fits = match target {
-            Word::Parameter(parameter) => parameter.allows(word, |bound| self.parameter(bound)),
-            Word::Register(_) if family.command == Some(address) => (family.commands)(word).is_some(),
+            Word::Parameter(parameter) => parameter.bounds.allows(word, |bound| self.parameter(bound)),
+            Word::Register(_) if family.command == Some(address) => family.command_of(word).is_some(),
             Word::Register(register) => match register.range {
                 Range::Words(low, high) => (low..=high).contains(&word),
                 Range::UpTo(high, bound) => word <= high.min(self.parameter(bound)),
                 Range::Signed(low, high) => (low..=high).contains(&word.cast_signed()),
-                Range::Speed => is_speed(family.roles.speed_unit.and_then(|unit| self.store.get(unit)), word),
+                Range::Speed => family.roles.speed.as_ref().is_some_and(|speed| {
+                    let scale = speed.scale(|parameter| self.store.get(parameter));
+                    scale.bounds.allows(word, |bound| self.parameter(bound))
+                }),
+                Range::Within(bounds) => bounds.allows(word, |bound| self.parameter(bound)),
             },
         };
         if fits { Ok(()) } else { Err(Refusal::Value) }
@@ -191,13 +205,12 @@ impl Drive {
         }
         match self.target(address) {
             Some(Target::Control) => {
-                let place = usize::from(address.wrapping_sub(self.family().control));
-                if let Some(control) = self.control.get_mut(place) {
+                if let Some(control) = self.map.control(address).and_then(|place| self.control.get_mut(place)) {
                     *control = word;
                 }
             }
-            Some(Target::Eeprom) => self.store.write_eeprom(address & !MEMORY_BIT, word),
-            Some(Target::Ram) => self.store.write_ram(address & !MEMORY_BIT, word),
+            Some(Target::Eeprom) => self.store.write_eeprom(self.plain(address), word),
+            Some(Target::Ram) => self.store.write_ram(self.plain(address), word),
             None => {}
         }
         if self.is_password(address) {
@@ -207,13 +220,9 @@ impl Drive {
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.family().command == Some(address)
             && self.obeys_bus()
-            && let Some(command) = (self.family().commands)(word)
+            && let Some(command) = self.family().command_of(word)
         {
             self.machine.command(command, &self.settings);
         }
     }
-}
-
-fn check_count(count: u16) -> Result<(), Refusal> {
-    if (1..=MAX_WORDS).contains(&count) { Ok(()) } else { Err(Refusal::Structure) }
 }

@@ -1,5 +1,7 @@
 //! What each family of drives does, typed from its manuals and not from its profile.
 //!
+//! A profile of somebody's own has nobody who typed it a second time: `own` takes the behaviour from the profile.
+//!
 //! A profile is what a master believes of a drive. If the simulated drive took its command codes, states, scales and
 //! refusals from there, a mistake in the profile would agree with itself. So each family says here by itself which
 //! words it has, what they show and what a command does; one machine does it. Only parameters that do nothing but keep
@@ -12,44 +14,64 @@ mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+pub(crate) mod own;
 mod register;
+mod roles;
 mod vfd500;
+
+use std::borrow::Cow;
 
 use super::machine::Command;
 use super::refusal::Refusal;
-pub(crate) use register::{Bit, Count, Measure, Parameter, Range, Register, Shows};
+pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
+pub(crate) use roles::{OnSilence, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
 
 /// One family.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Family {
     /// The name of its profile.
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     /// What is on its output.
     pub(crate) kind: Kind,
     /// The function codes it takes.
-    pub(crate) functions: &'static [u8],
+    pub(crate) functions: Vec<u8>,
+    /// Most words in one request.
+    pub(crate) max_words: u16,
+    /// Whether a read may run from one group of addresses (one high byte) into the next.
+    pub(crate) across_groups: bool,
     /// The exception code of each refusal.
     pub(crate) exception: fn(Refusal) -> u8,
     /// Which memory a parameter's address reaches.
     pub(crate) memory: Memory,
     /// What [`Shows::Identification`] shows.
     pub(crate) identification: u16,
-    /// The first of the words that the bus sets.
-    pub(crate) control: u16,
     /// The register that takes commands, and what each code does; codes it does not know are out of range.
     pub(crate) command: Option<u16>,
-    pub(crate) commands: fn(u16) -> Option<Command>,
-    /// Its bus registers, in blocks; a later one replaces an earlier one at the same address.
-    pub(crate) registers: &'static [&'static [Register]],
+    pub(crate) commands: Vec<(u16, Command)>,
+    /// Its bus registers; a later one replaces an earlier one at the same address.
+    pub(crate) registers: Vec<Register>,
     /// Its parameters, beside those of the profile, which they replace at the same address.
-    pub(crate) parameters: &'static [Parameter],
+    pub(crate) parameters: Vec<Parameter>,
     /// Factory values of parameters that stand in the profile without one.
     pub(crate) factory: &'static [(u16, u16)],
     /// Parameters that cannot be set above [`Roles::max_frequency`], whatever the profile says.
     pub(crate) capped: &'static [u16],
     pub(crate) roles: Roles,
+    /// How many milliseconds an answer takes where no parameter says it.
+    pub(crate) delay: u16,
+    /// The highest frequency where no parameter says it, Hz.
+    pub(crate) max_hertz: f64,
     pub(crate) faults: Faults,
 }
+
+/// Most words of one read or write: GD350 operation manual, sections 9.4.1 and 9.4.4; VFD500 manual, appendix A.
+///
+/// Assumption: the same in the families whose manuals at hand do not say.
+const MAX_WORDS: u16 = 16;
+/// How long a drive takes to answer that has no parameter for it, ms. Assumption: what most have from the factory.
+const USUAL_DELAY: u16 = 5;
+/// The highest frequency of most, and what their keypads ask for. Assumption.
+pub(crate) const USUAL_MAX_HZ: f64 = 50.0;
 
 /// What a family drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,108 +82,67 @@ pub(crate) enum Kind {
     Rectifier,
 }
 
-/// What bit 15 of a parameter's address does when it is written to. An address that has it cannot be read.
+/// What a bit of a parameter's address does when it is written to. An address that has it cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Memory {
     /// Plain addresses are kept in EEPROM; with the bit the word goes to RAM only.
-    BitMeansRam,
+    BitMeansRam(u16),
     /// Plain addresses write to RAM only; with the bit the word is kept in EEPROM.
-    BitMeansEeprom,
-    /// Every write is kept in EEPROM; there is no address with the bit.
+    BitMeansEeprom(u16),
+    /// Every write is kept in EEPROM; there is no address with such a bit.
     EepromOnly,
 }
 
-/// The parameters at which a family behaves, by address; `None` where it has no such parameter or nobody knows which.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Roles {
-    /// Commands move something only while each of these parameters has this value.
-    pub(crate) obeys: &'static [(u16, u16)],
-    /// Who gives the commands, as status words show it.
-    pub(crate) channel: Option<u16>,
-    /// The speed comes from the bus while this parameter has this value. Without one: while the bus is obeyed.
-    pub(crate) speed_source: Option<(u16, u16)>,
-    /// The unit of the speed registers: 0 hundredths of a percent, 1 hundredths of a hertz, 2 rpm. Without one: hertz.
-    pub(crate) speed_unit: Option<u16>,
-    /// The speed where it does not come from the bus, in hundredths of a hertz.
-    pub(crate) keypad_frequency: Option<u16>,
-    pub(crate) max_frequency: Option<u16>,
-    pub(crate) upper_frequency: Option<u16>,
-    pub(crate) acceleration: Option<u16>,
-    pub(crate) deceleration: Option<u16>,
-    pub(crate) jog_frequency: Option<u16>,
-    pub(crate) jog_acceleration: Option<u16>,
-    pub(crate) jog_deceleration: Option<u16>,
-    /// "Stop" coasts while this parameter has this value.
-    pub(crate) coasts_to_stop: Option<(u16, u16)>,
-    pub(crate) password: Option<u16>,
-    /// The latest fault first.
-    pub(crate) fault_history: &'static [u16],
-    pub(crate) unit_address: Option<u16>,
-    /// In milliseconds.
-    pub(crate) response_delay: Option<u16>,
-    /// In tenths of a second, 0 for never.
-    pub(crate) bus_timeout: Option<u16>,
-    /// 0 trips, 1 does nothing, 2 stops if the bus is obeyed, 3 stops. Without one it trips.
-    pub(crate) bus_timeout_action: Option<u16>,
-}
+/// The bit that families typed here have for the other memory.
+const MEMORY_BIT: u16 = 0x8000;
 
-impl Roles {
-    /// None of them.
-    pub(crate) const NONE: Self = Self {
-        obeys: &[],
-        channel: None,
-        speed_source: None,
-        speed_unit: None,
-        keypad_frequency: None,
-        max_frequency: None,
-        upper_frequency: None,
-        acceleration: None,
-        deceleration: None,
-        jog_frequency: None,
-        jog_acceleration: None,
-        jog_deceleration: None,
-        coasts_to_stop: None,
-        password: None,
-        fault_history: &[],
-        unit_address: None,
-        response_delay: None,
-        bus_timeout: None,
-        bus_timeout_action: None,
-    };
+impl Memory {
+    /// The bit; 0 where there is none.
+    pub(crate) fn mask(self) -> u16 {
+        match self {
+            Self::BitMeansRam(bit) | Self::BitMeansEeprom(bit) => bit,
+            Self::EepromOnly => 0,
+        }
+    }
 }
 
 /// The numbers of the faults that come about by themselves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Faults {
-    /// Motor overload.
-    pub(crate) overload: u16,
-    /// A bus that is silent for too long.
-    pub(crate) silent_bus: u16,
+    /// Motor overload. `None`: it does not trip.
+    pub(crate) overload: Option<u16>,
+    /// A bus that is silent for too long. `None`: the motor coasts without a fault.
+    pub(crate) silent_bus: Option<u16>,
 }
 
-/// Every family that is simulated.
-static FAMILIES: [&Family; 11] = [
-    &gd350::GD350,
-    &gd300::GD35,
-    &gd300::GD35_H1,
-    &gd300::GD300,
-    &gd600::GD600,
-    &gd600::RECTIFIER,
-    &gd3000::GD3000,
-    &gd3000::RECTIFIER,
-    &vfd500::VFD500,
-    &chf100a::CHF100A,
-    &chf100a::CHV100,
+/// Every family that is typed here.
+const FAMILIES: [fn() -> Family; 11] = [
+    gd350::gd350,
+    gd300::gd35,
+    gd300::gd35_h1,
+    gd300::gd300,
+    gd600::gd600,
+    gd600::rectifier,
+    gd3000::gd3000,
+    gd3000::rectifier,
+    vfd500::vfd500,
+    chf100a::chf100a,
+    chf100a::chv100,
 ];
 
 impl Family {
     /// The family called `name`, in upper or lower case.
-    pub(crate) fn named(name: &str) -> Option<&'static Self> {
-        FAMILIES.into_iter().find(|family| family.name.eq_ignore_ascii_case(name.trim()))
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        FAMILIES.into_iter().map(|family| family()).find(|family| family.name.eq_ignore_ascii_case(name.trim()))
     }
 
     /// The names of all of them.
-    pub(crate) fn names() -> impl Iterator<Item = &'static str> {
-        FAMILIES.into_iter().map(|family| family.name)
+    pub(crate) fn names() -> impl Iterator<Item = Cow<'static, str>> {
+        FAMILIES.into_iter().map(|family| family().name)
+    }
+
+    /// What `code` does at the command register; `None` where it is out of range.
+    pub(crate) fn command_of(&self, code: u16) -> Option<Command> {
+        self.commands.iter().find(|&&(known, _)| known == code).map(|&(_, command)| command)
     }
 }

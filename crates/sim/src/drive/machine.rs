@@ -126,8 +126,8 @@ pub(crate) struct Machine {
     now: Instant,
     output: Output,
     load: f64,
-    /// Fault number of the motor overload.
-    overload: u16,
+    /// Fault number of the motor overload; `None`: it does not trip.
+    overload: Option<u16>,
     /// What the motor took from the beginning until `metered`, as shares of its rated power times seconds.
     taken: f64,
     /// Since then nothing has changed but the frequency, along one line.
@@ -141,7 +141,7 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    pub(crate) fn new(now: Instant, load: f64, overload: u16) -> Self {
+    pub(crate) fn new(now: Instant, load: f64, overload: Option<u16>) -> Self {
         let output = Output::Off { rpm: 0.0, since: now };
         let (taken, heat, heating) = (0.0, 0.0, -COOLING);
         Self { now, output, load, overload, taken, metered: now, heat, heating, fault: None, held: false }
@@ -161,13 +161,13 @@ impl Machine {
                 Output::Off { .. } => None,
             };
             let overload = self.overload_at();
-            let next = [turn, overload, Some(to)].into_iter().flatten().min().unwrap_or(to);
+            let next = [turn, overload.map(|(at, _)| at), Some(to)].into_iter().flatten().min().unwrap_or(to);
             let seconds = next.saturating_duration_since(self.now).as_secs_f64();
             self.heat = (self.heat + self.heating * seconds).max(0.0);
             self.now = next;
-            if overload == Some(next) {
-                self.trip(self.overload);
-                tripped = Some(self.overload);
+            if let Some((_, code)) = overload.filter(|&(at, _)| at == next) {
+                self.trip(code);
+                tripped = Some(code);
             } else if turn == Some(next) {
                 self.meter();
                 self.finish_stop();
@@ -377,13 +377,11 @@ impl Machine {
         if current > OVERLOAD_CURRENT { current.powi(2) - OVERLOAD_CURRENT.powi(2) } else { -COOLING }
     }
 
-    /// When the overload trips if nothing changes before.
-    fn overload_at(&self) -> Option<Instant> {
-        if self.heating <= 0.0 {
-            return None;
-        }
+    /// When the overload trips if nothing changes before, and with which fault.
+    fn overload_at(&self) -> Option<(Instant, u16)> {
+        let code = self.overload.filter(|_| self.heating > 0.0)?;
         let time = Duration::try_from_secs_f64((TRIP_HEAT - self.heat) / self.heating).unwrap_or(Duration::ZERO);
         // At least one nanosecond, so that the moment lies ahead and is reached.
-        Some(self.now + time.max(Duration::from_nanos(1)))
+        Some((self.now + time.max(Duration::from_nanos(1)), code))
     }
 }

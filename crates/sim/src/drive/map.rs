@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use drivebus_drives::{Access as ProfileAccess, Entry, Kind, Profile, ProfileError, Value};
+use drivebus_drives::{Access as ProfileAccess, Entry, Kind, Profile, Quantity, Value};
 use drivebus_rtu::UnitAddress;
 
-use super::family::{Family, Parameter, Register};
+use super::family::{Bounds, Family, Parameter, Register};
 use super::places::Places;
 
 /// When a word may be read and written.
@@ -29,36 +29,51 @@ pub(crate) enum Word {
 /// Every word of one family's drives. Shared by the drives of a family.
 #[derive(Debug)]
 pub(crate) struct Map {
-    family: &'static Family,
+    family: Family,
     /// By address.
     words: Vec<(u16, Word)>,
     places: Places,
     /// Where the parameters stand among the parameters, by address.
     parameters: Arc<Places>,
+    /// Where the words that the bus sets stand among each other.
+    controls: Places,
+    control_words: usize,
 }
 
 impl Map {
-    /// The words of `family`, with the plain parameters of its profile.
-    pub(crate) fn new(family: &'static Family) -> Result<Self, ProfileError> {
-        let profile = Profile::builtin(family.name)?;
+    /// The words of `family`, with the plain parameters of its `profile`.
+    pub(crate) fn new(family: Family, profile: &Profile) -> Self {
         let mut words = BTreeMap::new();
         for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
             if let Some(address) = entry.address() {
-                words.insert(address, Word::Parameter(parameter(family, &profile, entry, address)));
+                words.insert(address, Word::Parameter(parameter(&family, profile, entry, address)));
             }
         }
         words.extend(family.parameters.iter().map(|&known| (known.address, Word::Parameter(known))));
-        let registers = family.registers.iter().copied().flatten();
-        words.extend(registers.map(|&register| (register.address, Word::Register(register))));
+        words.extend(family.registers.iter().map(|register| (register.address, Word::Register(register.clone()))));
 
         let places = Places::new(words.keys().copied());
-        let of_parameters = words.iter().filter(|(_, word)| matches!(word, Word::Parameter(_)));
-        let parameters = Arc::new(Places::new(of_parameters.map(|(&address, _)| address)));
-        Ok(Self { family, words: words.into_iter().collect(), places, parameters })
+        let addresses = |wanted: fn(&Word) -> bool| -> Vec<u16> {
+            words.iter().filter(|(_, word)| wanted(word)).map(|(&address, _)| address).collect()
+        };
+        let parameters = Arc::new(Places::new(addresses(Word::is_parameter)));
+        let set = addresses(|word| !word.is_parameter() && word.access() != Access::ReadOnly);
+        let (controls, control_words) = (Places::new(set.iter().copied()), set.len());
+        Self { family, words: words.into_iter().collect(), places, parameters, controls, control_words }
     }
 
-    pub(crate) fn family(&self) -> &'static Family {
-        self.family
+    pub(crate) fn family(&self) -> &Family {
+        &self.family
+    }
+
+    /// How many words the bus sets.
+    pub(crate) fn control_words(&self) -> usize {
+        self.control_words
+    }
+
+    /// Where `address` stands among them.
+    pub(crate) fn control(&self, address: u16) -> Option<usize> {
+        self.controls.of(address)
     }
 
     pub(crate) fn word(&self, address: u16) -> Option<&Word> {
@@ -95,26 +110,13 @@ impl Word {
     }
 }
 
-impl Parameter {
-    /// Whether `raw` is in range; `value_of` tells the parameters that the range depends on.
-    pub(crate) fn allows(&self, raw: u16, value_of: impl Fn(u16) -> u16) -> bool {
-        let count = |raw: u16| if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) };
-        let value = count(raw);
-        let bound = |address: Option<u16>| address.map(|address| count(value_of(address)));
-        let above = [self.low, bound(self.low_from)].into_iter().flatten().all(|low| low <= value);
-        let below = [self.high, bound(self.high_from)].into_iter().flatten().all(|high| value <= high);
-        above && below
-    }
-}
-
 /// A row of the profile.
 fn parameter(family: &Family, profile: &Profile, entry: &Entry, address: u16) -> Parameter {
-    let quantity = entry.quantity();
-    let address_of = |code: &str| profile.find(code).ok().and_then(Entry::address);
-    let low = quantity.low().map(Value::count);
+    let low = entry.quantity().low().map(Value::count);
     let lowest = low.and_then(|low| u16::try_from(low).ok()).unwrap_or(0);
     let assumed = || family.factory.iter().find(|&&(known, _)| known == address).map(|&(_, value)| value);
-    let cap = if family.capped.contains(&address) { family.roles.max_frequency } else { None };
+    let cap = family.roles.max_frequency.filter(|_| family.capped.contains(&address)).map(|max| max.address);
+    let bounds = bounds(profile, entry.quantity());
     Parameter {
         address,
         access: match entry.access() {
@@ -122,11 +124,19 @@ fn parameter(family: &Family, profile: &Profile, entry: &Entry, address: u16) ->
             ProfileAccess::Stop => Access::Stopped,
             _ => Access::Always,
         },
-        low,
+        bounds: Bounds { high_from: bounds.high_from.or(cap), ..bounds },
+        factory: entry.default_raw().or_else(assumed).unwrap_or(lowest),
+    }
+}
+
+/// The range of a quantity of the profile.
+pub(crate) fn bounds(profile: &Profile, quantity: &Quantity) -> Bounds {
+    let address_of = |code: &str| profile.find(code).ok().and_then(Entry::address);
+    Bounds {
+        low: quantity.low().map(Value::count),
         high: quantity.high().map(Value::count),
         low_from: quantity.low_from().and_then(address_of),
-        high_from: quantity.high_from().and_then(address_of).or(cap),
+        high_from: quantity.high_from().and_then(address_of),
         signed: quantity.is_signed(),
-        factory: entry.default_raw().or_else(assumed).unwrap_or(lowest),
     }
 }

@@ -1,7 +1,7 @@
 //! What the drive shows: state words, measured values, fault and identification.
 
 use super::Drive;
-use super::family::{Bit, Count, Measure, Shows};
+use super::family::{Bit, Count, Flag, Measure, Shows};
 use super::machine::RunState;
 use super::map::{Access, Word};
 use super::refusal::Refusal;
@@ -19,14 +19,14 @@ impl Drive {
         match self.map.word(address) {
             None => Err(Refusal::Address),
             Some(Word::Register(register)) if register.access == Access::WriteOnly => Err(Refusal::Unreadable),
-            Some(Word::Register(register)) => Ok(self.shown(register.address, register.shows)),
+            Some(Word::Register(register)) => Ok(self.shown(register.address, &register.shows)),
             Some(Word::Parameter(_)) if self.family().roles.password == Some(address) => Ok(0),
             Some(Word::Parameter(_)) => self.store.get(address).ok_or(Refusal::Address),
         }
     }
 
-    fn shown(&self, address: u16, shows: Shows) -> u16 {
-        match shows {
+    fn shown(&self, address: u16, shows: &Shows) -> u16 {
+        match *shows {
             Shows::Written => self.control_word(address),
             Shows::WrittenTo(register) => self.control_word(register),
             Shows::WrittenIf { parameter, is, register, otherwise } => {
@@ -36,13 +36,16 @@ impl Drive {
                     otherwise.map_or(0, |parameter| self.parameter(parameter))
                 }
             }
-            Shows::State([forward, reverse, stopped, fault]) => match self.machine.state() {
-                RunState::Forward => forward,
-                RunState::Reverse => reverse,
-                RunState::Stopped => stopped,
-                RunState::Fault => fault,
-            },
-            Shows::Bits(bits) => bits.iter().fold(0, |word, &bit| word | self.bit(bit)),
+            Shows::State([forward, reverse, stopped, fault], ref bits) => {
+                let code = match self.machine.state() {
+                    RunState::Forward => forward,
+                    RunState::Reverse => reverse,
+                    RunState::Stopped => stopped,
+                    RunState::Fault => fault,
+                };
+                code | self.bits(bits)
+            }
+            Shows::Bits(ref bits) => self.bits(bits),
             Shows::Measured(measure, counts) => word(self.measured(measure) * counts),
             Shows::Fault => self.fault(),
             Shows::Identification => self.family().identification,
@@ -64,6 +67,7 @@ impl Drive {
         let point = || self.machine.working_point();
         match measure {
             Measure::Frequency => self.machine.frequency().abs(),
+            Measure::SignedFrequency => self.machine.frequency(),
             Measure::Setpoint => self.settings.setpoint.abs(),
             Measure::BusVoltage => point().bus_volts,
             Measure::Voltage => point().volts,
@@ -71,6 +75,18 @@ impl Drive {
             Measure::Speed => self.machine.speed().abs(),
             Measure::Power => point().power.clamp(-3.0, 3.0),
             Measure::Torque => point().torque.clamp(-2.5, 2.5),
+        }
+    }
+
+    fn bits(&self, bits: &[Bit]) -> u16 {
+        bits.iter().fold(0, |word, &bit| word | self.bit(bit))
+    }
+
+    fn is(&self, flag: Flag) -> bool {
+        match flag {
+            Flag::Ready => self.machine.fault().is_none(),
+            Flag::OverloadAlarm => self.machine.overload_alarm(),
+            Flag::Obeying => self.obeys_bus(),
         }
     }
 
@@ -93,6 +109,7 @@ impl Drive {
             }
             Bit::Motor(place, register) => (self.control_word(register) & 0b11, place),
             Bit::Always(bits) => (bits, 0),
+            Bit::Either { flag, low, yes, no } => (if self.is(flag) { yes } else { no }, low),
         };
         value << place
     }

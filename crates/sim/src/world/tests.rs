@@ -9,10 +9,10 @@ use drivebus_rtu::{Adu, Request};
 use proptest::prelude::*;
 
 use super::*;
-use crate::drive::{Family, Map};
+use crate::model::Model;
 
 fn world(strict_silence: bool) -> World {
-    let map = Arc::new(Map::new(Family::named("gd350").unwrap()).unwrap());
+    let map = Arc::new(Model::from("gd350").map().unwrap());
     let drive = |unit| (unit, Drive::new(UnitAddress::new(unit).unwrap(), Arc::clone(&map), Instant::ZERO));
     World::new(SerialFormat::default(), strict_silence, 7, Drives::new(BTreeMap::from([1, 2].map(drive))))
 }

@@ -11,6 +11,7 @@ mod families;
 mod faults;
 mod goodrives;
 mod memory;
+mod own_profiles;
 mod ports;
 mod refusals;
 mod running;

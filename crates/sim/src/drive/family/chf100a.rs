@@ -11,43 +11,48 @@
 //!   bus is not printed. So what is written to 2000H moves nothing, and it reads as 0.
 //! - Assumption: 3006H counts tenths of a percent.
 
-use super::{Family, Faults, Kind, Memory, Range, Register, Roles, Shows, gd350};
+use super::{Family, Faults, Kind, MAX_WORDS, Memory, Range, Register, Roles, Shows, USUAL_DELAY, USUAL_MAX_HZ, gd350};
 
-pub(crate) static CHF100A: Family = Family {
-    name: "chf100a",
-    functions: &[0x03, 0x06],
-    control: 0x1000,
-    command: Some(0x1000),
-    commands: gd350::commands,
-    registers: &[CONTROL, gd350::MONITOR],
-    roles: Roles { speed_source: Some(NEVER), ..Roles::NONE },
-    ..FAMILY
-};
-pub(crate) static CHV100: Family = FAMILY;
+pub(crate) fn chf100a() -> Family {
+    Family {
+        name: "chf100a".into(),
+        functions: vec![0x03, 0x06],
+        command: Some(0x1000),
+        commands: gd350::COMMANDS.to_vec(),
+        registers: [CONTROL, gd350::MONITOR].concat(),
+        roles: Roles { speed_source: Some(vec![NEVER]), ..Roles::NONE },
+        ..chv100()
+    }
+}
 
-const FAMILY: Family = Family {
-    name: "chv100",
-    kind: Kind::Inverter,
-    functions: &[0x03, 0x06, 0x08],
-    exception: gd350::exception,
-    memory: Memory::EepromOnly,
-    identification: 0,
-    control: 0x2000,
-    command: None,
-    commands: |_| None,
-    registers: &[gd350::MONITOR],
-    parameters: &[],
-    factory: &[],
-    capped: &[],
-    roles: Roles::NONE,
-    faults: Faults { overload: 11, silent_bus: 18 },
-};
+pub(crate) fn chv100() -> Family {
+    Family {
+        name: "chv100".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x08],
+        max_words: MAX_WORDS,
+        across_groups: true,
+        exception: gd350::exception,
+        memory: Memory::EepromOnly,
+        identification: 0,
+        command: None,
+        commands: Vec::new(),
+        registers: gd350::MONITOR.to_vec(),
+        parameters: Vec::new(),
+        factory: &[],
+        capped: &[],
+        roles: Roles::NONE,
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(11), silent_bus: Some(18) },
+    }
+}
 
 /// A parameter that is not there has no value.
 const NEVER: (u16, u16) = (u16::MAX, 0);
 
 const CONTROL: &[Register] = &[
     Register::set(0x1000, Range::Words(1, 8)),
-    Register::read(0x1001, Shows::State([1, 2, 3, 4])),
+    Register::read(0x1001, Shows::state([1, 2, 3, 4])),
     Register::set(0x2000, Range::Signed(-10_000, 10_000)),
 ];

@@ -5,24 +5,28 @@
 use super::{Bit, Family, Range, Register, Shows};
 use crate::drive::family::gd350;
 
-pub(crate) static GD300: Family = Family {
-    name: "gd300",
-    identification: 0x010A,
-    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD300_STATE],
-    ..gd350::FAMILY
-};
-
-pub(crate) static GD35: Family = GD35_FAMILY;
+pub(crate) fn gd300() -> Family {
+    Family {
+        name: "gd300".into(),
+        identification: 0x010A,
+        registers: [gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD300_STATE].concat(),
+        ..gd350::gd350()
+    }
+}
 
 /// Assumption: as GD35 in everything but its code; no manual of its own is at hand.
-pub(crate) static GD35_H1: Family = Family { name: "gd35-h1", identification: 0x0109, ..GD35_FAMILY };
+pub(crate) fn gd35_h1() -> Family {
+    Family { name: "gd35-h1".into(), identification: 0x0109, ..gd35() }
+}
 
-const GD35_FAMILY: Family = Family {
-    name: "gd35",
-    identification: 0x0108,
-    registers: &[gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD35_STATE],
-    ..gd350::FAMILY
-};
+pub(crate) fn gd35() -> Family {
+    Family {
+        name: "gd35".into(),
+        identification: 0x0108,
+        registers: [gd350::CONTROL, gd350::STATE, gd350::MONITOR, NARROWER, GD35_STATE].concat(),
+        ..gd350::gd350()
+    }
+}
 
 /// The GD300 and GD35 manuals let 200AH go up to 1FFH only.
 ///
@@ -33,11 +37,11 @@ const NARROWER: &[Register] =
 /// Bits 8 to 11 of state word 2 are not printed for GD300 and GD35.
 const GD300_STATE: &[Register] = &[Register::read(
     0x2101,
-    Shows::Bits(&[Bit::Ready(0), Bit::Motor(1, 0x2009), Bit::OverloadAlarm(4), Bit::Channel(5)]),
+    Shows::bits(&[Bit::Ready(0), Bit::Motor(1, 0x2009), Bit::OverloadAlarm(4), Bit::Channel(5)]),
 )];
 
 /// GD35: 0 in bit 0 of state word 2 is ready, the other way round than in GD300 and GD350.
 const GD35_STATE: &[Register] = &[Register::read(
     0x2101,
-    Shows::Bits(&[Bit::NotReady(0), Bit::Motor(1, 0x2009), Bit::OverloadAlarm(4), Bit::Channel(5)]),
+    Shows::bits(&[Bit::NotReady(0), Bit::Motor(1, 0x2009), Bit::OverloadAlarm(4), Bit::Channel(5)]),
 )];

@@ -3,11 +3,12 @@
 //! Parameter P*gg.ii* stands at *gg* × 100H + *ii* (section 9.4.5). Assumption: P14.04 and P14.05, which only manuals of
 //! sister series print, do here what they do there.
 
-use super::{Bit, Family, Faults, Kind, Measure, Memory, Range, Register, Roles, Shows};
+use super::{
+    Bit, Family, Faults, Kind, MAX_WORDS, MEMORY_BIT, Measure, Memory, Range, Register, Roles, Scaled, Shows, Silence,
+    Speed, USUAL_DELAY, USUAL_MAX_HZ,
+};
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::Refusal;
-
-pub(crate) static GD350: Family = FAMILY;
 
 pub(super) const MAX_FREQUENCY: u16 = 0x0003;
 const UPPER_FREQUENCY: u16 = 0x0004;
@@ -18,47 +19,52 @@ const JOG_FREQUENCY: u16 = 0x0806;
 const JOG_ACCELERATION: u16 = 0x0807;
 const JOG_DECELERATION: u16 = 0x0808;
 
-pub(super) const FAMILY: Family = Family {
-    name: "gd350",
-    kind: Kind::Inverter,
-    functions: &[0x03, 0x06, 0x08, 0x10],
-    exception,
-    memory: Memory::BitMeansRam,
-    identification: 0x01A0,
-    control: 0x2000,
-    command: Some(0x2000),
-    commands,
-    registers: &[CONTROL, STATE, MONITOR],
-    parameters: &[],
-    factory: FACTORY,
-    // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
-    capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
-    roles: Roles {
-        // Assumption: 0 in P00.02 is Modbus; the digit is not printed.
-        obeys: &[(0x0001, 2), (0x0002, 0)],
-        channel: Some(0x0001),
-        // Assumption: any source but 8 means the frequency set at the keypad.
-        speed_source: Some((0x0006, 8)),
-        speed_unit: None,
-        keypad_frequency: Some(KEYPAD_FREQUENCY),
-        max_frequency: Some(MAX_FREQUENCY),
-        upper_frequency: Some(UPPER_FREQUENCY),
-        acceleration: Some(ACCELERATION),
-        deceleration: Some(DECELERATION),
-        jog_frequency: Some(JOG_FREQUENCY),
-        jog_acceleration: Some(JOG_ACCELERATION),
-        jog_deceleration: Some(JOG_DECELERATION),
-        // Assumption: 0 in P01.08 ramps down, 1 coasts; the digits are not printed.
-        coasts_to_stop: Some((0x0108, 1)),
-        password: Some(0x0700),
-        fault_history: &[0x071B, 0x071C, 0x071D, 0x071E, 0x071F, 0x0720],
-        unit_address: Some(0x0E00),
-        response_delay: Some(0x0E03),
-        bus_timeout: Some(0x0E04),
-        bus_timeout_action: Some(0x0E05),
-    },
-    faults: Faults { overload: 11, silent_bus: 18 },
-};
+pub(crate) fn gd350() -> Family {
+    Family {
+        name: "gd350".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x08, 0x10],
+        max_words: MAX_WORDS,
+        across_groups: true,
+        exception,
+        memory: Memory::BitMeansRam(MEMORY_BIT),
+        identification: 0x01A0,
+        command: Some(0x2000),
+        commands: COMMANDS.to_vec(),
+        registers: [CONTROL, STATE, MONITOR].concat(),
+        parameters: Vec::new(),
+        factory: FACTORY,
+        // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
+        capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
+        roles: Roles {
+            // Assumption: 0 in P00.02 is Modbus; the digit is not printed.
+            obeys: vec![(0x0001, 2), (0x0002, 0)],
+            channel: Some(0x0001),
+            // Assumption: any source but 8 means the frequency set at the keypad.
+            speed_source: Some(vec![(0x0006, 8)]),
+            speed: Some(Speed::hertz(0x2001)),
+            keypad_frequency: Some(Scaled::hundredths(KEYPAD_FREQUENCY)),
+            max_frequency: Some(Scaled::hundredths(MAX_FREQUENCY)),
+            upper_frequency: Some(Scaled::hundredths(UPPER_FREQUENCY)),
+            acceleration: Some(Scaled::tenths(ACCELERATION)),
+            deceleration: Some(Scaled::tenths(DECELERATION)),
+            jog_frequency: Some(Scaled::hundredths(JOG_FREQUENCY)),
+            jog_acceleration: Some(Scaled::tenths(JOG_ACCELERATION)),
+            jog_deceleration: Some(Scaled::tenths(JOG_DECELERATION)),
+            // Assumption: 0 in P01.08 ramps down, 1 coasts; the digits are not printed.
+            coasts_to_stop: Some((0x0108, 1)),
+            password: Some(0x0700),
+            fault_history: vec![0x071B, 0x071C, 0x071D, 0x071E, 0x071F, 0x0720],
+            unit_address: Some(0x0E00),
+            response_delay: Some(0x0E03),
+            bus_timeout: Some(Scaled::tenths(0x0E04)),
+            on_silence: Some(Silence::at(0x0E05)),
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(11), silent_bus: Some(18) },
+    }
+}
 
 /// Section 9.4.7. Beyond 03H the meanings are not those of the Modbus specification.
 ///
@@ -78,19 +84,16 @@ pub(super) fn exception(refusal: Refusal) -> u8 {
 }
 
 /// 2000H.
-pub(super) fn commands(code: u16) -> Option<Command> {
-    Some(match code {
-        1 => Command::Run(Direction::Forward),
-        2 => Command::Run(Direction::Reverse),
-        3 => Command::Jog(Direction::Forward),
-        4 => Command::Jog(Direction::Reverse),
-        5 => Command::Stop,
-        6 => Command::Coast,
-        7 => Command::ResetFault,
-        8 => Command::JogStop,
-        _ => return None,
-    })
-}
+pub(super) const COMMANDS: &[(u16, Command)] = &[
+    (1, Command::Run(Direction::Forward)),
+    (2, Command::Run(Direction::Reverse)),
+    (3, Command::Jog(Direction::Forward)),
+    (4, Command::Jog(Direction::Reverse)),
+    (5, Command::Stop),
+    (6, Command::Coast),
+    (7, Command::ResetFault),
+    (8, Command::JogStop),
+];
 
 /// Assumption: 2000H reads as the last command.
 pub(super) const CONTROL: &[Register] = &[
@@ -113,8 +116,8 @@ pub(super) const CONTROL: &[Register] = &[
 
 /// Code 5 (power off) and 6 (pre-exciting) do not come about.
 pub(super) const STATE: &[Register] = &[
-    Register::read(0x2100, Shows::State([1, 2, 3, 4])),
-    Register::read(0x2101, Shows::Bits(STATUS_WORD_2)),
+    Register::read(0x2100, Shows::state([1, 2, 3, 4])),
+    Register::read(0x2101, Shows::bits(STATUS_WORD_2)),
     Register::read(0x2102, Shows::Fault),
     Register::read(0x2103, Shows::Identification),
 ];

@@ -12,7 +12,10 @@
 //! - Ramps, jog and answers have no parameters in the pages at hand; the times are fixed.
 //! - Assumption: the motor overload has the number it has in Goodrive350; fault 1 is the only one printed.
 
-use super::{Family, Faults, Kind, Measure, Memory, Parameter, Range, Register, Roles, Shows, gd350};
+use super::{
+    Family, Faults, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows, Speed,
+    USUAL_DELAY, USUAL_MAX_HZ, gd350,
+};
 use crate::drive::machine::{Command, Direction};
 
 const RUN_CHANNEL: u16 = 0x0001;
@@ -23,56 +26,62 @@ pub(super) const SPEED_SOURCE: u16 = 0x0006;
 const KEYPAD_FREQUENCY: u16 = 0x000A;
 pub(super) const PASSWORD: u16 = 0x0700;
 
-pub(crate) static GD600: Family = FAMILY;
-
-const FAMILY: Family = Family {
-    name: "gd600",
-    kind: Kind::Inverter,
-    functions: &[0x03, 0x06, 0x08, 0x10],
-    exception: gd350::exception,
-    memory: Memory::EepromOnly,
-    identification: 0,
-    control: 0x2000,
-    command: Some(0x2000),
-    commands: gd350::commands,
-    registers: &[
-        &[
-            Register::set(0x2000, Range::Words(1, 8)),
-            Register::set(0x2001, Range::UpTo(63_000, MAX_FREQUENCY)),
-            Register::set(0x2002, Range::Words(0, 1_000)),
+pub(crate) fn gd600() -> Family {
+    Family {
+        name: "gd600".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x08, 0x10],
+        max_words: MAX_WORDS,
+        across_groups: true,
+        exception: gd350::exception,
+        memory: Memory::EepromOnly,
+        identification: 0,
+        command: Some(0x2000),
+        commands: gd350::COMMANDS.to_vec(),
+        registers: [
+            [
+                Register::set(0x2000, Range::Words(1, 8)),
+                Register::set(0x2001, Range::UpTo(63_000, MAX_FREQUENCY)),
+                Register::set(0x2002, Range::Words(0, 1_000)),
+            ]
+            .as_slice(),
+            STATE,
+        ]
+        .concat(),
+        parameters: vec![
+            Parameter::new(RUN_CHANNEL, 0, 2, 0),
+            Parameter::new(MAX_FREQUENCY, 1_000, 63_000, 5_000).not_below(UPPER_FREQUENCY).at_standstill(),
+            Parameter::new(UPPER_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
+            Parameter::new(LOWER_FREQUENCY, 0, 63_000, 0).not_above(UPPER_FREQUENCY),
+            Parameter::new(SPEED_SOURCE, 0, 15, 0),
+            Parameter::new(KEYPAD_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
+            // P01.20, P10.00, P10.01.
+            Parameter::new(0x0114, 0, 36_000, 0),
+            Parameter::new(PASSWORD, 0, u16::MAX, 0),
+            Parameter::new(0x0A00, 0, 2, 0),
+            Parameter::new(0x0A01, 0, 1, 0),
         ],
-        STATE,
-    ],
-    parameters: &[
-        Parameter::new(RUN_CHANNEL, 0, 2, 0),
-        Parameter::new(MAX_FREQUENCY, 1_000, 63_000, 5_000).not_below(UPPER_FREQUENCY).at_standstill(),
-        Parameter::new(UPPER_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
-        Parameter::new(LOWER_FREQUENCY, 0, 63_000, 0).not_above(UPPER_FREQUENCY),
-        Parameter::new(SPEED_SOURCE, 0, 15, 0),
-        Parameter::new(KEYPAD_FREQUENCY, 0, 63_000, 5_000).not_above(MAX_FREQUENCY),
-        // P01.20, P10.00, P10.01.
-        Parameter::new(0x0114, 0, 36_000, 0),
-        Parameter::new(PASSWORD, 0, u16::MAX, 0),
-        Parameter::new(0x0A00, 0, 2, 0),
-        Parameter::new(0x0A01, 0, 1, 0),
-    ],
-    factory: &[],
-    capped: &[],
-    roles: Roles {
-        obeys: &[(RUN_CHANNEL, 2)],
-        speed_source: Some((SPEED_SOURCE, 8)),
-        keypad_frequency: Some(KEYPAD_FREQUENCY),
-        max_frequency: Some(MAX_FREQUENCY),
-        upper_frequency: Some(UPPER_FREQUENCY),
-        password: Some(PASSWORD),
-        ..Roles::NONE
-    },
-    faults: Faults { overload: 11, silent_bus: 18 },
-};
+        factory: &[],
+        capped: &[],
+        roles: Roles {
+            obeys: vec![(RUN_CHANNEL, 2)],
+            speed_source: Some(vec![(SPEED_SOURCE, 8)]),
+            speed: Some(Speed::hertz(0x2001)),
+            keypad_frequency: Some(Scaled::hundredths(KEYPAD_FREQUENCY)),
+            max_frequency: Some(Scaled::hundredths(MAX_FREQUENCY)),
+            upper_frequency: Some(Scaled::hundredths(UPPER_FREQUENCY)),
+            password: Some(PASSWORD),
+            ..Roles::NONE
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(11), silent_bus: Some(18) },
+    }
+}
 
 /// State, fault and frequencies.
 pub(super) const STATE: &[Register] = &[
-    Register::read(0x2100, Shows::State([1, 2, 3, 4])),
+    Register::read(0x2100, Shows::state([1, 2, 3, 4])),
     Register::read(0x2102, Shows::Fault),
     Register::read(0x3000, Shows::Measured(Measure::Frequency, 100.0)),
     Register::read(0x3001, Shows::Measured(Measure::Setpoint, 100.0)),
@@ -80,28 +89,23 @@ pub(super) const STATE: &[Register] = &[
 
 /// Assumption: all of it. No page about this unit is at hand; it is taken to have the run byte that Goodrive3000's
 /// rectifier has over PROFIBUS, at the inverter's addresses, and no parameters.
-pub(crate) static RECTIFIER: Family = Family {
-    name: "gd600-rectifier",
-    kind: Kind::Rectifier,
-    command: Some(0x2000),
-    commands: rectifier_commands,
-    registers: &[RECTIFIER_REGISTERS],
-    parameters: &[],
-    roles: Roles::NONE,
-    ..FAMILY
-};
+pub(crate) fn rectifier() -> Family {
+    Family {
+        name: "gd600-rectifier".into(),
+        kind: Kind::Rectifier,
+        command: Some(0x2000),
+        commands: RECTIFIER_COMMANDS.to_vec(),
+        registers: RECTIFIER_REGISTERS.to_vec(),
+        parameters: Vec::new(),
+        roles: Roles::NONE,
+        ..gd600()
+    }
+}
 
 /// Fed and stopped like a motor, at no frequency. Pre-charging takes no time and nothing waits for it.
-pub(super) fn rectifier_commands(code: u16) -> Option<Command> {
-    Some(match code {
-        1 => Command::Run(Direction::Forward),
-        5 => Command::Stop,
-        7 => Command::ResetFault,
-        9 => Command::Nothing,
-        _ => return None,
-    })
-}
+pub(super) const RECTIFIER_COMMANDS: &[(u16, Command)] =
+    &[(1, Command::Run(Direction::Forward)), (5, Command::Stop), (7, Command::ResetFault), (9, Command::Nothing)];
 
 /// Assumption: a rectifier's state has the codes of the inverters' for running, stopped and fault.
 pub(super) const RECTIFIER_REGISTERS: &[Register] =
-    &[Register::set(0x2000, Range::Words(1, 9)), Register::read(0x2100, Shows::State([1, 1, 3, 4]))];
+    &[Register::set(0x2000, Range::Words(1, 9)), Register::read(0x2100, Shows::state([1, 1, 3, 4]))];

@@ -1,9 +1,11 @@
 //! How a family describes its words: who may write what, and what is read.
 
+use std::borrow::Cow;
+
 use crate::drive::map::Access;
 
 /// A register of the bus.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Register {
     pub(crate) address: u16,
     pub(crate) access: Access,
@@ -22,10 +24,11 @@ pub(crate) enum Range {
     Signed(i16, i16),
     /// As a speed in the unit that the drive is set to.
     Speed,
+    Within(Bounds),
 }
 
 /// What is read.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) enum Shows {
     /// What was last written there.
     Written,
@@ -38,9 +41,9 @@ pub(crate) enum Shows {
         register: u16,
         otherwise: Option<u16>,
     },
-    /// A code each for forward, reverse, stopped and fault.
-    State([u16; 4]),
-    Bits(&'static [Bit]),
+    /// A code each for forward, reverse, stopped and fault, and bits beside it.
+    State([u16; 4], Cow<'static, [Bit]>),
+    Bits(Cow<'static, [Bit]>),
     /// Counts per unit.
     Measured(Measure, f64),
     Fault,
@@ -63,6 +66,8 @@ pub(crate) enum Shows {
 pub(crate) enum Measure {
     /// Hz, without sign.
     Frequency,
+    /// Hz, below zero in reverse.
+    SignedFrequency,
     /// Hz, without sign.
     Setpoint,
     /// V.
@@ -110,6 +115,22 @@ pub(crate) enum Bit {
     Motor(u8, u16),
     /// The same bits always.
     Always(u16),
+    /// One number, from its lowest bit on, while something is so, and another while it is not.
+    Either {
+        flag: Flag,
+        low: u8,
+        yes: u16,
+        no: u16,
+    },
+}
+
+/// Something that is so or is not.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Flag {
+    Ready,
+    OverloadAlarm,
+    /// Commands come from the bus.
+    Obeying,
 }
 
 /// A parameter.
@@ -117,14 +138,45 @@ pub(crate) enum Bit {
 pub(crate) struct Parameter {
     pub(crate) address: u16,
     pub(crate) access: Access,
+    pub(crate) bounds: Bounds,
+    pub(crate) factory: u16,
+}
+
+/// Which words are in range.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounds {
     /// In counts; `None` where nothing is printed.
     pub(crate) low: Option<i64>,
     pub(crate) high: Option<i64>,
     /// Parameters that bound it as well, by address.
     pub(crate) low_from: Option<u16>,
     pub(crate) high_from: Option<u16>,
+    /// Whether words are two's complement.
     pub(crate) signed: bool,
-    pub(crate) factory: u16,
+}
+
+impl Bounds {
+    /// Every word is.
+    pub(crate) const NONE: Self = Self { low: None, high: None, low_from: None, high_from: None, signed: false };
+
+    /// From..=to, in counts.
+    pub(crate) const fn new(low: i64, high: i64) -> Self {
+        Self { low: Some(low), high: Some(high), ..Self::NONE }
+    }
+
+    /// The number in `raw`.
+    pub(crate) fn count(self, raw: u16) -> i64 {
+        if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) }
+    }
+
+    /// Whether `raw` is in range; `value_of` tells the parameters that the range depends on.
+    pub(crate) fn allows(self, raw: u16, value_of: impl Fn(u16) -> u16) -> bool {
+        let value = self.count(raw);
+        let bound = |address: Option<u16>| address.map(|address| self.count(value_of(address)));
+        let above = [self.low, bound(self.low_from)].into_iter().flatten().all(|low| low <= value);
+        let below = [self.high, bound(self.high_from)].into_iter().flatten().all(|high| value <= high);
+        above && below
+    }
 }
 
 impl Register {
@@ -144,19 +196,27 @@ impl Register {
     }
 }
 
+impl Shows {
+    /// A code each for forward, reverse, stopped and fault, and nothing beside it.
+    pub(crate) const fn state(codes: [u16; 4]) -> Self {
+        Self::State(codes, Cow::Borrowed(&[]))
+    }
+
+    /// Bits that are typed here.
+    pub(crate) const fn bits(bits: &'static [Bit]) -> Self {
+        Self::Bits(Cow::Borrowed(bits))
+    }
+}
+
 impl Parameter {
     /// From..=to, in counts, with its factory value; to be changed at any time.
     pub(crate) const fn new(address: u16, low: u16, high: u16, factory: u16) -> Self {
-        Self {
-            address,
-            access: Access::Always,
-            low: Some(low as i64),
-            high: Some(high as i64),
-            low_from: None,
-            high_from: None,
-            signed: false,
-            factory,
-        }
+        Self { address, access: Access::Always, bounds: Bounds::new(low as i64, high as i64), factory }
+    }
+
+    /// One that only the drive itself changes.
+    pub(crate) const fn shown(address: u16) -> Self {
+        Self { address, access: Access::ReadOnly, bounds: Bounds::NONE, factory: 0 }
     }
 
     /// The same, to be changed at standstill only.
@@ -166,11 +226,11 @@ impl Parameter {
 
     /// The same, never below another parameter.
     pub(crate) const fn not_below(self, address: u16) -> Self {
-        Self { low_from: Some(address), ..self }
+        Self { bounds: Bounds { low_from: Some(address), ..self.bounds }, ..self }
     }
 
     /// The same, never above another parameter.
     pub(crate) const fn not_above(self, address: u16) -> Self {
-        Self { high_from: Some(address), ..self }
+        Self { bounds: Bounds { high_from: Some(address), ..self.bounds }, ..self }
     }
 }

@@ -17,7 +17,10 @@
 //! - Ramps and jog have no parameters in the pages at hand; the times are fixed.
 //! - Assumption: as a master (P30.09 = 1) it stays a slave here.
 
-use super::{Bit, Count, Family, Faults, Kind, Measure, Memory, Parameter, Range, Register, Roles, Shows};
+use super::{
+    Bit, Bounds, Count, Family, Faults, Kind, MAX_WORDS, MEMORY_BIT, Measure, Memory, Parameter, Range, Register,
+    Roles, Scaled, Shows, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+};
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::Refusal;
 
@@ -29,33 +32,52 @@ const RESPONSE_DELAY: u16 = 0x1E04;
 const BUS_TIMEOUT: u16 = 0x1E05;
 const SPEED_UNIT: u16 = 0x1E0E;
 
-pub(crate) static VFD500: Family = Family {
-    name: "vfd500",
-    kind: Kind::Inverter,
-    functions: &[0x03, 0x06, 0x08, 0x10],
-    exception,
-    memory: Memory::BitMeansEeprom,
-    identification: 0,
-    control: 0x7000,
-    command: Some(0x7000),
-    commands,
-    registers: &[CONTROL, MONITOR],
-    parameters: PARAMETERS,
-    factory: &[],
-    capped: &[],
-    roles: Roles {
-        obeys: &[(RUN_CHANNEL, 2)],
-        channel: Some(RUN_CHANNEL),
-        speed_unit: Some(SPEED_UNIT),
-        keypad_frequency: Some(KEYPAD_FREQUENCY),
-        max_frequency: Some(MAX_FREQUENCY),
-        unit_address: Some(UNIT_ADDRESS),
-        response_delay: Some(RESPONSE_DELAY),
-        bus_timeout: Some(BUS_TIMEOUT),
-        ..Roles::NONE
-    },
-    faults: Faults { overload: 11, silent_bus: 34 },
-};
+pub(crate) fn vfd500() -> Family {
+    Family {
+        name: "vfd500".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x08, 0x10],
+        max_words: MAX_WORDS,
+        across_groups: true,
+        exception,
+        memory: Memory::BitMeansEeprom(MEMORY_BIT),
+        identification: 0,
+        command: Some(0x7000),
+        commands: COMMANDS.to_vec(),
+        registers: [CONTROL, MONITOR].concat(),
+        parameters: PARAMETERS.to_vec(),
+        factory: &[],
+        capped: &[],
+        roles: Roles {
+            obeys: vec![(RUN_CHANNEL, 2)],
+            channel: Some(RUN_CHANNEL),
+            speed: Some(speed()),
+            keypad_frequency: Some(Scaled::hundredths(KEYPAD_FREQUENCY)),
+            max_frequency: Some(Scaled::hundredths(MAX_FREQUENCY)),
+            unit_address: Some(UNIT_ADDRESS),
+            response_delay: Some(RESPONSE_DELAY),
+            bus_timeout: Some(Scaled::tenths(BUS_TIMEOUT)),
+            ..Roles::NONE
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(11), silent_bus: Some(34) },
+    }
+}
+
+/// In hundredths of a hertz, unless P30.14 says hundredths of a percent or rpm.
+fn speed() -> Speed {
+    let scale = |unit, counts, bounds| SpeedScale { unit, counts, bounds };
+    let percent = Bounds { signed: true, ..Bounds::new(-10_000, 10_000) };
+    Speed {
+        register: 0x7001,
+        unit: Some((
+            SPEED_UNIT,
+            vec![(0, scale(SpeedUnit::Percent, 100.0, percent)), (2, scale(SpeedUnit::Rpm, 1.0, Bounds::NONE))],
+        )),
+        usual: scale(SpeedUnit::Hertz, 100.0, Bounds::new(0, 60_000)),
+    }
+}
 
 /// 01H to 05H, and no others.
 ///
@@ -71,20 +93,17 @@ fn exception(refusal: Refusal) -> u8 {
 }
 
 /// 7000H.
-fn commands(code: u16) -> Option<Command> {
-    Some(match code {
-        0 => Command::Nothing,
-        1 => Command::Run(Direction::Forward),
-        2 => Command::Run(Direction::Reverse),
-        3 => Command::Jog(Direction::Forward),
-        4 => Command::Jog(Direction::Reverse),
-        5 => Command::Coast,
-        6 => Command::Stop,
-        7 => Command::StopAtOnce,
-        8 => Command::ResetFault,
-        _ => return None,
-    })
-}
+const COMMANDS: &[(u16, Command)] = &[
+    (0, Command::Nothing),
+    (1, Command::Run(Direction::Forward)),
+    (2, Command::Run(Direction::Reverse)),
+    (3, Command::Jog(Direction::Forward)),
+    (4, Command::Jog(Direction::Reverse)),
+    (5, Command::Coast),
+    (6, Command::Stop),
+    (7, Command::StopAtOnce),
+    (8, Command::ResetFault),
+];
 
 /// Assumption: none of it can be read back; the manual's access column is lost.
 const CONTROL: &[Register] = &[
@@ -108,10 +127,10 @@ const MONITOR: &[Register] = &[
     Register::read(0x1900, Shows::Fault),
     Register::read(0x1B00, Shows::Measured(Measure::Frequency, 100.0)),
     Register::read(0x1B01, Shows::Measured(Measure::Setpoint, 100.0)),
-    Register::read(0x1B02, Shows::Bits(&[Bit::Reverse(0), Bit::ReverseSetpoint(1)])),
+    Register::read(0x1B02, Shows::bits(&[Bit::Reverse(0), Bit::ReverseSetpoint(1)])),
     Register::read(0x1B03, Shows::Measured(Measure::BusVoltage, 10.0)),
-    Register::read(0x1B12, Shows::Bits(STATUS_WORD_1)),
-    Register::read(0x1B13, Shows::Bits(&[Bit::Channel(0)])),
+    Register::read(0x1B12, Shows::bits(STATUS_WORD_1)),
+    Register::read(0x1B13, Shows::bits(&[Bit::Channel(0)])),
     Register::read(0x1E06, Shows::Count(Count::Received)),
     Register::read(0x1E07, Shows::Count(Count::Sent)),
     Register::read(0x1E08, Shows::Count(Count::Spoilt)),

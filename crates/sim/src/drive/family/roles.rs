@@ -1,0 +1,151 @@
+//! The parameters and registers at which a family behaves: who is obeyed, how fast, along which ramps.
+
+use super::Bounds;
+
+/// The places at which a family behaves, by address; `None` where it has no such parameter or nobody knows which.
+#[derive(Debug, Clone)]
+pub(crate) struct Roles {
+    /// Commands move something only while each of these parameters has this value.
+    pub(crate) obeys: Vec<(u16, u16)>,
+    /// Who gives the commands, as status words show it.
+    pub(crate) channel: Option<u16>,
+    /// The speed comes from the bus while these parameters have these values. Without them: while the bus is obeyed.
+    pub(crate) speed_source: Option<Vec<(u16, u16)>>,
+    /// The speed that the bus sets.
+    pub(crate) speed: Option<Speed>,
+    /// The speed where it does not come from the bus, Hz.
+    pub(crate) keypad_frequency: Option<Scaled>,
+    pub(crate) max_frequency: Option<Scaled>,
+    pub(crate) upper_frequency: Option<Scaled>,
+    /// In seconds, as the others.
+    pub(crate) acceleration: Option<Scaled>,
+    pub(crate) deceleration: Option<Scaled>,
+    pub(crate) jog_frequency: Option<Scaled>,
+    pub(crate) jog_acceleration: Option<Scaled>,
+    pub(crate) jog_deceleration: Option<Scaled>,
+    /// "Stop" coasts while this parameter has this value.
+    pub(crate) coasts_to_stop: Option<(u16, u16)>,
+    pub(crate) password: Option<u16>,
+    /// The latest fault first.
+    pub(crate) fault_history: Vec<u16>,
+    pub(crate) unit_address: Option<u16>,
+    /// In milliseconds.
+    pub(crate) response_delay: Option<u16>,
+    /// In seconds, 0 for never.
+    pub(crate) bus_timeout: Option<Scaled>,
+    /// What is then done. Without it the drive trips.
+    pub(crate) on_silence: Option<Silence>,
+}
+
+/// A parameter that holds a quantity.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scaled {
+    pub(crate) address: u16,
+    /// Counts in one unit.
+    pub(crate) counts: f64,
+}
+
+impl Scaled {
+    /// One that counts hundredths.
+    pub(crate) const fn hundredths(address: u16) -> Self {
+        Self { address, counts: 100.0 }
+    }
+
+    /// One that counts tenths.
+    pub(crate) const fn tenths(address: u16) -> Self {
+        Self { address, counts: 10.0 }
+    }
+}
+
+/// How the bus sets a speed.
+#[derive(Debug, Clone)]
+pub(crate) struct Speed {
+    pub(crate) register: u16,
+    /// A parameter that decides what the register counts, and what its words decide.
+    pub(crate) unit: Option<(u16, Vec<(u16, SpeedScale)>)>,
+    /// What it counts otherwise.
+    pub(crate) usual: SpeedScale,
+}
+
+/// What a speed is counted in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SpeedScale {
+    pub(crate) unit: SpeedUnit,
+    /// Counts in one unit.
+    pub(crate) counts: f64,
+    pub(crate) bounds: Bounds,
+}
+
+/// A unit of speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SpeedUnit {
+    Hertz,
+    /// Of the maximum frequency (assumed).
+    Percent,
+    Rpm,
+}
+
+impl Speed {
+    /// Hundredths of a hertz, always.
+    pub(crate) const fn hertz(register: u16) -> Self {
+        let usual = SpeedScale { unit: SpeedUnit::Hertz, counts: 100.0, bounds: Bounds::NONE };
+        Self { register, unit: None, usual }
+    }
+
+    /// The scale in force, where `value_of` tells the values of parameters.
+    pub(crate) fn scale(&self, value_of: impl Fn(u16) -> Option<u16>) -> &SpeedScale {
+        let decided = self.unit.as_ref().and_then(|(parameter, choices)| {
+            let word = value_of(*parameter)?;
+            choices.iter().find(|&&(choice, _)| choice == word).map(|(_, scale)| scale)
+        });
+        decided.unwrap_or(&self.usual)
+    }
+}
+
+/// What a parameter's words say is to be done about a silent bus; words that are not here say nothing.
+#[derive(Debug, Clone)]
+pub(crate) struct Silence {
+    pub(crate) parameter: u16,
+    pub(crate) words: Vec<(u16, OnSilence)>,
+}
+
+/// What is done about a silent bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OnSilence {
+    Trip,
+    /// Only while the bus is obeyed.
+    StopIfObeyed,
+    Stop,
+}
+
+impl Silence {
+    /// 0 trips, 1 does nothing, 2 stops if the bus is obeyed, 3 stops.
+    pub(crate) fn at(parameter: u16) -> Self {
+        Self { parameter, words: vec![(0, OnSilence::Trip), (2, OnSilence::StopIfObeyed), (3, OnSilence::Stop)] }
+    }
+}
+
+impl Roles {
+    /// None of them.
+    pub(crate) const NONE: Self = Self {
+        obeys: Vec::new(),
+        channel: None,
+        speed_source: None,
+        speed: None,
+        keypad_frequency: None,
+        max_frequency: None,
+        upper_frequency: None,
+        acceleration: None,
+        deceleration: None,
+        jog_frequency: None,
+        jog_acceleration: None,
+        jog_deceleration: None,
+        coasts_to_stop: None,
+        password: None,
+        fault_history: Vec::new(),
+        unit_address: None,
+        response_delay: None,
+        bus_timeout: None,
+        on_silence: None,
+    };
+}
