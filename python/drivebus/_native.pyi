@@ -40,6 +40,7 @@ __all__ = [
     "open_bus",
     "port_facts",
     "port_url",
+    "run_time_folder",
 ]
 
 def crc16(data: Buffer, /) -> int:
@@ -97,6 +98,9 @@ def port_url(
     *schemes* are those that the caller opens itself, *families* and *faults* what a simulated line can have. NotAllowed
     names the part that is wrong and what is allowed there.
     """
+
+def run_time_folder() -> str:
+    """The folder for the sockets of this user's programs. OSError where there is none."""
 
 def check_port_options(port: str | None, rs485: bool, echo: str, /) -> None:
     """Raises NotAllowed for what cannot be meant of *port*, which is None where it has no name."""
@@ -633,6 +637,12 @@ class SimulatedDrive:
 class SimulatedLine:
     """The wire: what it saw, and what it is told to spoil."""
 
+    format: SerialFormat
+    """What the units are set to. May be set, as at their keypads: what is on its way is then lost, and ports stay as they are.
+
+    A pseudo-terminal has the speed that a program set, a TCP port what the simulation began with. Where that is not what
+    the units are set to, they make nothing of what they are sent. A bus in this process always fits.
+    """
     @property
     def requests(self) -> int: ...
     @property

@@ -75,6 +75,12 @@ class SimulatedDrive:
         return self._native.fault
 
     @property
+    def fault_name(self) -> str:
+        """What the keypad shows of the present fault, such as `"OL1"`; empty for none, or where it is not known."""
+        known = self._profile.fault(self.fault)
+        return "" if known is None else known.mnemonic
+
+    @property
     def load(self) -> float:
         """Load torque as a share of the motor's rated torque, 0.0..4.0. May be set."""
         return self._native.load

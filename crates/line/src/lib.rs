@@ -91,6 +91,8 @@ pub use ports::words::WordError;
 pub use ports::{mbap, tcp};
 #[cfg(feature = "serial")]
 pub use ports::{rs485, tty};
+#[cfg(all(unix, feature = "share"))]
+pub use share::place::run_time_folder;
 pub use system::clock;
 pub use trace::{Direction, Traced, Watch};
 pub use turns::order::Priority;

@@ -166,3 +166,12 @@ pub(crate) fn port_facts(
     all.set_item("holders", facts.holders)?;
     Ok(all)
 }
+
+/// The folder for the sockets of this user's programs.
+#[pyfunction]
+pub(crate) fn run_time_folder() -> PyResult<PathBuf> {
+    #[cfg(unix)]
+    return Ok(drivebus_line::run_time_folder()?);
+    #[cfg(not(unix))]
+    Err(pyo3::exceptions::PyOSError::new_err("this system has no Unix sockets"))
+}

@@ -6,6 +6,7 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::convert::{bytes_of, shown};
 use crate::errors::{not_allowed, refuse};
+use crate::format::SerialFormat;
 use crate::sim::{duration, seconds, sim_error};
 
 /// The wire: what it saw, and what it is told to spoil.
@@ -20,6 +21,16 @@ impl SimulatedLine {
 
 #[pymethods]
 impl SimulatedLine {
+    #[getter]
+    fn format(&self) -> SerialFormat {
+        SerialFormat(self.0.format())
+    }
+
+    #[setter]
+    fn set_format(&self, format: SerialFormat) {
+        self.0.set_format(format.0);
+    }
+
     #[getter]
     fn requests(&self) -> u64 {
         self.0.requests()

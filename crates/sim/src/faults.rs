@@ -76,7 +76,7 @@ pub(crate) struct Faults {
     counts: [u64; KINDS],
     pub(crate) times: Times,
     /// The silence that another's frame keeps to ours.
-    silence: Duration,
+    pub(crate) silence: Duration,
 }
 
 impl Faults {

@@ -87,7 +87,7 @@ impl Line for SimLine {
 
     /// In virtual time nobody minds waking up for each character, and each is told by its moment.
     fn char_time(&self) -> Option<Duration> {
-        self.shared.clock.is_real().then_some(self.shared.char_time)
+        self.shared.clock.is_real().then(|| self.shared.present().wire.format().char_time())
     }
 
     /// Adapters do, and this one may be told to.

@@ -6,7 +6,7 @@
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
 
-use drivebus_rtu::Instant;
+use drivebus_rtu::{Instant, SerialFormat};
 use rustix::io::Errno;
 
 use crate::pacer::{Due, Next};
@@ -21,17 +21,31 @@ pub(crate) struct Port {
     /// Does not block.
     descriptor: OwnedFd,
     listener: Listener,
+    /// What the program at the other side has set, looked up when it sends.
+    looks_up: Option<LookUp>,
 }
+
+/// The speed that a program has set its side of a descriptor to, in bit/s.
+type LookUp = fn(&OwnedFd) -> Option<u32>;
 
 /// The other side is gone.
 struct Disconnected;
 
 impl Port {
-    /// `descriptor` must not block.
-    pub(crate) fn new(shared: Arc<Shared>, descriptor: OwnedFd, watch: &Watch, key: Key) -> std::io::Result<Self> {
+    /// `descriptor` must not block. It is set as the simulation began; where `looks_up` tells a speed, that counts.
+    pub(crate) fn new(
+        shared: Arc<Shared>,
+        descriptor: OwnedFd,
+        looks_up: Option<LookUp>,
+        watch: &Watch,
+        key: Key,
+    ) -> std::io::Result<Self> {
         watch.add(descriptor.as_fd(), key)?;
-        let listener = shared.lock().attach();
-        Ok(Self { shared, descriptor, listener })
+        let mut world = shared.lock();
+        let listener = world.attach();
+        world.set_adapter(listener, shared.began_as);
+        drop(world);
+        Ok(Self { shared, descriptor, listener, looks_up })
     }
 
     pub(crate) fn leave(&self, watch: &Watch) {
@@ -45,10 +59,10 @@ impl Port {
             return Next::Gone;
         }
         loop {
-            let (count, next) = {
+            let (count, next, char_time) = {
                 let mut world = self.shared.present();
                 let count = world.hand_over(self.listener, &mut buffer, self.shared.fifo);
-                (count, world.next_hand_over(self.listener, self.shared.fifo))
+                (count, world.next_hand_over(self.listener, self.shared.fifo), world.wire.format().char_time())
             };
             if count > 0 && self.write(&buffer[..count]).is_err() {
                 return Next::Gone;
@@ -57,7 +71,7 @@ impl Port {
                 let due = next.and_then(|wakeup| {
                     let at = self.shared.clock.system(wakeup.at)?;
                     // Nobody waits for what is not the end of a run.
-                    let latest = if wakeup.exact { at } else { at + self.shared.char_time / 2 };
+                    let latest = if wakeup.exact { at } else { at + char_time / 2 };
                     Some(Due { at, latest })
                 });
                 return due.map_or(Next::Readable, Next::At);
@@ -71,12 +85,22 @@ impl Port {
         match rustix::io::read(self.descriptor.as_fd(), &mut *buffer) {
             Ok(0) => Err(Disconnected),
             Ok(count) => {
-                self.shared.lock().transmit(self.listener, arrived, &buffer[..count]);
+                let mut world = self.shared.lock();
+                if let Some(adapter) = self.looked_up(world.wire.format()) {
+                    world.set_adapter(self.listener, adapter);
+                }
+                world.transmit(self.listener, arrived, &buffer[..count]);
                 Ok(())
             }
             Err(Errno::AGAIN | Errno::INTR) => Ok(()),
             Err(_) => Err(Disconnected),
         }
+    }
+
+    /// What a program has set its side to: a speed, and for the rest what the units are set to.
+    fn looked_up(&self, units: &SerialFormat) -> Option<SerialFormat> {
+        let speed = self.looks_up.and_then(|look_up| look_up(&self.descriptor))?;
+        SerialFormat::new(speed, units.data_bits(), units.parity(), units.stop_bits(), units.silence()).ok()
     }
 
     /// Hands `bytes` to the other side. What it has no room for is lost, as on a wire.

@@ -21,8 +21,8 @@ use crate::watch::{Key, Watch};
 
 /// A pseudo-terminal that is served until this is dropped.
 ///
-/// A pseudo-terminal has no speed and no parity: whatever a program sets, the characters take the time of the
-/// simulation's format.
+/// The speed that a program sets on it counts: where it is not that of the units, they make nothing of what they are
+/// sent. Parity and data bits cannot be set on a pseudo-terminal, and always fit. A program that sets nothing fits.
 #[derive(Debug)]
 pub struct PtyServer(Arc<Socket>);
 
@@ -97,13 +97,20 @@ impl Pty {
         // Without this the terminal would echo requests back as answers and translate line ends.
         let mut raw = tcgetattr(&held)?;
         raw.make_raw();
+        // A program that never sets a speed is taken to fit.
+        raw.set_speed(shared.began_as.baud_rate())?;
         tcsetattr(&held, OptionalActions::Now, &raw)?;
         rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
 
         let shared = Arc::clone(shared);
-        let serving = Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, watch, key)?))))?;
+        let serving = Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, Some(speed), watch, key)?))))?;
         Ok(Self { path, serving: Some(serving), _held: held })
     }
+}
+
+/// The speed that the programs' side is set to. The system tells it at our side too.
+fn speed(ours: &OwnedFd) -> Option<u32> {
+    tcgetattr(ours).ok().map(|settings| settings.output_speed())
 }
 
 /// Our side of a pseudo-terminal. It fails only as a whole; its users then see it closed.

@@ -90,8 +90,9 @@ pub(crate) struct Shared {
     /// After how many characters a served port hands them over.
     #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
     pub(crate) fifo: usize,
-    /// Of the format.
-    pub(crate) char_time: Duration,
+    /// What the units were set to when the simulation began, and ports still are.
+    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
+    pub(crate) began_as: SerialFormat,
     pub(crate) outlets: Outlets,
 }
 
@@ -165,7 +166,7 @@ impl Simulator {
             shown: world.shown(),
             world: Mutex::new(world),
             fifo: options.fifo.0,
-            char_time: options.format.char_time(),
+            began_as: options.format,
             outlets: Outlets::default(),
         };
         Ok(Self { shared: Arc::new(shared) })

@@ -98,7 +98,7 @@ impl Door {
         let taken = self.listener.accept().and_then(|(client, _)| {
             client.set_nodelay(true)?;
             client.set_nonblocking(true)?;
-            Port::new(Arc::clone(&self.shared), client.into(), watch, key)
+            Port::new(Arc::clone(&self.shared), client.into(), None, watch, key)
         });
         match taken {
             Ok(port) => {

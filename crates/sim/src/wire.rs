@@ -150,8 +150,15 @@ impl Wire {
 
     /// The master that hears as `from` sends `bytes` in one piece; returns when the last character has left.
     ///
-    /// They start now, or where the previous piece ends if that is still on its way.
-    pub(crate) fn transmit(&mut self, from: Listener, now: Instant, bytes: &[u8]) -> Instant {
+    /// They start now, or where the previous piece ends if that is still on its way. `sent_as` is what the master's
+    /// adapter is set to, where that is not what the units are set to: none of them then makes anything of it.
+    pub(crate) fn transmit(
+        &mut self,
+        from: Listener,
+        now: Instant,
+        bytes: &[u8],
+        sent_as: Option<SerialFormat>,
+    ) -> Instant {
         let begin = self.master.map_or(now, |span| now.max(span.end));
         if bytes.is_empty() {
             return begin;
@@ -174,12 +181,16 @@ impl Wire {
             self.trace.extend(Side::Master, bytes);
         }
 
-        self.heard.push(bytes, begin, &self.format);
+        let format = sent_as.unwrap_or(self.format);
+        self.heard.push(bytes, begin, &format);
+        if sent_as.is_some() {
+            self.heard.ignore();
+        }
         if self.echo {
-            let spans = (0..).map(|place| Span::of_char(&self.format, begin, place));
+            let spans = (0..).map(|place| Span::of_char(&format, begin, place));
             self.echoes.extend(bytes.iter().zip(spans).map(|(&byte, span)| Echo { to: from, byte, span }));
         }
-        let end = begin + self.chars(bytes.len());
+        let end = Span::of_char(&format, begin, bytes.len() - 1).end;
         self.master = Some(match self.master {
             Some(span) if span.end == begin => Span { begin: span.begin, end },
             _ => Span { begin, end },
@@ -194,6 +205,31 @@ impl Wire {
         if let Some(master) = &mut self.master {
             master.end = master.end.min(now);
         }
+    }
+
+    /// What units and adapters that fit are set to.
+    pub(crate) fn format(&self) -> &SerialFormat {
+        &self.format
+    }
+
+    /// Sets every unit to `format`. What is on its way is lost.
+    pub(crate) fn set_format(&mut self, now: Instant, format: SerialFormat) {
+        self.cut_off(now);
+        self.heard = Heard::default();
+        self.cut_short.clear();
+        self.talking = None;
+        self.waiting.clear();
+        for answer in &mut self.answers {
+            answer.end = answer.end.min(now).max(answer.begin);
+        }
+        self.format = format;
+        self.t35 = format.t35();
+        self.faults.silence = self.t35;
+    }
+
+    /// What arrives where an adapter is set to something else than the units: as many characters, none of them right.
+    pub(crate) fn misread(&mut self) -> Vec<u8> {
+        self.arrived.iter().map(|byte| byte ^ self.random.next_nonzero()).collect()
     }
 
     /// `unit` answers, from `begin` on, after whatever the wire was told to do to answers, and whatever `hits` it.

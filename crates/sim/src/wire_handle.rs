@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus_rtu::SerialFormat;
+
 use crate::error::SimError;
 use crate::faults::FaultKind;
 use crate::simulator::Shared;
@@ -22,6 +24,20 @@ impl SimulatedLine {
     /// Transmissions of masters, right or wrong, that silence or the next one has told apart.
     pub fn requests(&self) -> u64 {
         self.shared.present().wire.requests
+    }
+
+    /// What the units are set to.
+    pub fn format(&self) -> SerialFormat {
+        *self.shared.present().wire.format()
+    }
+
+    /// Sets every unit to `format`, as at their keypads. What is on its way is lost.
+    ///
+    /// Ports stay as they are: a pseudo-terminal has the speed that a program set, a TCP port what the simulation began
+    /// with. Where that is not what the units are set to, they make nothing of what they are sent. A line in this process
+    /// always fits.
+    pub fn set_format(&self, format: SerialFormat) {
+        self.shared.present().set_format(format);
     }
 
     /// Requests whose first bit came less than 3.5 characters after the last bit on the wire.

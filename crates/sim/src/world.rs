@@ -27,9 +27,18 @@ pub(crate) struct World {
     shown: Arc<AtomicU64>,
     pub(crate) wire: Wire,
     drives: Drives,
-    inboxes: Vec<(Listener, VecDeque<u8>)>,
+    masters: Vec<Master>,
     next_listener: u64,
     plug: Plug,
+}
+
+/// One of those who listen.
+#[derive(Debug)]
+struct Master {
+    name: Listener,
+    inbox: VecDeque<u8>,
+    /// What its side of the line is set to; `None`: whatever the units are.
+    adapter: Option<SerialFormat>,
 }
 
 /// The adapter between the masters and the wire.
@@ -49,7 +58,7 @@ impl World {
             shown: Arc::default(),
             wire: Wire::new(format, strict_silence, seed),
             drives,
-            inboxes: Vec::new(),
+            masters: Vec::new(),
             next_listener: 0,
             plug: Plug { is_in: true, pulls: 0, back_at: None },
         }
@@ -81,7 +90,14 @@ impl World {
     fn run(&mut self, to: Instant) {
         while let Some(step) = self.wire.step(to) {
             match step {
-                Step::Delivered => self.inboxes.iter_mut().for_each(|(_, inbox)| put(inbox, &self.wire.arrived)),
+                Step::Delivered => {
+                    for master in &mut self.masters {
+                        match misfit(master.adapter, self.wire.format()) {
+                            None => put(&mut master.inbox, &self.wire.arrived),
+                            Some(_) => put(&mut master.inbox, &self.wire.misread()),
+                        }
+                    }
+                }
                 Step::Echoed(to, byte) => {
                     if let Some(inbox) = self.inbox_mut(to) {
                         put(inbox, &[byte]);
@@ -103,7 +119,21 @@ impl World {
     /// The master `from` sends at `at`; returns when its last character has left.
     pub(crate) fn transmit(&mut self, from: Listener, at: Instant, bytes: &[u8]) -> Instant {
         self.advance(at);
-        self.wire.transmit(from, self.now, bytes)
+        let adapter = self.masters.iter().find(|master| master.name == from).and_then(|master| master.adapter);
+        self.wire.transmit(from, self.now, bytes, misfit(adapter, self.wire.format()))
+    }
+
+    /// Sets the adapter of the master `whose`.
+    #[cfg(unix)]
+    pub(crate) fn set_adapter(&mut self, whose: Listener, adapter: SerialFormat) {
+        if let Some(master) = self.masters.iter_mut().find(|master| master.name == whose) {
+            master.adapter = Some(adapter);
+        }
+    }
+
+    /// Sets every unit to `format`. What is on its way is lost.
+    pub(crate) fn set_format(&mut self, format: SerialFormat) {
+        self.wire.set_format(self.now, format);
     }
 
     /// When to [`advance`](Self::advance) next.
@@ -148,13 +178,13 @@ impl World {
     pub(crate) fn attach(&mut self) -> Listener {
         let listener = Listener(self.next_listener);
         self.next_listener += 1;
-        self.inboxes.push((listener, VecDeque::new()));
+        self.masters.push(Master { name: listener, inbox: VecDeque::new(), adapter: None });
         listener
     }
 
     /// A master is gone.
     pub(crate) fn detach(&mut self, listener: Listener) {
-        self.inboxes.retain(|(name, _)| *name != listener);
+        self.masters.retain(|master| master.name != listener);
     }
 
     /// Moves what arrived for `listener` into `buffer`; returns how much.
@@ -184,15 +214,15 @@ impl World {
     /// How much `listener` has not taken.
     #[cfg(unix)]
     fn held(&self, listener: Listener) -> usize {
-        self.inboxes.iter().find(|(name, _)| *name == listener).map_or(0, |(_, inbox)| inbox.len())
+        self.masters.iter().find(|master| master.name == listener).map_or(0, |master| master.inbox.len())
     }
 
     fn inbox_mut(&mut self, listener: Listener) -> Option<&mut VecDeque<u8>> {
-        self.inboxes.iter_mut().find(|(name, _)| *name == listener).map(|(_, inbox)| inbox)
+        self.masters.iter_mut().find(|master| master.name == listener).map(|master| &mut master.inbox)
     }
 
     fn empty_inboxes(&mut self) {
-        self.inboxes.iter_mut().for_each(|(_, inbox)| inbox.clear());
+        self.masters.iter_mut().for_each(|master| master.inbox.clear());
     }
 
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.
@@ -225,6 +255,18 @@ impl World {
             Err(_) => {}
         }
     }
+}
+
+/// What `adapter` is set to, if no unit that is set to `units` can make anything of what it sends.
+///
+/// Stop bits do not tell: a receiver looks at one of them. Assumption: a UART that samples in the middle of a bit bears
+/// 3 % between the two speeds.
+fn misfit(adapter: Option<SerialFormat>, units: &SerialFormat) -> Option<SerialFormat> {
+    adapter.filter(|adapter| {
+        let (theirs, ours) = (u64::from(adapter.baud_rate()), u64::from(units.baud_rate()));
+        100 * theirs.abs_diff(ours) > 3 * ours
+            || (adapter.parity(), adapter.data_bits()) != (units.parity(), units.data_bits())
+    })
 }
 
 /// Bytes arrive.

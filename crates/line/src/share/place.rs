@@ -62,7 +62,7 @@ impl Place {
     /// There is no folder that is this user's alone.
     pub(crate) fn of(key: &PortKey) -> io::Result<Option<Self>> {
         let Some(name) = key.name() else { return Ok(None) };
-        Ok(Some(Self { folder: folder()?, name }))
+        Ok(Some(Self { folder: run_time_folder()?, name }))
     }
 
     fn path(&self, ending: &str) -> PathBuf {
@@ -126,8 +126,12 @@ fn file_of(path: &Path) -> io::Result<(u64, u64)> {
     fs::symlink_metadata(path).map(|status| (status.dev(), status.ino()))
 }
 
-/// The folder for the sockets of this user, made where it is missing.
-fn folder() -> io::Result<PathBuf> {
+/// The folder for the sockets of this user's programs, made where it is missing; nobody else can look into it.
+///
+/// # Errors
+///
+/// It cannot be made, or is not this user's alone.
+pub fn run_time_folder() -> io::Result<PathBuf> {
     let user = geteuid().as_raw();
     let run_time = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
     let run_time = run_time.filter(|path| path.is_absolute() && is_of(path, user));

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Request};
+use drivebus_rtu::{Adu, DataBits, Parity, Request, Silence, StopBits};
 use proptest::prelude::*;
 
 use super::*;
@@ -15,6 +15,21 @@ fn world(strict_silence: bool) -> World {
     let map = Arc::new(Model::from("gd350").map().unwrap());
     let drive = |unit| (unit, Drive::new(UnitAddress::new(unit).unwrap(), Arc::clone(&map), Instant::ZERO));
     World::new(SerialFormat::default(), strict_silence, 7, Drives::new(BTreeMap::from([1, 2].map(drive))))
+}
+
+/// 8E1 at this speed.
+fn at(speed: u32) -> SerialFormat {
+    SerialFormat::new(speed, DataBits::Eight, Parity::Even, StopBits::One, Silence::Spec).unwrap()
+}
+
+/// Asks unit 1 for two words; what came within a second.
+fn asked(world: &mut World, port: Listener) -> Vec<u8> {
+    let now = world.now();
+    world.transmit(port, now, Adu::request(UnitAddress::MIN.into(), &Request::read(0x3000, 2).unwrap()).as_bytes());
+    world.advance(now + Duration::from_secs(1));
+    let mut buffer = [0; 64];
+    let count = world.take(port, &mut buffer);
+    buffer[..count].to_vec()
 }
 
 /// What may happen to a world.
@@ -32,6 +47,8 @@ enum Act {
     Unplug,
     Replug,
     DelayAnswers(Duration),
+    /// Every unit is set to this speed, and the adapter too, or not.
+    Settings(u32, bool),
 }
 
 fn act() -> impl Strategy<Value = Act> {
@@ -44,6 +61,8 @@ fn act() -> impl Strategy<Value = Act> {
         1 => Just(Act::Unplug),
         2 => Just(Act::Replug),
         2 => (0..600_000_000_u64).prop_map(|nanos| Act::DelayAnswers(Duration::from_nanos(nanos))),
+        1 => (prop::sample::select(&[9_600, 19_200, 115_200][..]), any::<bool>())
+            .prop_map(|(speed, both)| Act::Settings(speed, both)),
     ]
 }
 
@@ -68,6 +87,12 @@ fn happened(mut world: World, acts: &[Act]) -> (Vec<Vec<u8>>, World) {
             Act::Unplug => world.unplug(now, None),
             Act::Replug => world.replug(),
             Act::DelayAnswers(delay) => world.wire.spoil.delay_answers(delay, 1),
+            Act::Settings(speed, both) => {
+                world.set_format(at(speed));
+                if both {
+                    world.set_adapter(port, at(speed));
+                }
+            }
         }
         let count = world.take(port, &mut buffer);
         read.push(buffer[..count].to_vec());
@@ -111,6 +136,77 @@ fn a_late_answer_that_meets_an_echo_fills_the_same_fifo() {
     let faults = [(3, FaultKind::Late), (1, FaultKind::Long), (1, FaultKind::Delay)];
     let lumps = handed_over(2, &faults, true, &[1, 1, 2, 1]);
     assert!(lumps.iter().all(|(_, lump)| lump.len() <= 2), "{lumps:02X?}");
+}
+
+#[test]
+fn units_make_nothing_of_what_comes_at_another_speed_or_with_other_parity() {
+    let mut world = world(false);
+    let port = world.attach();
+    let usual = asked(&mut world, port);
+    assert_eq!(usual.len(), 9);
+    let format = |speed, bits, parity, stop| SerialFormat::new(speed, bits, parity, stop, Silence::Spec).unwrap();
+    let fits = [
+        format(19_200, DataBits::Eight, Parity::Even, StopBits::Two),
+        format(19_700, DataBits::Eight, Parity::Even, StopBits::One),
+        format(18_700, DataBits::Eight, Parity::Even, StopBits::One),
+    ];
+    for adapter in fits {
+        world.set_adapter(port, adapter);
+        assert_eq!(asked(&mut world, port), usual, "{adapter}");
+    }
+    let misfits = [
+        format(9_600, DataBits::Eight, Parity::Even, StopBits::One),
+        format(19_800, DataBits::Eight, Parity::Even, StopBits::One),
+        format(18_600, DataBits::Eight, Parity::Even, StopBits::One),
+        format(19_200, DataBits::Eight, Parity::None, StopBits::One),
+        format(19_200, DataBits::Eight, Parity::Odd, StopBits::One),
+        format(19_200, DataBits::Seven, Parity::Even, StopBits::One),
+    ];
+    for adapter in misfits {
+        world.set_adapter(port, adapter);
+        assert_eq!(asked(&mut world, port), [], "{adapter}");
+    }
+    assert_eq!(world.wire.requests, 10, "each was on the wire");
+    world.set_adapter(port, SerialFormat::DEFAULT);
+    assert_eq!(asked(&mut world, port), usual);
+}
+
+#[test]
+fn who_listens_at_another_speed_reads_as_many_characters_and_none_of_them_right() {
+    let mut world = world(false);
+    let (port, other) = (world.attach(), world.attach());
+    world.set_adapter(other, at(9_600));
+    let usual = asked(&mut world, port);
+    let mut buffer = [0; 64];
+    let count = world.take(other, &mut buffer);
+    assert_eq!(count, usual.len());
+    assert!(usual.iter().zip(&buffer).all(|(right, read)| right != read));
+}
+
+#[test]
+fn units_that_are_set_to_another_speed_lose_what_is_on_its_way_and_answer_at_theirs() {
+    let mut world = world(false);
+    let port = world.attach();
+    let usual = asked(&mut world, port);
+    let request = Adu::request(UnitAddress::MIN.into(), &Request::read(0x3000, 2).unwrap());
+    // Amid the request, before the answer, amid the answer: 8 and 9 characters of 573 us, a silence of 2 ms, 5 ms delay.
+    for millis in [2, 8, 14] {
+        let now = world.now();
+        world.transmit(port, now, request.as_bytes());
+        world.advance(now + Duration::from_millis(millis));
+        world.set_format(at(9_600));
+        world.advance(now + Duration::from_secs(1));
+        let count = world.take(port, &mut [0; 64]);
+        assert!(count < usual.len(), "{count} characters, {millis} ms");
+        assert_eq!(asked(&mut world, port), usual, "an adapter that follows");
+        let traced = world.wire.trace.to_vec();
+        let [sent, answered] = &traced[traced.len() - 2..] else { unreachable!() };
+        // 8 characters, the silence (3.5) at 9 600 bit/s with 11 bits each, and the 5 ms that a GD350 takes.
+        let took = 11.5 * 11.0 / 9_600.0 + 0.005;
+        let taken = answered.begin.saturating_duration_since(sent.begin).as_secs_f64();
+        assert!((taken - took).abs() < 1e-6, "{taken}");
+        world.set_format(SerialFormat::DEFAULT);
+    }
 }
 
 proptest! {

@@ -8,7 +8,9 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use drivebus_line::Line;
-use drivebus_rtu::Instant;
+#[cfg(target_os = "linux")]
+use drivebus_line::tty::{Tty, TtyOptions};
+use drivebus_rtu::{DataBits, Instant, Parity, SerialFormat, Silence, StopBits};
 use drivebus_sim::{FaultKind, Options, SimError, Simulator};
 
 use crate::bench::{framed, hex, pdu};
@@ -45,6 +47,52 @@ fn a_pseudo_terminal_serves_one_program_after_the_other() {
     ask_thrice(&simulator, &mut open(&server));
     ask_thrice(&simulator, &mut open(&server));
     assert_eq!(simulator.wire().requests(), 6);
+}
+
+/// Whether unit 1 answers a bus that opens `path` as `format` says.
+#[cfg(target_os = "linux")]
+fn answers(path: &std::path::Path, format: &SerialFormat) -> bool {
+    let mut port = Tty::open(path.to_str().unwrap(), format, &TtyOptions::default()).unwrap();
+    let sent = port.send(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    port.receive(&mut [0; 64], sent + Duration::from_millis(300)).unwrap() > 0
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_speed_that_a_program_sets_on_a_pseudo_terminal_counts_and_parity_does_not() {
+    let simulator = simulator();
+    let server = simulator.serve_pty().unwrap();
+    let format = |speed, parity| {
+        SerialFormat::new(speed, DataBits::Eight, parity, StopBits::One, Silence::Spec).unwrap()
+    };
+    let path = server.path();
+    assert!(!answers(&path, &format(9_600, Parity::Even)));
+    assert!(answers(&path, &format(19_200, Parity::Even)));
+    assert!(answers(&path, &format(19_200, Parity::None)), "no pseudo-terminal carries it");
+    simulator.wire().set_format(format(9_600, Parity::None));
+    assert!(!answers(&path, &format(19_200, Parity::Even)));
+    assert!(answers(&path, &format(9_600, Parity::Even)));
+    // One that only opens and writes has the speed that was set last.
+    simulator.wire().set_format(format(9_600, Parity::Even));
+    let mut port = open(&server);
+    port.write_all(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    port.read_exact(&mut [0; 7]).unwrap();
+}
+
+#[test]
+fn a_tcp_port_keeps_the_settings_that_the_simulation_began_with() {
+    let simulator = simulator();
+    let server = simulator.serve_tcp().unwrap();
+    let other = SerialFormat::new(19_200, DataBits::Eight, Parity::None, StopBits::One, Silence::Spec).unwrap();
+    let mut port = TcpStream::connect(server.address()).unwrap();
+    ask_thrice(&simulator, &mut port);
+    simulator.wire().set_format(other);
+    port.write_all(&framed(1, &pdu(0x03, &[0x2103, 1]))).unwrap();
+    port.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+    assert!(port.read(&mut [0; 8]).is_err(), "nobody understands 8E1 any more");
+    simulator.wire().set_format(SerialFormat::DEFAULT);
+    port.set_read_timeout(None).unwrap();
+    ask_thrice(&simulator, &mut port);
 }
 
 #[cfg(target_os = "linux")]

@@ -1,0 +1,154 @@
+"""`drivebus sim`: simulated drives for any program, until it is ended."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import threading
+from contextlib import ExitStack
+
+import click
+
+import drivebus
+from drivebus.cli.names import complete_units
+from drivebus.cli.output import remark
+from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, pass_session
+from drivebus.cli.simulation.meeting import open_to_orders
+from drivebus.cli.simulation.orders import Orders, in_words
+from drivebus.cli.simulation.rates import rates_of
+from drivebus.cli.types import Place, Whole
+
+__all__ = ["sim"]
+
+
+@click.group(invoke_without_command=True)
+@click.option(
+    "--units",
+    default="1=gd350",
+    show_default=True,
+    metavar="LIST",
+    shell_complete=complete_units,
+    help=f"Such as 1=gd350,2=vfd500, or with a profile's folder, 3=./acme. There are {', '.join(drivebus.profiles())}.",
+)
+@click.option(
+    "--transport",
+    type=click.Choice(["auto", "pty", "tcp"]),
+    default="auto",
+    show_default=True,
+    help="A pseudo-terminal, RTU over TCP, or the first of them that this system has.",
+)
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes chance repeatable.")
+@click.option(
+    "--faults", type=click.FloatRange(0, 1), metavar="RATE", help="Share of answers that each kind of fault hits."
+)
+@click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind, such as late=0.02.")
+@click.option("--echo", is_flag=True, help="As an adapter that hands back what it sends.")
+@click.option("--link", type=Place(), help="A symbolic link to keep leading to the pseudo-terminal.")
+@click.option("--fifo", type=Whole(1, 256), default=8, show_default=True, help="Characters read at once.")
+@pass_session
+@click.pass_context
+def sim(
+    context: click.Context,
+    session: Session,
+    units: str,
+    transport: str,
+    seed: int,
+    faults: float | None,
+    single: tuple[str, ...],
+    echo: bool,
+    link: str | None,
+    fifo: int,
+) -> None:
+    """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other.
+
+    While it serves them, `drivebus sim ctl` in another window trips, loads and unplugs them.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    bits, parity, stop = session.line_format
+    simulator = drivebus.Simulator(
+        _simulated(units),
+        baudrate=session.baud,
+        bytesize=int(bits),
+        parity=parity,
+        stopbits=int(stop),
+        seed=seed,
+        transport=transport,
+        faults=rates_of(faults, single),
+        echo=echo,
+        link=link,
+        fifo=fifo,
+    )
+    # Whoever ends it, the link goes with it.
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.default_int_handler)
+    with simulator:
+        if simulator.transport == "process":
+            raise drivebus.PortError(
+                "nothing that this system has is a port to the simulated line: no other program can open it"
+            )
+        opened = (lambda: link) if link is not None else (lambda: simulator.port)
+        orders = Orders(simulator, opened, session.out.say)
+        try:
+            with ExitStack() as open_things:
+                _take_orders(open_things, orders)
+                # Whoever reads the port may end it at once.
+                _say_what_is_served(session, simulator, opened())
+                threading.Event().wait()
+        except KeyboardInterrupt:
+            session.out.say("")
+
+
+def _take_orders(open_things: ExitStack, orders: Orders) -> None:
+    """Lets other windows give orders. Where they cannot, that is said, and the rest goes on."""
+    try:
+        open_things.enter_context(open_to_orders(orders.obey))
+    except (drivebus.NotAllowed, OSError) as error:
+        remark(f"Warning: this simulation takes no orders by `drivebus sim ctl`: {error}")
+
+
+def _say_what_is_served(session: Session, simulator: drivebus.Simulator, opened: str) -> None:
+    """What to open, what is there, and what to do next."""
+    drives = {unit: simulator.drive(unit).profile for unit in simulator.units}
+    settings = in_words(simulator.format)
+    if session.out.as_json:
+        told = {"port": opened, "leads_to": simulator.port, "units": drives, "settings": settings}
+        session.out.record({**told, "seed": simulator.seed, "faults": simulator.line.faults})
+        return
+    session.out.say(opened)
+    if opened != simulator.port:
+        session.out.say(f"Leads to: {simulator.port}")
+    for unit, family in drives.items():
+        session.out.say(f"Unit {unit}: {family}")
+    session.out.say(f"Settings: {settings}")
+    if simulator.line.faults:
+        session.out.say("Faults: " + ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items()))
+    session.out.say(f"Seed: {simulator.seed}")
+    first = simulator.units[0]
+    which = "" if first == 1 else f" --unit {first}"
+    words = "".join(f" --{name} {value}" for name, value, usual in _settings_of(session) if value != usual)
+    session.out.say(f"Try in another window: `drivebus --port {shlex.quote(opened)}{words}{which} info`")
+    session.out.say("Trip, load, unplug: `drivebus sim ctl --help`")
+    session.out.say("Ctrl-C ends it.")
+
+
+def _settings_of(session: Session) -> list[tuple[str, object, object]]:
+    """The options for the line: name, value and what is usual."""
+    return [
+        ("baud", session.baud, DEFAULT_BAUD),
+        ("format", "".join(session.line_format), "".join(DEFAULT_FORMAT)),
+    ]
+
+
+def _simulated(text: str) -> dict[int, str]:
+    units: dict[int, str] = {}
+    for part in text.split(","):
+        unit, equals, family = part.strip().partition("=")
+        if not equals or re.fullmatch(r"\d{1,20}", unit) is None:
+            raise click.UsageError(f'"{part}" is not a simulated drive; write UNIT=FAMILY, such as 1=gd350')
+        if int(unit) in units:
+            raise click.UsageError(f"unit {unit} is given twice; give each unit once, such as 1=gd350,2=gd350")
+        units[int(unit)] = family
+    return units
