@@ -638,10 +638,11 @@ class SimulatedLine:
     """The wire: what it saw, and what it is told to spoil."""
 
     format: SerialFormat
-    """What the units are set to. May be set, as at their keypads: what is on its way is then lost, and ports stay as they are.
+    """The settings of all units on the line. May be set, as at their keypads; what is on its way is then lost.
 
-    A pseudo-terminal has the speed that a program set, a TCP port what the simulation began with. Where that is not what
-    the units are set to, they make nothing of what they are sent. A bus in this process always fits.
+    Ports stay as they are: a pseudo-terminal has the speed that a program set, a TCP port the settings that the
+    simulation began with. Units do not understand what comes with other settings than theirs. A bus in this process
+    always fits.
     """
     @property
     def requests(self) -> int: ...

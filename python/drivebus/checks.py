@@ -39,7 +39,9 @@ def unit(value: object) -> int:
     if type(value) is int and 0 < value <= 247:
         return value
     if value == 0 and not isinstance(value, bool):
-        raise NotAllowed("unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()")
+        raise NotAllowed(
+            "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()"
+        )
     return whole("unit", value, 1, 247)
 
 

@@ -77,8 +77,7 @@ class SimulatedDrive:
     @property
     def fault_name(self) -> str:
         """What the keypad shows of the present fault, such as `"OL1"`; empty for none, or where it is not known."""
-        known = self._profile.fault(self.fault)
-        return "" if known is None else known.mnemonic
+        return self._profile.fault(self.fault).mnemonic if self.fault else ""
 
     @property
     def load(self) -> float:
@@ -108,7 +107,7 @@ class SimulatedDrive:
         fault = self._profile.fault_named(mnemonic)
         if fault is None:
             hint = checks.closest(mnemonic, [fault.mnemonic for fault in self._profile.faults() if fault.mnemonic])
-            raise NotAllowed(f"{self.profile} has no fault {mnemonic!r}{hint}")
+            raise NotAllowed(f"{self.profile} has no fault {checks.shown(mnemonic)}{hint}")
         return fault.code
 
     def power_cycle(self) -> None:
@@ -214,12 +213,12 @@ class Simulator:
         checks.one_of("clock", clock, ("real", "virtual"))
         if clock == "virtual" and transport != "process":
             raise NotAllowed(
-                f'clock "virtual" needs transport "process": nothing outside can share it over {transport!r}'
+                f'clock "virtual" needs transport "process": nothing outside can share it over "{transport}"'
             )
         if link is not None:
             link = checks.path("link", link)
             if transport not in ("auto", "pty"):
-                raise NotAllowed(f'link {link!r} leads to a pseudo-terminal: it needs transport "pty"')
+                raise NotAllowed(f'link {checks.shown(link)} leads to a pseudo-terminal: it needs transport "pty"')
         self._profiles = _profiles_of(units)
         families = {unit: native_of(profile) for unit, profile in self._profiles.items()}
         checks.flag("strict_silence", strict_silence)
@@ -320,7 +319,9 @@ def core_of(simulator: Simulator) -> _native.Simulator:
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:
     """*faults* as rates, if each is a kind of fault (or "all") with a share that this transport can have."""
     if not isinstance(faults, Mapping):
-        raise NotAllowed(f'faults {faults!r} is no mapping; give one such as {{"flip_bit": 0.02}}, or None')
+        raise NotAllowed(
+            f'faults {checks.shown(faults)} is not a mapping; give one such as {{"flip_bit": 0.02}}, or None'
+        )
     rates = {}
     for kind, rate in faults.items():
         checks.one_of("fault", kind, ("all", *FAULT_KINDS))
@@ -333,5 +334,5 @@ def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float
 def _profiles_of(units: object) -> dict[int, Profile]:
     """The profile of each of *units*, if that is what they are."""
     if not isinstance(units, Mapping) or not units:
-        raise NotAllowed(f'units {units!r} name no drive; give at least one, such as {{1: "gd350"}}')
+        raise NotAllowed(f'units {checks.shown(units)} name no drive; give at least one, such as {{1: "gd350"}}')
     return {checks.unit(unit): Profile.find(profile) for unit, profile in units.items()}

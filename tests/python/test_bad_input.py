@@ -187,7 +187,7 @@ def test_a_port_that_cannot_be_opened_is_named(port: str) -> None:
     ("arguments", "message"),
     [
         (({},), "units {} name no drive"),
-        (("gd350",), "units 'gd350' name no drive"),
+        (("gd350",), 'units "gd350" name no drive'),
         (({0: "gd350"},), "unit 0"),
         (({1: "gd35O"},), 'gd35O.*the closest is "gd35'),
     ],

@@ -37,11 +37,11 @@ def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path, end: s
     words = [sys.executable, "-m", "drivebus", "sim", "--faults", "0.02", "--fault", "deaf=1", "--seed", "7", "--echo"]
     with subprocess.Popen([*words, "--link", link], stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
-        said = [child.stdout.readline().strip() for _ in range(3)]
-        assert said[0] == str(link.readlink())
-        assert said[1].startswith("Faults: flip_bit 0.02, ")
-        assert "deaf 1" in said[1]
-        assert said[2] == "Seed: 7"
+        said = [child.stdout.readline().strip() for _ in range(6)]
+        assert said[:4] == [str(link), f"Leads to: {link.readlink()}", "Unit 1: gd350", "Settings: 19200 8E1"]
+        assert said[4].startswith("Faults: flip_bit 0.02, ")
+        assert "deaf 1" in said[4]
+        assert said[5] == "Seed: 7"
         with drivebus.Bus(link, timeout=0.05, retries=0) as bus, pytest.raises(drivebus.NoAnswer):
             bus.read(1, 0x2103)
         child.send_signal(getattr(signal, end))

@@ -94,7 +94,7 @@ def test_a_simulator_is_told_each_thing_once(url: str, message: str) -> None:
         ({"echo": "no"}, 'echo "no" .*True'),
         ({"echo": None}, "echo None .*True"),
         ({"faults": [1]}, r"faults \[1\] .*mapping"),
-        ({"faults": "late"}, "faults 'late' .*mapping"),
+        ({"faults": "late"}, 'faults "late" .*mapping'),
         ({"faults": {"late": True}}, "late True"),
         ({"clock": "virtual"}, '"process"'),
         ({"clock": "virtual", "transport": "pty"}, '"process"'),

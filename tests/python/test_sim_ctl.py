@@ -22,11 +22,20 @@ from drivebus.cli import cli
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="programs meet over a Unix socket")
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the windows of this test meet."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    return tmp_path / "drivebus"
+@pytest.fixture(autouse=True, scope="class")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Where the windows of one test, or of one class of tests, meet."""
+    place = tmp_path_factory.mktemp("run")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(place))
+        yield place / "drivebus"
+
+
+@pytest.fixture(scope="class")
+def simulation(folder: Path) -> Iterator[dict[str, Any]]:  # noqa: ARG001 - it has to be there first
+    """One that a class of tests shares."""
+    with served() as simulation:
+        yield simulation
 
 
 @contextmanager
@@ -58,15 +67,19 @@ def drive_of(now: Any, unit: int) -> Any:
 
 
 def test_each_order_does_what_it_says() -> None:
-    with served("--units", "1=gd350,2=vfd500") as simulation, drivebus.Bus(simulation["port"]) as bus:
+    with (
+        served("--units", "1=gd350,2=vfd500") as simulation,
+        drivebus.Bus(simulation["port"], retries=0) as bus,
+    ):
         assert simulation["units"] == {"1": "gd350", "2": "vfd500"}
         now = told("status")
         assert (now["port"], now["settings"], now["plugged"]) == (simulation["port"], "19200 8E1", True)
         assert [drive["family"] for drive in now["units"]] == ["gd350", "vfd500"]
 
         drive = bus.drive(1)
+        drive.prepare_control()
         assert drive_of(told("trip", "1", "OL1"), 1)["fault_name"] == "OL1"
-        assert (drive.state(), drive.fault().mnemonic) == ("fault", "OL1")
+        assert (drive.state(), drive.fault()) == ("fault", drive.profile.fault_named("OL1"))
         assert drive_of(told("trip", "2", "11"), 2)["fault"] == 11
         drive.reset_fault()
         assert drive_of(told("load", "1", "80%"), 1)["load"] == 0.8
@@ -74,27 +87,28 @@ def test_each_order_does_what_it_says() -> None:
 
         assert told("faults", "silence=1", "late=0.25")["faults"] == {"silence": 1.0, "late": 0.25}
         with pytest.raises(drivebus.NoAnswer):
-            bus.read(1, 0x2103, retries=0, timeout=0.05)
+            bus.read(1, 0x2103)
         assert told("faults", "off")["faults"] == {}
         assert told("faults")["faults"] == {}
         assert bus.read(1, 0x2103) == [0x01A0]
 
-        bus.write(1, 0x2001, 1000)
-        assert bus.read(1, 0x3001) == [1000]
+        usual = drive.read("P00.11")
+        drive.write("P00.11", 2.5)
+        assert drive.read("P00.11") == 2.5
         told("power-cycle", "1")
-        assert bus.read(1, 0x3001) == [0], "what was in RAM is lost"
+        assert drive.read("P00.11") == usual, "what was in RAM is lost"
 
 
 def test_an_adapter_is_pulled_and_put_back(tmp_path: Path) -> None:
     link = str(tmp_path / "drive")
     with served("--link", link) as simulation, drivebus.Bus(link) as bus:
-        assert (simulation["port"], os.readlink(link)) == (link, simulation["leads_to"])
+        assert (simulation["port"], str(Path(link).readlink())) == (link, simulation["leads_to"])
         assert bus.read(1, 0x2103) == [0x01A0]
         assert told("unplug")["plugged"] is False
         with pytest.raises(drivebus.PortError):
             bus.read(1, 0x2103)
         now = told("replug")
-        assert (now["plugged"], now["port"], now["leads_to"]) == (True, link, os.readlink(link))
+        assert (now["plugged"], now["port"], now["leads_to"]) == (True, link, str(Path(link).readlink()))
         assert bus.read(1, 0x2103) == [0x01A0]
 
 
@@ -128,35 +142,6 @@ def test_people_see_the_line_and_each_drive() -> None:
         ]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["trip", "2", "OL1"], "no unit 2 is simulated"),
-        (["trip", "1", "XYZ"], 'gd350 has no fault "XYZ"'),
-        (["trip", "1", "0"], "fault 0 is out of range; allowed is 1 to 65535"),
-        (["trip", "1", "99999999"], "fault 99999999 is out of range"),
-        (["trip", "999", "OL1"], "unit 999 is out of range"),
-        (["load", "1", "80"], 'did you mean 80%?'),
-        (["load", "1", "nan"], "out of range"),
-        (["load", "1", "much"], "write 80% or 0.8"),
-        (["faults", "rain=0.1"], '"rain" is unknown'),
-        (["faults", "late"], "write KIND=RATE, such as late=0.02"),
-        (["faults", "late=2"], "rate of late 2.0 is out of range"),
-        (["faults", "unplug=0.1"], "line.unplug()"),
-        (["settings", "9600", "4800"], "one speed and one format"),
-        (["settings", "1"], "baud rate 1 is not a number from 50 to 10000000"),
-        (["settings", "fast"], "give data bits"),
-        (["--of", "/dev/nowhere", "status"], 'no simulation is called "/dev/nowhere"; there are /dev/pts/'),
-    ],
-)
-def test_what_is_wrong_is_named_and_nothing_changes(words: list[str], said: str) -> None:
-    with served():
-        before = told("status")
-        result = ctl(*words)
-        assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
-        assert told("status") == before
-
-
 def test_of_several_one_is_chosen() -> None:
     assert "start one in another window: `drivebus sim`" in ctl("status").stderr
     with served() as one, served("--units", "5=gd600") as two:
@@ -169,20 +154,49 @@ def test_of_several_one_is_chosen() -> None:
     assert ctl("status").exit_code == 2
 
 
-class TestHostileWindows:
-    """Whatever comes into the socket is answered in words; the simulation goes on."""
+def say(folder: Path, sent: bytes) -> bytes:
+    [path] = folder.glob("sim-*.sock")
+    with socket.socket(socket.AF_UNIX) as window:
+        window.connect(str(path))
+        window.settimeout(100)
+        try:
+            window.sendall(sent)
+            window.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass  # it was sent away before it had said all
+        return window.makefile("rb").readline()
 
-    def say(self, folder: Path, sent: bytes) -> bytes:
-        [path] = folder.glob("sim-*.sock")
-        with socket.socket(socket.AF_UNIX) as window:
-            window.settimeout(100)
-            window.connect(str(path))
-            try:
-                window.sendall(sent)
-                window.shutdown(socket.SHUT_WR)
-            except OSError:
-                pass  # it was sent away before it had said all
-            return window.makefile("rb").readline()
+
+class TestWrongOrders:
+    """An order that makes no sense changes nothing, whether it was typed or sent by something else."""
+
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [
+            (["trip", "2", "OL1"], "no unit 2 is simulated"),
+            (["trip", "1", "XYZ"], 'gd350 has no fault "XYZ"'),
+            (["trip", "1", "0"], "fault 0 is out of range; allowed is 1 to 65535"),
+            (["trip", "1", "99999999"], "fault 99999999 is out of range"),
+            (["trip", "999", "OL1"], "unit 999 is out of range"),
+            (["load", "1", "80"], "did you mean 80%?"),
+            (["load", "1", "nan"], "out of range"),
+            (["load", "1", "much"], "write 80% or 0.8"),
+            (["faults", "rain=0.1"], '"rain" is unknown'),
+            (["faults", "late"], "write KIND=RATE, such as late=0.02"),
+            (["faults", "late=2"], "rate of late 2.0 is out of range"),
+            (["faults", "unplug=0.1"], '"unplug" by rate needs'),
+            (["settings", "9600", "4800"], "one speed and one format"),
+            (["settings", "1"], "baud rate 1 is not a number from 50 to 10000000"),
+            (["settings", "fast"], "give data bits"),
+            (["--of", "/dev/nowhere", "status"], 'no simulation is called "/dev/nowhere"; there are /dev/pts/'),
+        ],
+    )
+    @pytest.mark.usefixtures("simulation")
+    def test_what_is_wrong_is_named_and_nothing_changes(self, words: list[str], said: str) -> None:
+        before = told("status")
+        result = ctl(*words)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
+        assert told("status") == before
 
     @pytest.mark.parametrize(
         "sent",
@@ -211,12 +225,16 @@ class TestHostileWindows:
             b'{"order": "shutdown"}\n',
         ],
     )
+    @pytest.mark.usefixtures("simulation")
     def test_no_words_break_it(self, folder: Path, sent: bytes) -> None:
-        with served():
-            before = told("status")
-            answer = json.loads(self.say(folder, sent))
-            assert list(answer) == ["error"], answer
-            assert told("status") == before
+        before = told("status")
+        answer = json.loads(say(folder, sent))
+        assert list(answer) == ["error"], answer
+        assert told("status") == before
+
+
+class TestHostileWindows:
+    """Whatever comes into the socket is answered in words; the simulation goes on."""
 
     def test_windows_that_say_nothing_keep_nobody_out_for_long(self, folder: Path) -> None:
         with served():
@@ -225,7 +243,7 @@ class TestHostileWindows:
             for window in silent:
                 window.connect(str(path))
             # Eight may talk at once, each for two seconds.
-            assert b"8 others talk" in self.say(folder, b'{"order": "about"}\n')
+            assert b"8 others talk" in say(folder, b'{"order": "about"}\n')
             for window in silent:
                 window.settimeout(100)
                 assert b"error" in window.makefile("rb").readline()
@@ -238,9 +256,7 @@ class TestHostileWindows:
             assert (folder.stat().st_mode & 0o777, path.stat().st_mode & 0o777) == (0o700, 0o600)
 
     def test_what_a_killed_one_left_is_cleared_away(self, folder: Path) -> None:
-        with subprocess.Popen(
-            [sys.executable, "-m", "drivebus", "sim"], stdout=subprocess.PIPE, text=True
-        ) as child:
+        with subprocess.Popen([sys.executable, "-m", "drivebus", "sim"], stdout=subprocess.PIPE, text=True) as child:
             assert child.stdout is not None
             child.stdout.readline()
             child.kill()

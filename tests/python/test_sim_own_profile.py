@@ -70,7 +70,7 @@ def test_a_folder_that_is_no_sound_profile_is_refused_as_everywhere(tmp_path: Pa
         drivebus.Simulator({1: tmp_path}, transport="process")
     with pytest.raises(drivebus.NotAllowed, match='no profile "gd35o" is shipped; the closest is "gd350"'):
         drivebus.Simulator({1: "gd35o"}, transport="process")
-    with pytest.raises(drivebus.NotAllowed, match="is none; give a name"):
+    with pytest.raises(drivebus.NotAllowed, match="is not a profile; give a name"):
         drivebus.Simulator({1: 350}, transport="process")  # type: ignore[dict-item]
 
 

@@ -103,7 +103,8 @@ impl Pty {
         rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
 
         let shared = Arc::clone(shared);
-        let serving = Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, Some(speed), watch, key)?))))?;
+        let serving =
+            Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, Some(speed), watch, key)?))))?;
         Ok(Self { path, serving: Some(serving), _held: held })
     }
 }

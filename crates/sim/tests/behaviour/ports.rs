@@ -62,9 +62,8 @@ fn answers(path: &std::path::Path, format: &SerialFormat) -> bool {
 fn the_speed_that_a_program_sets_on_a_pseudo_terminal_counts_and_parity_does_not() {
     let simulator = simulator();
     let server = simulator.serve_pty().unwrap();
-    let format = |speed, parity| {
-        SerialFormat::new(speed, DataBits::Eight, parity, StopBits::One, Silence::Spec).unwrap()
-    };
+    let format =
+        |speed, parity| SerialFormat::new(speed, DataBits::Eight, parity, StopBits::One, Silence::Spec).unwrap();
     let path = server.path();
     assert!(!answers(&path, &format(9_600, Parity::Even)));
     assert!(answers(&path, &format(19_200, Parity::Even)));

@@ -1,7 +1,7 @@
 """Where a simulation that runs and the window that gives it orders meet: a socket in this user's run-time folder.
 
-One line of JSON goes each way, then the connection is closed. Whatever comes in is not believed: a line that is too long,
-takes too long or is no order is answered in words, and changes nothing.
+One line of JSON goes each way, then the connection is closed. A line that is too long, comes too slowly or is not an
+order is answered in words, and changes nothing.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ _AT_ONCE = 8
 class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
     daemon_threads = True
     block_on_close = False
+    request_queue_size = 4 * _AT_ONCE
 
     def __init__(self, path: Path, obey: Callable[[Order], Order]) -> None:
         self.obey = obey
@@ -65,7 +66,10 @@ class _Visit(socketserver.StreamRequestHandler):
     def _answer(self) -> Order:
         if not _is_own(self.connection):
             return {"error": "this simulation is another user's"}
-        line = self.rfile.readline(_LONGEST + 1)
+        try:
+            line = self.rfile.readline(_LONGEST + 1)
+        except OSError:
+            return {"error": f"no whole order came within {_PATIENCE:g} s"}
         if len(line) > _LONGEST:
             return {"error": f"an order has at most {_LONGEST} bytes"}
         try:

@@ -22,4 +22,4 @@ def _rate(text: str) -> tuple[str, float]:
     try:
         return kind.strip().replace("-", "_"), float(rate)
     except ValueError:
-        raise click.UsageError(f'"{text}" is not a fault; write KIND=RATE, such as late=0.02") from None
+        raise click.UsageError(f'"{text}" is not a fault; write KIND=RATE, such as late=0.02') from None

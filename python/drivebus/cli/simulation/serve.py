@@ -89,7 +89,10 @@ def sim(
             raise drivebus.PortError(
                 "nothing that this system has is a port to the simulated line: no other program can open it"
             )
-        opened = (lambda: link) if link is not None else (lambda: simulator.port)
+
+        def opened() -> str:
+            return simulator.port if link is None else link
+
         orders = Orders(simulator, opened, session.out.say)
         try:
             with ExitStack() as open_things:
