@@ -129,7 +129,7 @@ def test_a_time_out_that_the_drives_own_delay_fills_is_named() -> None:
 
 
 class TestOtherSettings:
-    """A pseudo-terminal carries no baud rate and no parity, so what opens the bus stands for the wire here."""
+    """A pseudo-terminal carries no parity, and virtual time has none, so what opens the bus stands for the wire here."""
 
     @staticmethod
     def unit_at(right: Settings, otherwise: dict[str, float]) -> tuple[Callable[..., Bus], list[Settings]]:
@@ -152,6 +152,14 @@ class TestOtherSettings:
         assert "38400 8E1, not at 19200 8E1" in found.text
         assert named(findings, "answers").unit == 1, "the unit is looked at where it answers"
         assert tried[1] == Settings(9600, 8, "N", 1), "factory settings come first"
+
+    @pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
+    def test_a_wrong_baud_rate_is_met_without_hardware(self) -> None:
+        with Simulator({1: "gd350"}, baudrate=38400, transport="pty") as simulator:
+            opened = lambda port, **options: Bus(port, **{**options, "timeout": 0.1})  # noqa: E731
+            findings = list(examine(simulator.port, 1, open=opened, listen=0.01))
+        assert named(findings, "wrong_baud").values["baudrate"] == 38400
+        assert named(findings, "answers").unit == 1
 
     def test_a_wrong_parity_is_named(self) -> None:
         opened, _ = self.unit_at(Settings(19200, 8, "N", 1), {"flip_bit": 1.0})

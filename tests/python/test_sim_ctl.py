@@ -265,7 +265,7 @@ class TestHostileWindows:
         assert list(folder.glob("sim-*.sock")) == []
 
     def test_something_else_at_the_place_is_no_simulation(self, folder: Path) -> None:
-        folder.mkdir(mode=0o700)
+        folder.mkdir(mode=0o700, exist_ok=True)
         with socket.socket(socket.AF_UNIX) as other:
             other.bind(str(folder / "sim-1.sock"))
             other.listen()

@@ -17,6 +17,7 @@ import drivebus
 from drivebus.cli.anywhere import in_front
 from drivebus.cli.choose import chosen, complete_drive, complete_port, parse_unit_list
 from drivebus.cli.commands import GROUPS, Commands
+from drivebus.cli.listing import first_sentence
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, laid_out, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
@@ -57,11 +58,6 @@ def _quoted_as_letters() -> Iterator[None]:
         raise
 
 
-def _first_sentence(command: click.Command) -> str:
-    """What *command* does, in one sentence."""
-    return (command.help or "").split("\n\n")[0].replace("\n", " ").split(". ")[0].rstrip(".")
-
-
 class _Program(click.Group):
     """Turns this package's errors into one message on standard error and the exit code of their kind."""
 
@@ -79,7 +75,7 @@ class _Program(click.Group):
         for title, files in GROUPS.items():
             commands = [self.commands[name] for names in files.values() for name in names]
             with formatter.section(title):
-                formatter.write_dl([(str(each.name), _first_sentence(each)) for each in commands])
+                formatter.write_dl([(str(each.name), first_sentence(each)) for each in commands])
 
     def invoke(self, context: click.Context) -> Any:
         """Runs the command."""
@@ -117,10 +113,10 @@ class _Program(click.Group):
     },
     epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
-    "These options may stand before the command or behind it, and in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
+    "These options can stand before the command or behind it, or in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
     "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_CONFIG, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, "
     "DRIVEBUS_READ_ONLY, DRIVEBUS_VARIANT, DRIVEBUS_TRACE, DRIVEBUS_JSON. "
-    "This is not a safety function: an emergency stop is a wire.",
+    "drivebus is not a safety function: an emergency stop is a wire.",
 )
 @click.option(
     "--port",
@@ -128,8 +124,8 @@ class _Program(click.Group):
     metavar="PORT",
     envvar="DRIVEBUS_PORT",
     shell_complete=complete_port,
-    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, a line of drivebus.toml, or a simulated drive: "
-    f"sim:// and one of {', '.join(drivebus.profiles())}.",
+    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, a line of drivebus.toml, or a simulated drive such as "
+    "sim://gd350.",
 )
 @click.option(
     "--baud",
@@ -155,7 +151,7 @@ class _Program(click.Group):
     "--rs485",
     type=click.Choice(["kernel", "rts", "auto"]),
     envvar="DRIVEBUS_RS485",
-    help="Who switches the direction of a bare transceiver: the driver, this program, whichever can.",
+    help="Who switches the direction of a bare transceiver: the driver, this program, or whichever of them can.",
 )
 @click.option(
     "--unit",
@@ -175,37 +171,37 @@ class _Program(click.Group):
     multiple=True,
     metavar="NAME",
     shell_complete=complete_drive,
-    help="A drive or a group of drivebus.toml, instead of --port and --unit; may be given several times.",
+    help="A drive or a group of drivebus.toml, instead of --port and --unit. May be repeated.",
 )
 @click.option(
     "--config",
     metavar="FILE",
     envvar="DRIVEBUS_CONFIG",
-    help="Take names from this file, not from drivebus.toml in this folder or among your settings.",
+    help="Read this file instead of the drivebus.toml in this folder or in your settings.",
 )
 @click.option(
     "--profile",
     metavar="NAME",
     envvar="DRIVEBUS_PROFILE",
     shell_complete=complete_profile,
-    help="Family or folder; without it, the drive is asked.",
+    help="Family of the drive, or a folder with a profile. Default: ask the drive.",
 )
 @click.option(
     "--trust-profile",
     is_flag=True,
-    help="The profile is meant: write also to a drive that says it is of another family.",
+    help="Trust --profile even if the drive identifies as another family.",
 )
 @click.option(
     "--unverified",
     is_flag=True,
     envvar="DRIVEBUS_UNVERIFIED",
-    help="Use what no document of this very family proves: rows and rules marked unverified or assumed.",
+    help="Also use registers and commands that this family's manuals do not confirm.",
 )
 @click.option(
     "--read-only",
     is_flag=True,
     envvar="DRIVEBUS_READ_ONLY",
-    help="Only look: what would write to a drive, a stop too, is refused before anything is sent.",
+    help="Only read: refuse everything that would write to a drive, also a stop, before anything is sent.",
 )
 @click.option(
     "--variant",
@@ -215,7 +211,7 @@ class _Program(click.Group):
     envvar="DRIVEBUS_VARIANT",
     callback=parse_variants,
     shell_complete=complete_variant,
-    help="What a parameter of the drive makes of its registers, such as speed_unit=Hz.",
+    help="How the drive is configured, where that changes the meaning of registers: speed_unit=Hz.",
 )
 @click.option(
     "--trace",
@@ -224,7 +220,7 @@ class _Program(click.Group):
     envvar="DRIVEBUS_TRACE",
     help="Show each frame on the line, with its meaning, on standard error.",
 )
-@click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="One JSON object a line.")
+@click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="Print one JSON object a line.")
 @click.version_option(drivebus.__version__, prog_name="drivebus")
 @click.pass_context
 def cli(

@@ -27,13 +27,14 @@ _file = Place(dir_okay=False, path_type=Path)
 
 @click.command()
 @click.argument("file", type=_file)
-@click.option("--fresh", is_flag=True, help="Begin anew, whatever an interrupted backup left behind.")
-@click.option("--force", is_flag=True, help="Replace a FILE that is there: an older backup, or no backup.")
+@click.option("--fresh", is_flag=True, help="Start again instead of continuing an interrupted backup.")
+@click.option("--force", is_flag=True, help="Replace FILE, whether it is an older backup or something else.")
 @pass_session
 def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     """Read every parameter the profile knows into FILE, a text for people and version control.
 
-    Writes nothing to the drive. Interrupted, the same command goes on where it was. Passwords are not read.
+    Writes nothing to the drive. After an interruption, the same command continues where it stopped. Passwords are not
+    read.
     """
     if not force:
         _keep_older(file)
@@ -83,11 +84,15 @@ def _keep_older(file: Path) -> None:
     shell_complete=complete_group,
     help="Only this group (P00) or code; may be repeated.",
 )
-@click.option("--serial", is_flag=True, help="Also the serial settings. The drive may not be heard afterwards.")
-@click.option("--motor", is_flag=True, help="Also the data of the motor.")
-@click.option("--force", is_flag=True, help="Also to another family, identification or firmware.")
-@click.option("--twice", is_flag=True, help="Write a parameter to its memory twice where nothing else leads there.")
-@click.option("--dry-run", is_flag=True, help="Only show what would be written.")
+@click.option(
+    "--serial", is_flag=True, help="Also restore the serial settings. The drive may not be reachable afterwards."
+)
+@click.option("--motor", is_flag=True, help="Also restore the motor data.")
+@click.option("--force", is_flag=True, help="Also write to a drive of another family, identification or firmware.")
+@click.option(
+    "--twice", is_flag=True, help="Allow a second EEPROM write where a value can only be reached in two steps."
+)
+@click.option("--dry-run", is_flag=True, help="Show what would be written, and write nothing.")
 @yes_option
 @pass_session
 def restore(
@@ -101,10 +106,10 @@ def restore(
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Give the drive back what FILE has. Shows what it would write, and asks.
+    """Write the values in FILE back to the drive. Shows what it would write, and asks first.
 
-    Writes only what differs, to the memory that outlives the power, and reads each back. Interrupted, the same command
-    goes on where it was. Exit code 1: something was not restored.
+    Writes only the values that differ, to EEPROM, and reads each back. After an interruption, the same command
+    continues where it stopped. Exit code 1: something was not restored.
     """
     if not dry_run:
         session.will_write()
@@ -150,13 +155,13 @@ def _complete_side(_context: click.Context, _parameter: click.Parameter, incompl
     is_flag=True,
     help="Also what changes by itself, such as the fault history; list what is not compared.",
 )
-@click.option("--force", is_flag=True, help="Also with a drive of another identification or firmware.")
+@click.option("--force", is_flag=True, help="Also compare with a drive of another identification or firmware.")
 @pass_session
 def diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> None:
     """Show how B, or the drive, differs from A.
 
-    A and B are files; "factory" stands for what the factory set, as far as that is known. Only what A has is compared
-    with the drive. Exit code 0: nothing differs; 1: something does; others as always.
+    A and B are files. "factory" stands for the factory settings, as far as they are known. Only the parameters in A are
+    compared with the drive. Exit code 0: nothing differs. 1: something differs. Other exit codes are as usual.
     """
     found = _diff(session, a, b, everything, force)
     if session.out.as_json:

@@ -35,8 +35,12 @@ _STYLES = {"ok": "green", "note": "", "warning": "bold yellow", "fault": "bold r
     callback=lambda context, parameter, value: value and parse_format(context, parameter, value),
     help="Data bits, parity and stop bits it should be.  [default: 8E1]",
 )
-@click.option("--full", is_flag=True, help="Every address, baud rate and format, and ten times the echoes; minutes.")
-@click.option("--listen", type=Seconds(0, 3600), default=1.0, show_default=True, help="Seconds before asking.")
+@click.option(
+    "--full", is_flag=True, help="Try every address, baud rate and format, with ten times the echoes. Takes minutes."
+)
+@click.option(
+    "--listen", type=Seconds(0, 3600), default=1.0, show_default=True, help="Seconds to listen before asking."
+)
 @pass_session
 @click.pass_context
 def doctor(
@@ -49,10 +53,10 @@ def doctor(
     full: bool,
     listen: float,
 ) -> None:
-    """Find what is wrong with an adapter, a line and its units, and say what to do. Reads only.
+    """Find what is wrong with an adapter, a line and its units, and say what to do. Only reads.
 
-    Without --unit, addresses 1 to 32 are asked. Where nobody answers, other baud rates and parities are tried. A
-    --profile before the command is for units that do not say themselves what they are.
+    Without --unit, addresses 1 to 32 are asked. If nobody answers, other baud rates and parities are tried. With
+    --profile, units that do not identify themselves are examined as that family.
     """
     port = port or session.port
     if port is None:

@@ -15,7 +15,7 @@ __all__ = ["COMMANDS"]
 @pass_session
 @click.pass_context
 def drives(context: click.Context, session: Session) -> None:
-    """List the drives of drivebus.toml with their lines and groups. Asks none of them."""
+    """List the drives of drivebus.toml with their lines and groups. No drive is asked."""
     out = session.out
     site = find_site(context.find_root().params.get("config"), needed=True)
     rows = [

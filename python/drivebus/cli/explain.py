@@ -22,11 +22,11 @@ _MATCHES = 20
 @click.argument("text", metavar="TEXT...", nargs=-1, required=True, shell_complete=names.complete_name)
 @pass_session
 def describe(session: Session, text: tuple[str, ...]) -> None:
-    """Say all that is known of a register or parameter, or search for one.
+    """Show all that is known about a register or parameter, or search for one.
 
-    A name, code or address is described. Anything else (`drivebus describe torque`) lists what has it in its name,
-    label, choices or note, best first; "ramp" or "dc link" finds what else it is called. With --profile, no drive is
-    asked.
+    TEXT is a name, a code or an address. Anything else is searched for in names, labels, choices and notes:
+    `drivebus describe torque`. Other words of the field are found too, such as "ramp" or "dc link". With --profile, no
+    drive is asked.
     """
     profile = session.known_profile()
     wanted = " ".join(text)
@@ -79,7 +79,7 @@ def _match(profile: drivebus.Profile, name: str) -> list[Any]:
 @click.argument("group", metavar="[GROUP]", required=False, shell_complete=names.complete_group)
 @pass_session
 def list_(session: Session, group: str | None) -> None:
-    """List what the drive's family has: its registers and groups of parameters, or the rows of GROUP.
+    """List the registers and parameter groups of the drive's family, or the rows of GROUP.
 
     GROUP is a group of parameters (P00), "registers", "monitor", "parameters" or "all". With --profile, no drive is
     asked.
@@ -150,12 +150,12 @@ def _range(row: drivebus.Description) -> str:
 
 @click.command()
 @click.argument("text", metavar="[FAULT]...", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="List every fault the family knows; asks no drive for faults.")
+@click.option("--all", "everything", is_flag=True, help="List every fault of the family. No drive is asked for faults.")
 @each_drive
 def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
-    """Explain the present fault, and list the last ones, with the values the drive kept of the last.
+    """Explain the present fault, and list the last ones with the values that the drive kept of the latest.
 
-    FAULT is a number, what the keypad shows (`drivebus faults OL1`), or words (`drivebus faults earth short`): it is
+    FAULT is a number, the letters on the keypad (`drivebus faults OL1`), or words (`drivebus faults earth short`). It is
     explained, and no drive is asked for faults.
     """
     if everything and text:

@@ -52,14 +52,14 @@ def show_frames(context: click.Context) -> None:
 
 @click.command()
 @click.argument("data", metavar="HEX...", nargs=-1, required=True)
-@click.option("--force", is_flag=True, help="Also a command that the family does not define.")
+@click.option("--force", is_flag=True, help="Also send a command that the family does not define.")
 @yes_option
 @pass_session
 def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None:
-    """Send any request and show the answer: unit and PDU in hexadecimal, without the CRC.
+    """Send any request and show the answer. Give unit and PDU in hexadecimal, without the CRC.
 
-    As the serial assistants of the manuals: `drivebus raw 01 03 21 00 00 01`. What it writes to a command register must
-    be a command of the family (--profile; without it, of any family that has its commands there), or --force.
+    Example: `drivebus raw 01 03 21 00 00 01`. A word for a command register must be a command of the family (--profile;
+    without it, of any family that has its commands there). --force sends any other.
     """
     body = names.parse_hex(data)
     if not 2 <= len(body) <= 254:

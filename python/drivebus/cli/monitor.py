@@ -34,15 +34,15 @@ _KEPT = 10_000
     type=Seconds(0),
     default=0.5,
     show_default=True,
-    help="Seconds from one sample to the next; 0: as fast as the line.",
+    help="Seconds from one sample to the next. 0: as fast as the line allows.",
 )
-@click.option("--count", type=Whole(1), help="Samples to take of each drive; without it, until Ctrl-C.")
+@click.option("--count", type=Whole(1), help="Samples to take of each drive. Default: until Ctrl-C.")
 @pass_session
 def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: int | None) -> None:
     """Watch registers as they change: all monitor registers, or those named.
 
     A terminal shows the latest values, and the least and greatest so far. A file or a pipe gets CSV, and --json an
-    object for each sample. A sample that does not come is shown as missing, and the next one is asked for. Where none
+    object for each sample. A missing sample is shown as missing, and the next one is asked for. If none
     comes at all, the exit code says why.
     """
     out = session.out

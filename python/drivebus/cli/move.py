@@ -40,7 +40,7 @@ class _Run(click.Command):
 @yes_option
 @each_drive
 def run(session: Session, hz: float | None, reverse: bool, wait: float | None, force: bool, yes: bool) -> None:
-    """Start the motor, at HZ if given. It keeps running when this command has ended."""
+    """Start the motor, at HZ if given. The motor keeps running when this command has ended."""
     session.will_write()
     way = "in reverse" if reverse else "forward"
     speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
@@ -54,10 +54,10 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 
 
 @click.command()
-@click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until it stands.")
+@click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the motor stands still.")
 @each_drive
 def stop(session: Session, wait: float | None) -> None:
-    """Stop the motor as the drive is set to: by a ramp, usually. Asks nothing."""
+    """Stop the motor as the drive is set to stop it, usually by a ramp. Does not ask first."""
     session.will_write()
     with session.bus() as bus:
         drive = session.halt(bus, "stop", lambda drive: drive.stop())
@@ -69,7 +69,7 @@ def stop(session: Session, wait: float | None) -> None:
 @click.command()
 @each_drive
 def coast(session: Session) -> None:
-    """Take the voltage off the motor; it turns on until friction ends it. Asks nothing."""
+    """Switch the output off: the motor turns on until friction stops it. Does not ask first."""
     session.will_write()
     with session.bus() as bus:
         drive = session.halt(bus, "coast", lambda drive: drive.coast())
@@ -83,7 +83,7 @@ def coast(session: Session) -> None:
 @yes_option
 @each_drive
 def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool) -> None:
-    """Jog the motor at the drive's jog frequency, and end the jog whatever happens: Ctrl-C, a closed terminal."""
+    """Jog the motor at the drive's jog frequency. The jog ends whatever happens: Ctrl-C, a closed terminal."""
     session.will_write()
     way = "in reverse" if reverse else "forward"
     with session.drive() as drive:
@@ -97,7 +97,7 @@ def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool)
 @yes_option
 @each_drive
 def reset(session: Session, yes: bool) -> None:
-    """Reset a fault whose cause is gone. A drive whose run command still stands may start again."""
+    """Reset a fault after its cause is gone. The drive may start again if its run command is still active."""
     session.will_write()
     with session.drive() as drive:
         session.ask("This resets the fault; a drive that is still told to run may start", yes)
@@ -106,11 +106,13 @@ def reset(session: Session, yes: bool) -> None:
 
 
 @click.command()
-@click.option("--store", is_flag=True, help="Keep it in EEPROM: the drive still obeys the bus after it was off.")
+@click.option(
+    "--store", is_flag=True, help="Keep it in EEPROM: the drive still obeys the bus after it was switched off."
+)
 @yes_option
 @each_drive
 def prepare(session: Session, store: bool, yes: bool) -> None:
-    """Set the drive to obey the bus, and show what is set. Writes only what differs; moves nothing by itself."""
+    """Set the drive to obey the bus, and show the settings. Writes only those that differ. Does not move the motor."""
     session.will_write()
     with session.drive() as drive:
         session.ask_if_running(drive, "this takes its commands and its setpoint from the bus", yes)
@@ -127,15 +129,17 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
 @click.argument(
     "assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=names.complete_assignment
 )
-@click.option("--store", is_flag=True, help="Keep parameters in EEPROM, whose write life is limited.")
-@click.option("--force", is_flag=True, help="Also words at addresses of which nothing is known; always asks.")
+@click.option("--store", is_flag=True, help="Keep parameters in EEPROM, which stands a limited number of writes.")
+@click.option(
+    "--force", is_flag=True, help="Also write to addresses that the profile does not know. Always asks first."
+)
 @yes_option
 @each_drive
 def write(session: Session, assignments: tuple[str, ...], store: bool, force: bool, yes: bool) -> None:
-    """Write registers or parameters. Parameters go to RAM: lost when the drive is switched off, unless --store.
+    """Write registers or parameters. Parameters go to RAM and are lost when the drive is switched off, unless --store.
 
-    All are checked before the first is sent. Command registers are refused: `run`, `stop` and the like are for them.
-    While the motor turns, it asks first.
+    All values are checked before the first is sent. Command registers are refused; use `run`, `stop` and the like. If
+    the motor turns, the command asks first.
     """
     session.will_write()
     asked = [names.parse_assignment(text) for text in assignments]

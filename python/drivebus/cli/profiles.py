@@ -9,6 +9,7 @@ import click
 
 import drivebus
 from drivebus.cli import rules, skeleton
+from drivebus.cli.listing import Listing
 from drivebus.cli.names import complete_profile
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, pass_session
@@ -19,11 +20,11 @@ __all__ = ["COMMANDS"]
 KINDS = ("registers", "parameters", "faults")
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Listing, invoke_without_command=True)
 @pass_session
 @click.pass_context
 def profiles(context: click.Context, session: Session) -> None:
-    """List the families of drives that are known; show one; check or begin one of your own."""
+    """List the families of drives that are known. Subcommands show one, check one, or start one of your own."""
     if context.invoked_subcommand is not None:
         return
     rows: list[list[Any]] = []
@@ -57,7 +58,7 @@ def _printed(counts: dict[str, dict[str, int]]) -> float | None:
 @click.argument("family", shell_complete=complete_profile)
 @pass_session
 def show(session: Session, family: str) -> None:
-    """Say all rules of a family (or of a folder) in words, and how well its rows are known."""
+    """Show the rules of a family (or a folder) in words, and how well its rows are known."""
     profile = drivebus.Profile.find(family)
     counts = profile.counts()
     if session.out.as_json:
@@ -76,9 +77,9 @@ def show(session: Session, family: str) -> None:
 @pass_session
 @click.pass_context
 def check(context: click.Context, session: Session, folder: Path) -> None:
-    """Name everything that is wrong in the profile in FOLDER: file, line, what stands there, what would be right.
+    """Check the profile in FOLDER. Each mistake is named with its file, its line, and what would be right.
 
-    Ends with exit code 2 if anything is. A profile is read, never executed.
+    Ends with exit code 2 if there are mistakes. A profile is read, never executed.
     """
     problems = drivebus.Profile.check(folder)
     for problem in problems:
@@ -103,11 +104,15 @@ def _placed(problem: dict[str, Any]) -> str:
 
 @profiles.command()
 @click.argument("folder", type=Place(path_type=Path))
-@click.option("--like", metavar="FAMILY", shell_complete=complete_profile, help="Take over what is not said anew.")
-@click.option("--overlay", metavar="FAMILY", shell_complete=complete_profile, help="Add to a profile what you know.")
+@click.option(
+    "--like", metavar="FAMILY", shell_complete=complete_profile, help="Start from this family, and change what differs."
+)
+@click.option(
+    "--overlay", metavar="FAMILY", shell_complete=complete_profile, help="Add facts to this family's profile."
+)
 @pass_session
 def new(session: Session, folder: Path, like: str | None, overlay: str | None) -> None:
-    """Begin a profile: write its files, with comments that say what goes where. Nothing is overwritten."""
+    """Start a profile: write its files, with comments that explain them. Nothing is overwritten."""
     if like is not None and overlay is not None:
         raise click.UsageError("--like or --overlay: a profile stands beside another, or over it")
     base = like or overlay
@@ -133,7 +138,7 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
 
 @profiles.command()
 def schema() -> None:
-    """Print the JSON schema of profile.toml: with it an editor knows the keys, and marks wrong ones while you type.
+    """Print the JSON schema of profile.toml. With it, an editor knows the keys and marks wrong ones while you type.
 
     `drivebus profiles new` puts it beside the files that it writes.
     """

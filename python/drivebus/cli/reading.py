@@ -20,7 +20,7 @@ __all__ = ["COMMANDS"]
 @click.command()
 @pass_session
 def ports(session: Session) -> None:
-    """List serial ports, with what is plugged in."""
+    """List the serial ports, and the adapters that are plugged in."""
     found = drivebus.ports()
     if not found:
         session.out.say("No serial port found. Is the adapter plugged in? Try `drivebus demo` without one.")
@@ -31,11 +31,11 @@ def ports(session: Session) -> None:
 
 
 @click.command()
-@click.option("--units", default="1-247", show_default=True, metavar="LIST", help="Which to ask, such as 1-31,40.")
-@click.option("--timeout", type=Seconds(0.001, 3600), help="Seconds each is given.  [default: 0.1]")
+@click.option("--units", default="1-247", show_default=True, metavar="LIST", help="Addresses to ask, such as 1-31,40.")
+@click.option("--timeout", type=Seconds(0.001, 3600), help="Seconds to wait for each answer.  [default: 0.1]")
 @pass_session
 def scan(session: Session, units: str, timeout: float | None) -> None:
-    """Find the drives on the line, by one read each."""
+    """Find the drives on the line. Each address is asked once."""
     wanted = names.parse_units(units)
     count = 0
     # On the console that the lines go to, so that they stand above the bar.
@@ -78,7 +78,7 @@ def _show_found(session: Session, found: drivebus.Found) -> None:
 @click.command()
 @each_drive
 def info(session: Session) -> None:
-    """Say what the drive is and how sure that is, what is known of its family, and whether it obeys the bus."""
+    """Show which drive it is and how sure that is, what is known about its family, and whether it obeys the bus."""
     out = session.out
     with session.bus() as bus:
         found = bus.identify(session.unit)
@@ -166,7 +166,10 @@ def _facts_of(status: drivebus.Status) -> dict[str, Any]:
 @click.command()
 @each_drive
 def status(session: Session) -> None:
-    """Show what the drive is doing: state, frequency, current, voltage, speed, fault; and what is not told, and why."""
+    """Show what the drive is doing: state, frequency, current, voltage, speed, fault.
+
+    Missing values are named, with the reason.
+    """
     out = session.out
     with session.drive() as drive:
         now = drive.status()
@@ -214,7 +217,8 @@ def _may_be_read(drive: drivebus.Drive, name: str) -> bool:
 def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
     """Read registers or parameters: by name, code (P00.11) or address (3004H, 0x3004).
 
-    What comes is shown although something else does not; why not is said then, and the exit code is of that.
+    Values that could be read are shown even if others fail. Failures are reported on standard error and set the exit
+    code.
     """
     rows: list[dict[str, Any]] = []
     failed: list[tuple[str, drivebus.DrivebusError]] = []

@@ -31,7 +31,7 @@ def completion(context: click.Context, shell: str) -> None:
 @click.command()
 @pass_session
 def demo(session: Session) -> None:
-    """Run a simulated GD350 through a whole job: under a minute, no hardware, nothing to set up."""
+    """Run a simulated GD350 through a whole job. Takes less than a minute and needs no hardware."""
     demonstration.run(session.out)
 
 

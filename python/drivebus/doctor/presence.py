@@ -69,7 +69,7 @@ def found_elsewhere(given: Settings, other: Settings, found: Sequence[Found]) ->
         "unit",
         "wrong_baud" if "baudrate" in what else "wrong_parity",
         Severity.FAULT,
-        f"unit {units} answers at {other}, not at {given}: the {wrong} {'are' if len(what) > 1 else 'is'} another",
+        f"unit {units} answers at {other}, not at {given}: the {wrong} {'differ' if len(what) > 1 else 'differs'}",
         f"use --baud {other.baudrate} --format {other.format}, or set the unit to "
         f"{given} (INVT: P14.01, P14.02; VFD500: P30.02 and the format beside it)",
         unit=found[0].unit,

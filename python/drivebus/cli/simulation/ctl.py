@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 import drivebus
+from drivebus.cli.listing import Listing
 from drivebus.cli.session import Session, parse_format, pass_session
 from drivebus.cli.simulation.meeting import Order, ask, running
 from drivebus.cli.simulation.rates import rates_of
@@ -16,7 +17,7 @@ from drivebus.cli.simulation.rates import rates_of
 __all__ = ["ctl"]
 
 
-@click.group()
+@click.group(cls=Listing)
 @click.option("--of", "which", metavar="PORT", help="Which simulation, by its port, its link or its process number.")
 @click.pass_context
 def ctl(context: click.Context, which: str | None) -> None:

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 import click
 
 import drivebus
+from drivebus.cli.listing import Listing
 from drivebus.cli.names import complete_units
 from drivebus.cli.output import remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, pass_session
@@ -22,30 +23,37 @@ from drivebus.cli.types import Place, Whole
 __all__ = ["sim"]
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Listing, invoke_without_command=True)
 @click.option(
     "--units",
     default="1=gd350",
     show_default=True,
     metavar="LIST",
     shell_complete=complete_units,
-    help=f"Such as 1=gd350,2=vfd500, or with a profile's folder, 3=./acme. There are {', '.join(drivebus.profiles())}.",
+    help="Drives by unit: 1=gd350,2=vfd500. A folder with a profile of your own: 3=./acme.",
 )
 @click.option(
     "--transport",
     type=click.Choice(["auto", "pty", "tcp"]),
     default="auto",
     show_default=True,
-    help="A pseudo-terminal, RTU over TCP, or the first of them that this system has.",
+    help="A pseudo-terminal, or RTU over TCP. auto: the first of them that this system has.",
 )
-@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes chance repeatable.")
 @click.option(
-    "--faults", type=click.FloatRange(0, 1), metavar="RATE", help="Share of answers that each kind of fault hits."
+    "--seed", type=Whole(0), default=0, show_default=True, help="Repeat the same random faults with the same seed."
 )
-@click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind, such as late=0.02.")
-@click.option("--echo", is_flag=True, help="As an adapter that hands back what it sends.")
-@click.option("--link", type=Place(), help="A symbolic link to keep leading to the pseudo-terminal.")
-@click.option("--fifo", type=Whole(1, 256), default=8, show_default=True, help="Characters read at once.")
+@click.option(
+    "--faults",
+    type=click.FloatRange(0, 1),
+    metavar="RATE",
+    help="Share of answers that each kind of fault damages: 0.02.",
+)
+@click.option("--fault", "single", multiple=True, metavar="KIND=RATE", help="The same for one kind: late=0.02.")
+@click.option("--echo", is_flag=True, help="Act like an adapter that echoes everything it sends.")
+@click.option("--link", type=Place(), help="Keep a symbolic link to the pseudo-terminal at this path.")
+@click.option(
+    "--fifo", type=Whole(1, 256), default=8, show_default=True, help="Characters that a program receives at once."
+)
 @pass_session
 @click.pass_context
 def sim(
