@@ -129,7 +129,7 @@ def test_a_time_out_that_the_drives_own_delay_fills_is_named() -> None:
 
 
 class TestOtherSettings:
-    """A pseudo-terminal carries no parity, and virtual time has none, so what opens the bus stands for the wire here."""
+    """Neither a pseudo-terminal nor virtual time carries parity, so what opens the bus stands for the wire here."""
 
     @staticmethod
     def unit_at(right: Settings, otherwise: dict[str, float]) -> tuple[Callable[..., Bus], list[Settings]]:

@@ -114,6 +114,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
                 "app",
                 "choose",
                 "commands",
+                "listing",
                 "crew",
                 "move",
                 "names",
@@ -133,7 +134,9 @@ def test_the_table_of_commands_names_those_of_each_file() -> None:
             commands = import_module(f"drivebus.cli.{file}").COMMANDS
             assert names == tuple(command.name for command in commands), file
     folder = Path(import_module("drivebus.cli").__path__[0])
-    with_commands = {path.stem for path in folder.glob("*.py") if "\nCOMMANDS = [" in path.read_text(encoding="utf-8")}
+    files = {path.stem: path for path in folder.glob("*.py")}
+    files |= {path.parent.name: path for path in folder.glob("*/__init__.py")}
+    with_commands = {name for name, path in files.items() if "\nCOMMANDS = [" in path.read_text(encoding="utf-8")}
     assert with_commands == {file for files in GROUPS.values() for file in files}
 
 

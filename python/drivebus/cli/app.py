@@ -124,7 +124,7 @@ class _Program(click.Group):
     metavar="PORT",
     envvar="DRIVEBUS_PORT",
     shell_complete=complete_port,
-    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, a line of drivebus.toml, or a simulated drive such as "
+    help="/dev/ttyUSB0, COM3, socket://host:port, tcp://host:502, a line of drivebus.toml, or a simulated drive: "
     "sim://gd350.",
 )
 @click.option(
@@ -184,7 +184,7 @@ class _Program(click.Group):
     metavar="NAME",
     envvar="DRIVEBUS_PROFILE",
     shell_complete=complete_profile,
-    help="Family of the drive, or a folder with a profile. Default: ask the drive.",
+    help=f"Family of the drive ({', '.join(drivebus.profiles())}), or a folder with a profile. Default: ask the drive.",
 )
 @click.option(
     "--trust-profile",

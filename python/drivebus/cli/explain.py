@@ -155,8 +155,8 @@ def _range(row: drivebus.Description) -> str:
 def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     """Explain the present fault, and list the last ones with the values that the drive kept of the latest.
 
-    FAULT is a number, the letters on the keypad (`drivebus faults OL1`), or words (`drivebus faults earth short`). It is
-    explained, and no drive is asked for faults.
+    FAULT is a number, the letters on the keypad (`drivebus faults OL1`), or words (`drivebus faults earth short`). No
+    drive is asked for faults then.
     """
     if everything and text:
         raise click.UsageError("--all lists every fault: leave it out to have one explained")

@@ -30,7 +30,8 @@ __all__ = ["sim"]
     show_default=True,
     metavar="LIST",
     shell_complete=complete_units,
-    help="Drives by unit: 1=gd350,2=vfd500. A folder with a profile of your own: 3=./acme.",
+    help="Drives by unit: 1=gd350,2=vfd500. A folder with a profile of your own: 3=./acme. Families: "
+    f"{', '.join(drivebus.profiles())}.",
 )
 @click.option(
     "--transport",
