@@ -164,7 +164,7 @@ HEADS: list[tuple[Callable[[str], str], str]] = [
     (lambda head: head.replace("format = 1", "format = 2"), "1: the file has format 2"),
     (lambda head: head.replace("format = 1", "format = true"), "1: format must be a number"),
     (lambda head: head.replace("format", "fromat"), 'did you mean "format"?'),
-    (lambda head: head.replace('family = "gd350"\n', ""), "does not say whose it is"),
+    (lambda head: head.replace('family = "gd350"\n', ""), "does not name its drive"),
     (lambda head: head.replace('"gd350"', "350"), "4: family must be a text"),
     (lambda head: head.replace("unit = 1", 'unit = "1"'), "5: unit must be a number"),
     (lambda head: head.replace("unit = 1", "unit = 1\nunit = 2"), "6: unit is given twice"),
@@ -186,7 +186,7 @@ def test_an_unknown_family_names_the_closest(file: Path) -> None:
 
 def test_one_parameter_stands_in_one_line(file: Path) -> None:
     [found] = wrong(file, HEAD + "P00.01 = { value = 2 }\nP00.01 = { value = 1 }\n")
-    assert found.startswith(f"{FIRST + 1}: P00.01 is given twice; it stands in line {FIRST} already")
+    assert found.startswith(f"{FIRST + 1}: P00.01 is given twice; the first is in line {FIRST}")
 
 
 WHOLE = HEAD + "".join(

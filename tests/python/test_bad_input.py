@@ -257,7 +257,11 @@ class TestProfileFolders:
 
 
 @pytest.mark.parametrize(
-    ("code", "says"), [(0x010B, "010BH, which is a gd100"), (0x4242, "4242H, which no list names")]
+    ("code", "says"),
+    [
+        (0x010B, "a gd100, a family without a profile yet; it reports 010BH"),
+        (0x4242, "4242H, which is not a known code"),
+    ],
 )
 def test_a_family_without_a_profile_is_not_taken_for_another(
     virtual: Simulator, virtual_bus: Bus, code: int, says: str

@@ -114,7 +114,7 @@ def test_a_restore_that_is_cut_off_says_what_was_done(
         patch.setattr(drivebus.Bus, "write", deaf)
         result = run(simulator, "restore", file, "--yes")
     assert result.exit_code == 3
-    assert "restored before it: P00.11; restored again, the drive is given only what it still lacks" in result.stderr
+    assert "restored before it: P00.11; a second restore writes only what is still missing" in result.stderr
     simulator.line.clear()
     assert run(simulator, "restore", file, "--yes").exit_code == 0
 
@@ -177,7 +177,7 @@ def interrupt(patch: pytest.MonkeyPatch, what: str, first: int) -> None:
     [
         (["diff"], "Interrupted."),
         pytest.param(["backup", "--force"], "16 of 52 parameters are in ", marks=NOTES),
-        pytest.param(["restore", "--yes"], "restored before it: P00.11; restored again", marks=NOTES),
+        pytest.param(["restore", "--yes"], "restored before it: P00.11; a second restore", marks=NOTES),
     ],
 )
 def test_who_interrupts_is_told_what_was_done(

@@ -52,7 +52,9 @@ def test_a_command_that_was_confirmed_is_done(command: str, monkeypatch: pytest.
     silence(monkeypatch, "status")
     result = run(command)
     assert (result.exit_code, result.stdout) == (0, "")
-    assert f"unit 1: {command} was done, and what it does now could not be read: unit 1, read 2100H" in result.stderr
+    assert (
+        f"unit 1: {command} was done, but the state afterwards could not be read: unit 1, read 2100H" in result.stderr
+    )
 
 
 def test_json_says_that_the_state_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,7 +70,7 @@ def test_a_password_that_locks_the_drive_was_written() -> None:
     result = run("--json", "write", "P00.11=4.0", "P07.00=1234")
     assert result.exit_code == 0, result.stderr
     assert [json.loads(line)["value"] for line in result.stdout.splitlines()] == [None, None]
-    assert "P00.11, P07.00: written, and what is there now could not be read: unit 1 refused" in result.stderr
+    assert "P00.11, P07.00: written, but could not be read back: unit 1 refused" in result.stderr
     assert "password_protected" in result.stderr
 
 
@@ -76,5 +78,5 @@ def test_a_value_that_was_confirmed_is_written(monkeypatch: pytest.MonkeyPatch) 
     silence(monkeypatch, "read")
     result = run("write", "P00.11=4.0", "P00.12=3.0")
     assert result.exit_code == 0
-    assert "P00.11, P00.12: written, and what is there now could not be read: unit 1, read 2100H" in result.stderr
+    assert "P00.11, P00.12: written, but could not be read back: unit 1, read 2100H" in result.stderr
     assert "Acceleration time 1" in result.stdout

@@ -192,7 +192,7 @@ class TestOnATerminal:
 
     def test_a_family_that_proves_little_says_what_shows_more(self) -> None:
         words = ("--port", "sim://vfd500", "--profile", "vfd500", "monitor", "--interval", "0.1")
-        shown = self.watch((80, 24), *words, until="register")
+        shown = self.watch((80, 24), *words, until="more.")
         assert "What is proved for this family does not tell the frequency" in " ".join(shown)
 
 

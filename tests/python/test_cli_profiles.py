@@ -315,7 +315,7 @@ class TestSureness:
 
     def test_info_of_a_drive_that_is_taken_for_another(self) -> None:
         result = at("gd35", "--profile", "gd350", "info")
-        assert (result.exit_code, "named gd350 (INVT Goodrive350), and it says 0108H" in result.stderr) == (0, True)
+        assert (result.exit_code, "named gd350 (INVT Goodrive350), and it reports 0108H" in result.stderr) == (0, True)
 
     def test_status_says_what_it_cannot_tell_and_why(self) -> None:
         [status] = told("vfd500", "--profile", "vfd500", "status")

@@ -56,7 +56,7 @@ def test_a_refusal_that_no_profile_names_is_that_of_the_specification() -> None:
     with drivebus.Bus("sim://1=chf100a?clock=virtual") as bus:
         drive = bus.drive(1, "chf100a")
         with pytest.raises(
-            drivebus.Refused, match=r"02H, illegal_data_address: so in the Modbus specification"
+            drivebus.Refused, match=r"02H, illegal_data_address: as in the Modbus specification"
         ) as error:
             drive.read_words(0x2100)
     assert (error.value.code, error.value.name) == (2, "illegal_data_address")

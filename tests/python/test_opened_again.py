@@ -55,7 +55,9 @@ def test_a_refusal_that_passes_makes_it_no_other_drive(
     assert virtual_bus.reconnects == 1
     refusal = bytes([1, 0x83, exception])
     line.line.answer_with(refusal + drivebus.crc16(refusal).to_bytes(2, "little"))
-    with pytest.raises(drivebus.NotAllowed, match=rf"did not say what it is.*refused with exception {exception:02X}H"):
+    with pytest.raises(
+        drivebus.NotAllowed, match=rf"has not identified itself.*refused with exception {exception:02X}H"
+    ):
         virtual_drive.write("P00.11", 2.0)
     assert line.drive(1).writes() == []
     virtual_drive.write("P00.11", 2.0)

@@ -388,7 +388,7 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("targets", "keywords", "message"),
         [
-            ({}, {}, "there is nobody to poll"),
+            ({}, {}, "nothing to poll"),
             (None, {}, "poll\\(\\) takes {drive: names"),
             ({"drive": ["output_curent"]}, {}, "output_current"),
             ({"drive": []}, {}, "nothing is asked of unit 1"),

@@ -60,7 +60,7 @@ def test_a_path_and_a_path_object() -> None:
 @pty_only
 def test_an_open_serial_port_keeps_its_own_settings() -> None:
     with (
-        Simulator({1: "gd350"}) as simulator,
+        Simulator({1: "gd350"}, baudrate=9600) as simulator,
         serial.Serial(simulator.port, 9600, timeout=0) as port,
         Bus(port) as bus,
     ):

@@ -110,7 +110,7 @@ def test_a_block_that_fails_raises_that_all_the_same(simulator: Simulator, block
     with pytest.raises(ValueError, match="inside") as failure:
         block(simulator, fail, {"wait": True, "timeout": 0.01})
     if hasattr(failure.value, "__notes__"):
-        assert "unit 1 was told to stop, but was not seen to stand" in notes(failure.value)
+        assert "unit 1 was told to stop, but was not seen at rest" in notes(failure.value)
         assert "it did not stop within 0.01 s; it is forward" in notes(failure.value)
 
 
@@ -133,7 +133,7 @@ def test_a_line_that_fails_meanwhile_leaves_a_motor_that_was_told_to_stop(
         block(simulator, lambda: None, {"wait": True})
     assert told(simulator) == [FORWARD, STOP]
     if hasattr(failure.value, "__notes__"):
-        assert notes(failure.value) == "unit 1 was told to stop, but was not seen to stand"
+        assert notes(failure.value) == "unit 1 was told to stop, but was not seen at rest"
 
 
 @pytest.mark.parametrize("keywords", [{"wait": 1}, {"wait": True, "timeout": -1.0}, {"wait": True, "timeout": "long"}])

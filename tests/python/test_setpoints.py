@@ -182,7 +182,7 @@ class TestWhatTheDriveHeeds:
     def test_a_setpoint_that_would_be_ignored_is_not_sent(
         self, simulator: Simulator, drive: Drive, name: str, source: str, number: int, register: int
     ) -> None:
-        with pytest.raises(NotAllowed, match=rf'would not heed.*\n{source}.*needs {number}.*\n.*setpoint="{name}"'):
+        with pytest.raises(NotAllowed, match=rf'would ignore.*\n{source}.*needs {number}.*\n.*setpoint="{name}"'):
             setattr(drive, name, 50.0)
         assert taken(simulator) == []
         assert not drive.check_control(name)
@@ -275,7 +275,7 @@ def test_the_awaitable_face_has_the_same(simulator: Simulator) -> None:
                 await getattr(drive, f"set_{name}")(value)
                 assert await getattr(drive, name) == value
                 assert taken(simulator) == [(address, word)]
-            with pytest.raises(NotAllowed, match="would not heed"):
+            with pytest.raises(NotAllowed, match="would ignore"):
                 await drive.set_pid(50.0)
             await drive.set_virtual_outputs(Y1=True)
             assert (await drive.inputs())["S1"] is False

@@ -134,9 +134,9 @@ def test_the_table_of_commands_names_those_of_each_file() -> None:
             commands = import_module(f"drivebus.cli.{file}").COMMANDS
             assert names == tuple(command.name for command in commands), file
     folder = Path(import_module("drivebus.cli").__path__[0])
-    files = {path.stem: path for path in folder.glob("*.py")}
-    files |= {path.parent.name: path for path in folder.glob("*/__init__.py")}
-    with_commands = {name for name, path in files.items() if "\nCOMMANDS = [" in path.read_text(encoding="utf-8")}
+    places = {path.stem: path for path in folder.glob("*.py")}
+    places |= {path.parent.name: path for path in folder.glob("*/__init__.py")}
+    with_commands = {name for name, path in places.items() if "\nCOMMANDS = [" in path.read_text(encoding="utf-8")}
     assert with_commands == {file for files in GROUPS.values() for file in files}
 
 

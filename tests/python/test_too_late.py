@@ -99,7 +99,7 @@ first_of_all = callbacks.append
 def test_a_block_that_begins_later_is_refused(where: str) -> None:
     body = REGISTERED_FIRST + ONE_BEFORE + AFTER[where]
     with line("native") as there, there.start(body) as program:
-        assert program.ends() == (0, ["the program ends"], "")
+        assert program.ends() == (0, ["the program is ending, and nobody could stop the motor"], "")
         assert there.commands() == [FORWARD, STOP], "of the block before"
 
 

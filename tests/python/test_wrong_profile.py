@@ -117,7 +117,7 @@ def test_what_is_contradicted_gets_nothing(named: str, unit: str) -> None:
         for said in (f"unit 1 was named {named}", "nothing was written", "trust_profile=True", "--trust-profile"):
             assert said in told
         if unit in SAYS:
-            assert f"it says {SAYS[unit]}" in told
+            assert f"it reports {SAYS[unit]}" in told
             assert f'profile="{unit}"' in told
             assert Profile.builtin(unit).title.removeprefix("INVT ") in told
         assert drive.contradiction() is not None
@@ -176,7 +176,7 @@ def test_nothing_that_moves_or_changes_anything_goes_out(write: Callable[[Drive]
     with line_with("gd300") as simulator, Bus(simulator) as bus:
         bus.drive(1, "gd300", unverified=True).prepare_control()
         before = len(written(simulator))
-        with pytest.raises(NotAllowed, match="says 010AH"):
+        with pytest.raises(NotAllowed, match="reports 010AH"):
             write(bus.drive(1, "gd350", unverified=True))
         assert len(written(simulator)) == before
 
@@ -200,7 +200,7 @@ def test_a_fault_is_reset_all_the_same(gd300: tuple[Simulator, Bus]) -> None:
     drive.reset_fault()
     assert [frame[:6].hex(" ") for frame in written(simulator)[before:]] == ["01 06 20 00 00 07"]
     # That it was asked for the reset does not count as having been judged.
-    with pytest.raises(NotAllowed, match="says 010AH"):
+    with pytest.raises(NotAllowed, match="reports 010AH"):
         drive.write("P00.11", 2.0)
 
 
@@ -257,7 +257,7 @@ class TestWhatTellsNothing:
         drive = bus.drive(1, "gd350")
         refuse(simulator, 0x09)
         drive.write_words(0x000B, 20)
-        with pytest.raises(NotAllowed, match="says 010AH"):
+        with pytest.raises(NotAllowed, match="reports 010AH"):
             drive.write_words(0x000B, 30)
         assert len(written(simulator)) == 1
 
@@ -268,7 +268,7 @@ class TestWhatTellsNothing:
         drive = bus.drive(1, "gd350")
         refuse(simulator, exception)
         drive.write_words(0x000B, 20)
-        with pytest.raises(NotAllowed, match="says 010AH"):
+        with pytest.raises(NotAllowed, match="reports 010AH"):
             drive.write_words(0x000B, 30)
         assert len(written(simulator)) == 1
 
@@ -306,7 +306,7 @@ class TestWhatTellsNothing:
         drive.write_words(0x000B, 20)
         assert len(written(simulator)) == 1
         # It did not tell then, and is asked the next time.
-        with pytest.raises(NotAllowed, match="says 010AH"):
+        with pytest.raises(NotAllowed, match="reports 010AH"):
             drive.write_words(0x000B, 30)
         assert len(written(simulator)) == 1
 
@@ -315,10 +315,10 @@ class TestWhatTells:
     @pytest.mark.parametrize(
         ("word", "said"),
         [
-            (0x01A0, r"01A0H, which is a Goodrive350 \(gd350\).*profile=\"gd350\""),
+            (0x01A0, r"01A0H, the code of Goodrive350 \(gd350\).*profile=\"gd350\""),
             # From a GD200L manual, and from programs: a family without a profile.
-            (0x010C, r"010CH, which is a Goodrive200, 200A or 200L \(gd200\).*no profile of it"),
-            (0x010D, r"010DH, which is a Goodrive10 mini \(gd10\).*no profile of it"),
+            (0x010C, r"010CH, the code of Goodrive200, 200A or 200L \(gd200\).*no profile of it"),
+            (0x010D, r"010DH, the code of Goodrive10 mini \(gd10\).*no profile of it"),
         ],
     )
     @pytest.mark.parametrize("named", ["gd35", "gd600", "vfd500"])
@@ -379,7 +379,7 @@ class TestProfilesOfOnesOwn:
         folder = self.new(tmp_path / "ours", "--overlay", "gd300")
         assert self.contradiction("gd300", folder) is None
         assert "010AH" not in str(self.contradiction("gd350", folder))
-        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+        assert "reports 01A0H" in str(self.contradiction("gd350", folder))
         assert "refuses 2103H" in str(self.contradiction("gd600", folder))
 
     def test_one_that_extends_another_counts_as_that(self, tmp_path: Path) -> None:
@@ -387,7 +387,7 @@ class TestProfilesOfOnesOwn:
         folder = self.new(tmp_path / "ours", "--like", "gd300")
         assert Profile.load(folder).family == "ours"
         assert self.contradiction("gd300", folder) is None
-        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+        assert "reports 01A0H" in str(self.contradiction("gd350", folder))
         assert self.contradiction("gd600", folder) is None
 
     def test_one_that_extends_another_and_has_a_code_is_known_by_that(self, tmp_path: Path) -> None:
@@ -397,7 +397,7 @@ class TestProfilesOfOnesOwn:
                 '\n[[identification.codes]]\ncode = 0x0199\nfamily = "ours"\ntitle = "Ours"\nverified = true\n'
                 'source = "Our manual"\n'
             )
-        assert "says 010AH" in str(self.contradiction("gd300", folder))
+        assert "reports 010AH" in str(self.contradiction("gd300", folder))
         assert "refuses 2103H" in str(self.contradiction("gd600", folder))
 
     @pytest.mark.parametrize("options", [("--like", "gd350"), ("--overlay", "gd350")])
@@ -422,12 +422,12 @@ class TestProfilesOfOnesOwn:
         folder = self.new(tmp_path / "ours", "--overlay", "vfd500")
         assert self.contradiction("vfd500", folder) is None
         assert "refuses 1900H" in str(self.contradiction("gd600", folder))
-        assert "says 01A0H" in str(self.contradiction("gd350", folder))
+        assert "reports 01A0H" in str(self.contradiction("gd350", folder))
 
     def test_one_with_codes_of_its_own_is_judged_by_them(self) -> None:
         """The EX-9 of the test vectors says 0900H or 0901H at 2103H."""
         ex9 = Path(__file__).resolve().parent.parent / "vectors/profiles/ex9"
-        assert "says 01A0H" in str(self.contradiction("gd350", ex9))
+        assert "reports 01A0H" in str(self.contradiction("gd350", ex9))
         assert "refuses 2103H" in str(self.contradiction("gd600", ex9))
         with line_with("gd350") as simulator, Bus(simulator) as bus:
             bus.echo(1)
@@ -476,8 +476,8 @@ class TestCommandLine:
     def test_info_says_it(self) -> None:
         result = at("gd300", "--profile", "gd350", "info")
         assert result.exit_code == 0
-        assert re.search(r"named gd350.*says 010AH", result.stderr)
+        assert re.search(r"named gd350.*reports 010AH", result.stderr)
         said = at("gd300", "--profile", "gd350", "--json", "info").stdout.splitlines()[0]
-        assert "says 010AH" in json.loads(said)["contradiction"]
+        assert "reports 010AH" in json.loads(said)["contradiction"]
         said = at("gd300", "--json", "info").stdout.splitlines()[0]
         assert json.loads(said)["contradiction"] is None

@@ -218,7 +218,7 @@ def _check_head(file: _File) -> None:
         what = "no line `format = 1`: it is not a backup" if given is None else f"format {given}, which is not known"
         file.lack(f"the file has {what}")
     if "family" not in file.drive and "family" not in file.tried:
-        file.lack('the file does not say whose it is: [drive] lacks a line such as family = "gd350"')
+        file.lack('the file does not name its drive: [drive] lacks a line such as family = "gd350"')
 
 
 def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str, int]]:
@@ -230,7 +230,7 @@ def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str
         try:
             meant, was = word(profile, code, value)
             if code in lines:
-                raise Wrong(f"{code} is given twice; it stands in line {lines[code]} already")
+                raise Wrong(f"{code} is given twice; the first is in line {lines[code]}")
             raw[code], lines[code] = meant, number
             if was is not None:
                 told[code] = was

@@ -271,7 +271,7 @@ class Restore:
         restored = [code for code, (result, _) in self._results.items() if result == "restored"]
         if hasattr(error, "add_note"):
             done = f"restored before it: {', '.join(restored)}" if restored else "nothing was restored before it"
-            error.add_note(f"{done}; restored again, the drive is given only what it still lacks")
+            error.add_note(f"{done}; a second restore writes only what is still missing")
 
     def _item(self, code: str) -> Restored:
         result, reason = self._results[code]
@@ -293,12 +293,12 @@ def _by_way_of(codes: Sequence[str]) -> str:
         return ""
     return (
         f"; what the drive has is beyond its own limits, and only another value of {' and '.join(codes)} leads there, "
-        "on the way. Its family has no known write to RAM alone: with twice=True (`--twice`) memory is written twice"
+        "on the way. Its family has no known write to RAM alone: twice=True (`--twice`) writes the memory twice"
     )
 
 
 def _unproved(reason: str) -> str:
     return (
         f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With unverified=True "
-        "(`--unverified`) it is written all the same"
+        "(`--unverified`) it is written nevertheless"
     )

@@ -58,7 +58,7 @@ class Rules:
         if known.access == "ro":
             return "it can only be read"
         if code in self._acts:
-            return "writing it does something, and what it reads as need not be what was written"
+            return "writing it triggers an action, and it may read differently from what was written"
         return None
 
     def unasked(self, code: str, *, serial: bool, motor: bool) -> str | None:

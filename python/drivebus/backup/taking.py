@@ -154,7 +154,7 @@ def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
         before = Backup.load(part, unit.profile)
     except NotAllowed as error:
         raise NotAllowed(
-            f"{error}\nThat is what an interrupted backup left; with resume=False (`--fresh`) it is begun anew",
+            f"{error}\nThat is what an interrupted backup left; with resume=False (`--fresh`) it starts again",
             unit=unit.address,
         ) from None
     others = before.origin.other(origin, unit=True)
@@ -163,7 +163,7 @@ def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
     if others:
         raise NotAllowed(
             f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With "
-            "resume=False (`--fresh`) it is begun anew",
+            "resume=False (`--fresh`) it starts again",
             unit=unit.address,
         )
     return before

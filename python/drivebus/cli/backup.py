@@ -212,7 +212,9 @@ def _question(drive: drivebus.Drive, codes: list[str]) -> str:
     text = f"This writes {len(codes)} parameter{'' if len(codes) == 1 else 's'} to the drive's memory"
     sources = [item["code"] for item in drive.profile.control() if item["code"] in codes]
     if sources:
-        text += f", and with {', '.join(sources)} where it takes commands from: one that is told to run there may start"
+        text += (
+            f", and with {', '.join(sources)} where it takes commands from: a drive that is told to run there may start"
+        )
     try:
         drive.state()
     except drivebus.NotAllowed:

@@ -117,8 +117,8 @@ _ALWAYS = ("registers", "monitor", "parameters", "all")
 
 def _show_groups(session: Session, profile: drivebus.Profile, rows: list[drivebus.Description]) -> None:
     registers = [row for row in rows if row.kind == "register"]
-    listed = [["registers", len(registers), "what exists for the bus only"]]
-    listed.append(["monitor", len(profile.monitor_names()), "what `drivebus monitor` shows by itself"])
+    listed = [["registers", len(registers), "registers that only the bus has"]]
+    listed.append(["monitor", len(profile.monitor_names()), "what `drivebus monitor` shows by default"])
     for name in _groups(rows):
         members = [row for row in rows if row.group == name]
         listed.append(
@@ -181,7 +181,7 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
             out.record({"when": when, **dict(zip(_COLUMNS, _row(fault), strict=True)), "values": dict(fault.values)})
         return
     if reason is not None:
-        out.say(f"Whether there is a fault now is not told: {reason}")
+        out.say(f"The present fault is not known: {reason}")
     else:
         out.say("No fault now." if present is None else f"Now: {present}")
     if present is not None:

@@ -102,7 +102,7 @@ def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> 
     known = [names.named(profile, text) for text in wanted] or usual
     if not known:
         raise drivebus.NotAllowed(
-            f"nothing that is known of {profile.title} may be watched without --unverified; name what you want to see"
+            f"no register of {profile.title} may be watched without --unverified; name the registers you want to see"
         )
     rows = {name: drive.describe(name) for name in known}
     hint = ""

@@ -156,7 +156,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
                 raise drivebus.NotAllowed(f"{known.code or known.name} is given twice; nothing was sent")
             wanted[known.name] = names.without_unit(value, known.unit)
         if words:
-            session.ask(f"This writes {', '.join(assignments)}, not knowing what that does", yes)
+            session.ask(f"This writes {', '.join(assignments)}, without knowing what that does", yes)
         else:
             session.ask_if_running(drive, f"this writes {', '.join(assignments)}", yes)
         parameters = [name for name in wanted if drive.describe(name).kind == "parameter"] if store else []
@@ -195,7 +195,7 @@ def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, A
             del missing[0]
     except drivebus.DrivebusError as error:
         lost = ", ".join(described[name].code or name for name in missing)
-        _say_lost(f"{lost}: written, and what is there now could not be read: {error}")
+        _say_lost(f"{lost}: written, but could not be read back: {error}")
     return now
 
 
@@ -253,7 +253,7 @@ def _done(session: Session, drive: drivebus.Drive, command: str, towards: State 
         status = drive.status()
     except drivebus.DrivebusError as error:
         whose = "" if session.crew else f"{session.called}: "
-        _say_lost(f"{whose}{command} was done, and what it does now could not be read: {error}")
+        _say_lost(f"{whose}{command} was done, but the state afterwards could not be read: {error}")
     if session.out.as_json:
         told = ("state", "frequency", "setpoint", "fault")
         session.out.record(

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -35,8 +35,8 @@ _PIPE_WIDTH = 200
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
-_NO_LIMIT = 10_000
-"""Characters that no line has."""
+_BETWEEN = 2
+"""Blanks between two columns of a table."""
 
 
 class Output:
@@ -132,13 +132,11 @@ class Output:
             for row in rows:
                 self.record(dict(zip(columns, row, strict=True)))
             return
-        from rich.measure import Measurement
-
         kept = list(rows)
         table = self.table(columns, kept)
         # A name that is cut cannot be typed, and a word broken in the middle not be read.
-        unlimited = self.console.options.update(max_width=_NO_LIMIT)
-        if kept and Measurement.get(self.console, unlimited, table).minimum > self.console.width:
+        narrowest = sum(column.min_width or 0 for column in table.columns) + _BETWEEN * (len(columns) - 1)
+        if kept and narrowest > self.console.width:
             for row in kept:
                 self.console.print()
                 self.facts(dict(zip(columns, row, strict=True)))
@@ -164,7 +162,14 @@ class Output:
         table = Table(box=None, header_style="bold", pad_edge=False)
         for index, name in enumerate(columns):
             numeric = bool(kept) and all(_is_number(row[index]) for row in kept)
-            table.add_column(name.replace("_", " "), justify="right" if numeric else "left", overflow="fold")
+            title = name.replace("_", " ")
+            texts = [title, *(str(row[index]) for row in kept)]
+            words = [word for text in texts for word in text.split()]
+            longest = max(map(len, words), default=0)
+            # Where a table is too wide, rich makes every column narrower that may be, and breaks words for it.
+            whole = all(len(text.split()) < 2 for text in texts)
+            justify: Literal["left", "right"] = "right" if numeric else "left"
+            table.add_column(title, justify=justify, overflow="fold", min_width=longest, no_wrap=whole)
         for row in kept:
             table.add_row(*(show(cell) for cell in row))
         return table

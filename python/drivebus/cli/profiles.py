@@ -89,7 +89,7 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
             session.out.say(_placed(problem))
     if problems:
         some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        remark(f"Error: {folder} has {some}; nothing of it is used until it has none.")
+        remark(f"Error: {folder} has {some}; it is not used until they are mended.")
         context.exit(2)
     counts = drivebus.Profile.load(folder).counts()
     totals = {kind: counts[kind]["total"] for kind in KINDS}
@@ -114,7 +114,7 @@ def _placed(problem: dict[str, Any]) -> str:
 def new(session: Session, folder: Path, like: str | None, overlay: str | None) -> None:
     """Start a profile: write its files, with comments that explain them. Nothing is overwritten."""
     if like is not None and overlay is not None:
-        raise click.UsageError("--like or --overlay: a profile stands beside another, or over it")
+        raise click.UsageError("give --like or --overlay, not both: a profile is either a copy or an overlay")
     base = like or overlay
     if base is not None:
         drivebus.Profile.builtin(base)

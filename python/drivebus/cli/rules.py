@@ -108,14 +108,14 @@ def _identification(profile: drivebus.Profile) -> list[str]:
             for key, what in (("answers", "answers"), ("refuses", "refuses"))
             if signature[key]
         ]
-        lines.append(f"told by what it does with reads: {'; '.join(told)}")
-    return lines or ["it does not say what it is; give --profile"]
+        lines.append(f"identified by how it answers reads: {'; '.join(told)}")
+    return lines or ["it has no identification; give --profile"]
 
 
 def _commands(profile: drivebus.Profile) -> list[str]:
     codes = profile.command_codes()
     if profile.command_address is None or not codes:
-        return ["none known: it cannot be run or stopped over the bus"]
+        return ["none known: it cannot be started or stopped over the bus"]
     reasons = _reasons(profile)
     by_code = {code: name for name, code in profile.commands().items()}
     lines = [f"written to {profile.command_address:04X}H"]

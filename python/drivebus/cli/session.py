@@ -168,9 +168,9 @@ class Session:
         except drivebus.DrivebusError:
             typed = replace(self, profile="FAMILY").command(command)
             remark(
-                f"{self.called} was not told to {command}: the code for that depends on the family, and it did not say "
-                f"which it is. If you know: `{typed}`, which asks it nothing first; families: "
-                f"{', '.join(drivebus.profiles())}. If it has to stand now, use the emergency stop."
+                f"{self.called} was not told to {command}: the code depends on the family, and the unit did not say "
+                f"which it is. If you know it: `{typed}`, which asks nothing first. Families: "
+                f"{', '.join(drivebus.profiles())}. If it must stop now, use the emergency stop."
             )
             raise
         do(drive)
@@ -194,7 +194,7 @@ class Session:
         if not self.read_only:
             return
         name = click.get_current_context().info_name
-        halt = " If it has to stand now, use the emergency stop." if name in ("stop", "coast") else ""
+        halt = " If it must stop now, use the emergency stop." if name in ("stop", "coast") else ""
         raise drivebus.NotAllowed(
             f"`{name}` writes to the drive, and --read-only says that nothing may; nothing was sent. Say it without "
             f"that switch; where the environment has it, with DRIVEBUS_READ_ONLY=0.{halt}"
@@ -206,7 +206,9 @@ class Session:
             profile = drivebus.Profile.find(self.profile)
             return profile.with_variants(self.variants) if self.variants else profile
         if self.port is None:
-            raise click.UsageError("no drive to ask what it is: give --profile NAME (`drivebus profiles`), or --port")
+            raise click.UsageError(
+                "the family is not known: give --profile NAME (`drivebus profiles`), or --port to ask a drive"
+            )
         with self.drive() as drive:
             return drive.profile
 
@@ -256,7 +258,7 @@ class Session:
         try:
             state = drive.state()
         except drivebus.NotAllowed:
-            self.ask(f"Whether the motor turns is not known; {what}", yes)
+            self.ask(f"It is not known whether the motor turns; {what}", yes)
             return
         if not state.at_rest:
             self.ask(f"The motor turns; {what}", yes)

@@ -53,7 +53,7 @@ def _latency_timer(timer: int, rule: str | None) -> Finding:
         "adapter",
         "latency_timer",
         Severity.WARNING,
-        f"the adapter keeps what it receives for up to {timer} ms, so every answer comes up to that much later",
+        f"the adapter holds received characters back for up to {timer} ms, so each answer comes up to that much later",
         f"allow 1 ms for good: write {rule} into /etc/udev/rules.d/99-low-latency.rules and plug it in again",
         values=values,
         error=PortError,

@@ -90,7 +90,7 @@ class DriveExamination:
             "unit",
             "fault",
             Severity.WARNING if is_ours else Severity.NOTE,
-            f"unit {self.drive.unit} stands in fault {fault}",
+            f"unit {self.drive.unit} is in fault {fault}",
             fault.remedy or ("the bus was silent for longer than P14.04" if is_ours else ""),
             unit=self.drive.unit,
             error=NoAnswer if is_ours else None,
@@ -100,7 +100,7 @@ class DriveExamination:
         unit = self.drive.unit
         control = self.drive.check_control()
         if not len(control):
-            text = f"what makes unit {unit} obey the bus is not known of {self.drive.profile.title}"
+            text = f"it is not known how {self.drive.profile.title} (unit {unit}) is set to obey the bus"
             return Finding("unit", "control", Severity.NOTE, text, unit=unit)
         if control:
             return Finding("unit", "control", Severity.OK, f"unit {unit} is set to obey the bus", unit=unit)

@@ -142,7 +142,7 @@ class Echoes:
         return self._finding(
             "bad_answers",
             self._severity,
-            f"{self.bad} of {self.asked} echoes of unit {self.unit} brought something else, the last: {self.last}",
+            f"{self.bad} of {self.asked} echoes of unit {self.unit} had a wrong answer; the last: {self.last}",
             "another master on the line, a gateway that mixes answers up, or two units with one address",
             error=BadAnswer,
         )

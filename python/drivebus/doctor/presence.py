@@ -87,7 +87,7 @@ def nobody(given: Settings, unit: int | None, asked: Sequence[int], tried: int, 
             "unit",
             "garbled",
             Severity.FAULT,
-            f"{who} gave no right answer {where}, but {noise} bytes came that are none",
+            f"{who} gave no valid answer {where}, but {noise} bytes came that belong to none",
             "a baud rate or parity that was not tried (--full tries all), + and - swapped, or no termination: compare "
             "P14.01 and P14.02 on the keypad, swap the two wires, look for a second unit with this address, "
             "then try with one unit on a short cable",
@@ -99,7 +99,7 @@ def nobody(given: Settings, unit: int | None, asked: Sequence[int], tried: int, 
         "unit",
         "nobody_answers",
         Severity.FAULT,
-        f"{who} said nothing {where}",
+        f"{who} did not answer {where}",
         "check the unit's power, that + goes to + and - to -, the common wire, its address (INVT: P14.00), its baud "
         "rate and format (P14.01, P14.02)"
         + ("" if unit is None else "; leave --unit out to look for others")

@@ -64,18 +64,18 @@ def _not_sure(found: Identification) -> NotAllowed:
     """Why no profile is taken by *found*, and how to name one."""
     known = shipped(found.candidates)
     if found.candidates and not known:
-        what = f"it says {found.code:04X}H, which is a {found.candidates[0]}, a family without a profile yet"
+        what = f"it may be a {found.candidates[0]}, a family without a profile yet; "
     elif found.candidates:
-        what = f"it may be {one_of(found.candidates)}"
+        what = f"it may be {one_of(found.candidates)}; "
     else:
-        what = "what it is, is not known"
+        what = ""
     with_one = (
         ", or unverified=True (`--unverified`) to take it for that" if len(found.candidates) == len(known) == 1 else ""
     )
     like = known[0] if len(known) == 1 else f"one of {', '.join(known or profiles())}"
     return NotAllowed(
-        f"unit {found.unit} is not surely of one family: {what} ({found.certainty}: {found.reason}). The registers "
-        f"and command codes of another family may differ; if you know that it behaves like {like}, "
+        f"unit {found.unit} answers, but could not be identified for sure: {what}{found.reason} ({found.certainty}). "
+        f"Registers and command codes differ between families; if you know that it behaves like {like}, "
         f"give profile=… (`--profile`){with_one}",
         unit=found.unit,
     )

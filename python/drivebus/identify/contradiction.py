@@ -53,7 +53,7 @@ def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
         then = "there is no profile of it yet"
     if profile.name not in profiles():
         then += f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
-    return f"it says {answer.word:04X}H, which is a {one_of([*titles, *also])}: {then}"
+    return f"it reports {answer.word:04X}H, the code of {one_of([*titles, *also])}: {then}"
 
 
 def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:

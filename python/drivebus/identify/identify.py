@@ -46,10 +46,10 @@ async def identify(read: Read, unit: int) -> Identification:
         rows = codes.listed_at(address, code)
         if rows:
             return await _as_it_behaves(read, _by_code(unit, code, rows), address)
-        told.append(f"it says {code:04X}H, which no list names")
+        told.append(f"it reports {code:04X}H, which is not a known code")
     candidates = await _by_answers(read, unit, answered)
     if not candidates:
-        reason = f"{'; '.join(told)}, and answers like no family that is known by its answers"
+        reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
     seen = ", ".join(f"{address:04X}H {'answered' if yes else 'refused'}" for address, yes in sorted(answered.items()))
     return Identification(
@@ -59,7 +59,7 @@ async def identify(read: Read, unit: int) -> Identification:
         code,
         one_of(Profile.builtin(name).title for name in candidates),
         "by answers",
-        f"it gives no code that is known, and answers as such a unit does: {seen}",
+        f"it has no known code, and answers like such a unit: {seen}",
     )
 
 
@@ -68,11 +68,11 @@ def _by_code(unit: int, code: int, rows: list[codes.Row]) -> Identification:
     families = tuple(codes.families_in(rows))
     title = one_of(name for row in rows for name in (row["title"], *(row.get("shared") or ())))
     printed = next((row for row in rows if row["verified"]), None)
-    says = f"it says {code:04X}H"
+    says = f"it reports {code:04X}H"
     if printed is None:
         certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0]['source']}"
     elif len(families) > 1:
-        certainty, reason = "shared", f"{says}, which {all_of(families)} report alike"
+        certainty, reason = "shared", f"{says}, which {all_of(families)} share"
     else:
         certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
     return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
@@ -101,8 +101,8 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
             return found
         against = f"says {word} at"
     reason = (
-        f"{found.reason}; but it {against} {about.address:04X}H, where each of those tells its state: "
-        f"something else may stand at {place:04X}H"
+        f"{found.reason}; but it {against} {about.address:04X}H, where such a drive has its state: "
+        f"{place:04X}H may have another meaning"
     )
     return replace(found, certainty="unverified", reason=reason)
 

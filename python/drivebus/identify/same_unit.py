@@ -99,15 +99,15 @@ class SameUnit:
 
     def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
         """Raises where the unit does not say what is *known* of it any more."""
-        unsaid = f"the port was opened again, and unit {self._unit} did not say what it is before anything is written"
+        unsaid = f"the port was opened again, and unit {self._unit} has not identified itself since"
         if failure is not None:
             # `started` stays None: of what was to follow, nothing left.
             raise type(failure)(
-                f"{unsaid} to it ({failure}); nothing was written", unit=self._unit, raw=failure.raw
+                f"{unsaid} ({failure}); nothing was written", unit=self._unit, raw=failure.raw
             ) from failure
         told = self._told(answers)
         if self._put_off(answers):
-            raise NotAllowed(f"{unsaid} to it ({told}); nothing was written", unit=self._unit)
+            raise NotAllowed(f"{unsaid} ({told}); nothing was written", unit=self._unit)
         if told != known:
             raise NotAllowed(
                 f"another drive answers as unit {self._unit} since the port was opened again: its identification was "

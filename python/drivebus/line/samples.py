@@ -298,7 +298,7 @@ def _targets(bus: object, wanted: object) -> tuple[Target, ...]:
     if not isinstance(wanted, Mapping):
         raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}, and not {checks.shown(wanted)}")
     if not wanted:
-        raise NotAllowed("there is nobody to poll: give {drive: names, …}, such as {drive: None}")
+        raise NotAllowed("nothing to poll: give {drive: names, …}, such as {drive: None}")
     targets = tuple(_target(bus, key, names) for key, names in wanted.items())
     units = [target.unit for target in targets]
     twice = next((unit for unit in units if units.count(unit) > 1), None)

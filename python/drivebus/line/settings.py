@@ -79,7 +79,7 @@ class Opening:
 def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
-        raise NotAllowed("trust_profile is for a profile that is named, and none is: give profile=… (`--profile`)")
+        raise NotAllowed("trust_profile needs a profile: give profile=… (`--profile`) too")
 
 
 def _check_together(port: object, keywords: Mapping[str, Any]) -> None:

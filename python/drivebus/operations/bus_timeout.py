@@ -51,7 +51,7 @@ class BusTimeout:
         if drive.profile.memory() is None:
             raise NotAllowed(
                 f"no way to write {settings.timeout} of {drive.profile.title} to RAM alone is known, and a watchdog "
-                "that wears EEPROM each time is none; nothing was sent. Set the time-out in the drive, for good",
+                "must not wear the EEPROM each time; nothing was sent. Set the time-out in the drive, for good",
                 unit=drive.address,
             )
         if not (settings.verified or drive.unverified):

@@ -78,8 +78,8 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
     control = await _check_items(unit, unit.profile.needs(setpoint))
     if not control:
         raise NotAllowed(
-            f"unit {unit.address} would not heed its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
-            f'sent. prepare_control(setpoint="{setpoint}") sets what is needed; write("{register}", …) writes it '
+            f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
+            f'sent. prepare_control(setpoint="{setpoint}") sets it so; write("{register}", …) writes it '
             "all the same",
             unit=unit.address,
         )

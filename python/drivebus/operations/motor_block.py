@@ -123,7 +123,7 @@ class MotorBlock:
 
     @property
     def _unseen(self) -> str:
-        return f"unit {self._unit.address} was told to stop, but was not seen to stand"
+        return f"unit {self._unit.address} was told to stop, but was not seen at rest"
 
     def _keeping_interruptions(self) -> AbstractContextManager[object]:
         before = self._unit.memory.halts

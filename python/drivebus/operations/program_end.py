@@ -172,7 +172,9 @@ def end_over(line: object) -> None:
 
 
 def _too_late() -> NotAllowed:
-    return NotAllowed("the program ends: nothing starts any more, for nobody would stop it. Nothing was sent")
+    return NotAllowed(
+        "the program is ending, and nobody could stop the motor: nothing starts any more. Nothing was sent"
+    )
 
 
 def _in_main_thread() -> bool:

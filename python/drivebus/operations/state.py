@@ -260,7 +260,7 @@ def state_word(unit: Unit, what: str) -> str:
     name = unit.profile.role("state")
     if reason is None and name is not None:
         return name
-    needs = f"{what} needs a state word, and that of {unit.profile.title} may not be used"
+    needs = f"{what} needs a state word, and the one of {unit.profile.title} may not be used"
     raise unit.evidence.missing(needs, reason or "", Evidence.without_state)
 
 

@@ -102,7 +102,7 @@ def explained(unit: Unit) -> Iterator[None]:
         name, meaning = unit.profile.exception(error.code)
         if name == _UNKNOWN and error.name != _NOWHERE:
             name = error.name
-            meaning = f"so in the Modbus specification; what a {unit.profile.title} means by it is not known"
+            meaning = f"as in the Modbus specification; its meaning to {unit.profile.title} is not known"
         raise Refused(
             f"unit {unit.address} refused {_asked(error.request)}: exception {error.code:02X}H, {name}: {meaning}"
             f"{_about_password(unit, name)}",

@@ -25,7 +25,7 @@ def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
     """The error for *what* of *unit*, which is not verified for the *reason* that the profile gives."""
     return NotAllowed(
         f"{what} is not verified: {_sentence(reason)} Nothing was sent to unit {unit}; with unverified=True "
-        "(`--unverified`) it is done all the same",
+        "(`--unverified`) it is done nevertheless",
         unit=unit,
     )
 
@@ -137,7 +137,7 @@ class Evidence:
     def missing(self, what: str, reason: str, better: Callable[[Evidence], str | None]) -> NotAllowed:
         """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
         helps = better(self.trusting(True)) is None
-        hint = "; with unverified=True (`--unverified`) what is assumed of it is used" if helps else ""
+        hint = "; unverified=True (`--unverified`) uses what is assumed" if helps else ""
         return NotAllowed(f"{what}: {_sentence(reason)} Nothing was sent to unit {self.unit}{hint}", unit=self.unit)
 
     def allows(self, reason: str | None) -> bool:

@@ -19,7 +19,7 @@ pub(crate) fn note() -> Option<String> {
     REFUSED.get().cloned().flatten()
 }
 
-/// A wait of this thread, for which it has the least timer slack. Afterwards it has back what it had: threads and
+/// A wait of this thread, for which it has the least timer slack. Afterwards its earlier settings are restored: threads and
 /// programs that it starts inherit its slack, and keep it for good.
 #[derive(Debug)]
 pub(crate) struct Wait {

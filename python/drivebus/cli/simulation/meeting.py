@@ -155,7 +155,7 @@ def ask(path: Path, order: Order) -> Order:
     except ValueError:
         answer = None
     if not isinstance(answer, dict):
-        raise drivebus.NotAllowed(f"what is at {path} does not answer as a simulation does")
+        raise drivebus.NotAllowed(f"what is at {path} does not answer like a simulation")
     if "error" in answer:
         raise drivebus.NotAllowed(str(answer["error"]))
     return answer
