@@ -34,7 +34,7 @@ def test_every_parameter_is_read_in_the_fewest_reads(virtual: Simulator, drive: 
 
 def test_what_is_only_assumed_is_read_where_that_is_asked_for(virtual_bus: Bus, drive: Drive) -> None:
     taken = drive.backup()
-    assert taken.unread["P02.01"].startswith("that this family has it is only assumed: ")
+    assert taken.unread["P02.01"].startswith("it is only assumed that this family has it: ")
     assert "P02.01" in drive.backup(unverified=True)
     whole = virtual_bus.drive(1, "gd350", unverified=True).backup()
     assert "P02.01" in whole

@@ -193,7 +193,7 @@ class TestOnATerminal:
     def test_a_family_that_proves_little_says_what_shows_more(self) -> None:
         words = ("--port", "sim://vfd500", "--profile", "vfd500", "monitor", "--interval", "0.1")
         shown = self.watch((80, 24), *words, until="more.")
-        assert "What is proved for this family does not tell the frequency" in " ".join(shown)
+        assert "No proved register of this family has the frequency; --unverified shows more." in " ".join(shown)
 
 
 def test_several_drives_are_told_apart() -> None:

@@ -262,7 +262,7 @@ def told(port: str, *words: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in result.stdout.splitlines()]
 
 
-HINT = "What is proved for this family does not tell the frequency; --unverified shows more."
+HINT = "No proved register of this family has the frequency; --unverified shows more."
 
 
 class TestSureness:
@@ -322,8 +322,8 @@ class TestSureness:
         assert status["state"] == "unknown"
         assert "address" in status["missing"]["state"]
         text = at("vfd500", "--profile", "vfd500", "status").stdout
-        assert "Not told:" in text
-        assert "unknown" not in text.partition("Not told:")[0]
+        assert "Missing:" in text
+        assert "unknown" not in text.partition("Missing:")[0]
 
     def test_an_overlay_makes_the_state_usable(self, tmp_path: Path) -> None:
         """With the very addresses that the profile only assumes, and so the simulated drive has."""

@@ -47,7 +47,7 @@ class Rules:
         if "password" in known.label.lower():
             return "a password has no place in a file"
         if known.evidence == "assumed" and not unverified:
-            return f"that this family has it is only assumed: {known.reason}"
+            return f"it is only assumed that this family has it: {known.reason}"
         return None
 
     def uncompared(self, code: str) -> str | None:

@@ -64,7 +64,7 @@ class _Job:
         self.farewell()
 
     def find(self) -> drivebus.Drive:
-        self.title(f"A simulated drive hangs on {self.simulator.port}, 19200 8E1. Who is there?")
+        self.title(f"A simulated drive is connected to {self.simulator.port} (19200 8E1). Which units answer?")
         found = list(self.bus.scan(range(1, 6)))
         self.out.rows(
             ["unit", "family", "identification", "round_trip"],

@@ -13,6 +13,7 @@ from drivebus.cli import names
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, pass_session, yes_option
 from drivebus.line.trace import LOGGER as TRACE_LOGGER
+from drivebus.line.trace import meaning
 
 __all__ = ["COMMANDS", "show_frames"]
 
@@ -88,24 +89,29 @@ def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None
         except drivebus.NotAllowed:
             raise
         except drivebus.DrivebusError as error:
-            _show_frame(session, "sent", _framed(body))
+            _show_frame(session, "sent", _framed(body), True)
             if not isinstance(error, drivebus.Refused):
                 raise
-            _show_frame(session, "answer", error.raw)
+            _show_frame(session, "answer", error.raw, False, _framed(body))
             if session.profile is not None:
-                name, meaning = drivebus.Profile.find(session.profile).exception(error.code)
-                session.out.say(f"{'':<7}{session.profile} means by it: {name}, {meaning}")
+                name, told = drivebus.Profile.find(session.profile).exception(error.code)
+                session.out.say(f"{'':<7}{session.profile} means by it: {name}, {told}")
             raise
-        _show_frame(session, "sent", _framed(body))
-        _show_frame(session, "answer", _framed(bytes([unit]) + answer))
+        sent = _framed(body)
+        _show_frame(session, "sent", sent, True)
+        _show_frame(session, "answer", _framed(bytes([unit]) + answer), False, sent)
 
 
 @click.command()
 @click.argument("data", metavar="HEX...", nargs=-1, required=True)
 @pass_session
 def decode(session: Session, data: tuple[str, ...]) -> None:
-    """Take a whole frame apart, CRC included."""
-    _show_frame(session, "frame", names.parse_hex(data))
+    """Take a whole frame apart, CRC included. With --profile, registers are shown by name."""
+    frame = names.parse_hex(data)
+    kind = drivebus.rtu.decode(frame).kind
+    _show_frame(session, "frame", frame, kind in _REQUESTS)
+    if kind in _ALIKE:
+        session.out.say(f"{'':<7}or the answer to it, which is the same")
 
 
 def _check_commands(unit: int, body: bytes) -> None:
@@ -132,14 +138,22 @@ def _framed(body: bytes) -> bytes:
     return body + drivebus.crc16(body).to_bytes(2, "little")
 
 
-def _show_frame(session: Session, what: str, frame: bytes) -> None:
-    decoded = drivebus.rtu.decode(frame)
+_ALIKE = ("write", "echo")
+"""Requests that a unit answers with the same bytes."""
+
+_REQUESTS = ("read", "write_many", *_ALIKE)
+
+
+def _show_frame(session: Session, what: str, frame: bytes, sent: bool, asked: bytes | None = None) -> None:
+    """*frame* and what it means; *asked* is the request that it answers, if it was *sent* by a unit."""
     if session.out.as_json:
+        decoded = drivebus.rtu.decode(frame)
         fields = {name: value for name, value in vars(decoded).items() if value is not None}
         session.out.record({"what": what, "hex": frame, **fields})
     else:
         session.out.say(f"{what:<7}{frame.hex(' ').upper()}")
-        session.out.say(f"{'':<7}{decoded!r}")
+        profile = None if session.profile is None else drivebus.Profile.find(session.profile)
+        session.out.say(f"{'':<7}{meaning(frame, sent, asked, profile)}", hanging=7)
 
 
 COMMANDS = [raw, decode]

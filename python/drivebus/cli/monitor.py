@@ -107,7 +107,7 @@ def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> 
     rows = {name: drive.describe(name) for name in known}
     hint = ""
     if not wanted and profile.role("frequency") not in rows:
-        hint = "What is proved for this family does not tell the frequency; --unverified shows more."
+        hint = "No proved register of this family has the frequency; --unverified shows more."
     if hint and not session.out.live:
         remark(hint)
     where = f"{session.name}: " if session.name else ""

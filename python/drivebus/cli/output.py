@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -135,8 +135,11 @@ class Output:
         kept = list(rows)
         table = self.table(columns, kept)
         # A name that is cut cannot be typed, and a word broken in the middle not be read.
-        narrowest = sum(column.min_width or 0 for column in table.columns) + _BETWEEN * (len(columns) - 1)
-        if kept and narrowest > self.console.width:
+        room = self.console.width - _BETWEEN * (len(columns) - 1)
+        widths = _widths([[name, *(row[place] for row in kept)] for place, name in enumerate(columns)], room)
+        for column, width in zip(table.columns, widths, strict=True):
+            column.width = width
+        if kept and sum(widths) > room:
             for row in kept:
                 self.console.print()
                 self.facts(dict(zip(columns, row, strict=True)))
@@ -163,16 +166,27 @@ class Output:
         for index, name in enumerate(columns):
             numeric = bool(kept) and all(_is_number(row[index]) for row in kept)
             title = name.replace("_", " ")
-            texts = [title, *(str(row[index]) for row in kept)]
-            words = [word for text in texts for word in text.split()]
-            longest = max(map(len, words), default=0)
-            # Where a table is too wide, rich makes every column narrower that may be, and breaks words for it.
-            whole = all(len(text.split()) < 2 for text in texts)
-            justify: Literal["left", "right"] = "right" if numeric else "left"
-            table.add_column(title, justify=justify, overflow="fold", min_width=longest, no_wrap=whole)
+            table.add_column(title, justify="right" if numeric else "left", overflow="fold")
         for row in kept:
             table.add_row(*(show(cell) for cell in row))
         return table
+
+
+def _widths(columns: Sequence[Sequence[Any]], room: int) -> list[int]:
+    """The width of each of *columns*, their titles first, so that they share *room* and no word is broken.
+
+    rich makes every column narrower that may be, and breaks words for it. More than *room*, where that is too small.
+    """
+    from rich.cells import cell_len
+    from rich.text import Text
+
+    cells = [[Text.from_markup(show(cell)).plain for cell in column] for column in columns]
+    least = [max(cell_len(word) for cell in column for word in (cell.split() or [""])) for column in cells]
+    widths = [max(cell_len(line) for cell in column for line in (cell.splitlines() or [""])) for column in cells]
+    while sum(widths) > max(room, sum(least)):
+        spare = [width - needed for width, needed in zip(widths, least, strict=True)]
+        widths[spare.index(max(spare))] -= 1
+    return widths
 
 
 def _is_number(cell: Any) -> bool:

@@ -89,7 +89,7 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
             session.out.say(_placed(problem))
     if problems:
         some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        remark(f"Error: {folder} has {some}; it is not used until they are mended.")
+        remark(f"Error: {folder} has {some}; the profile is not used until all is right.")
         context.exit(2)
     counts = drivebus.Profile.load(folder).counts()
     totals = {kind: counts[kind]["total"] for kind in KINDS}

@@ -189,7 +189,7 @@ def status(session: Session) -> None:
     }
     out.facts({**values, **shown})
     if now.missing:
-        out.say("Not told:")
+        out.say("Missing:")
         out.facts(now.missing)
 
 

@@ -104,7 +104,7 @@ class Screen:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width, height = options.max_width, options.height or console.height
-        heads, notes = self._heads(), self._notes()
+        heads, notes = self._heads(width), self._notes()
         used = sum(len(line.wrap(console, width)) for line in [*heads, *notes])
         room = height - used - 1  # the line of the columns' names
         names, blocks, extremes = self._fitting(width, room)
@@ -112,10 +112,11 @@ class Screen:
         if lacking:
             names = names[:-1]  # its place is taken by what is said of the others
             notes.append(Text(f"{lacking + 1} more do not fit: name those you want, or make the window larger", "dim"))
-        yield Group(*heads, self._table(names, blocks, extremes), *notes)
+        above, below = ([part for line in lines for part in line.wrap(console, width)] for lines in (heads, notes))
+        yield Group(*above, self._table(names, blocks, extremes), *below)
 
-    def _heads(self) -> list[Text]:
-        """Who is watched, and how often."""
+    def _heads(self, width: int) -> list[Text]:
+        """Who is watched, and how often and how long, if a line of *width* has room for that."""
         span = self._times[-1] - self._times[0] if self._times else 0.0
         rate = f"{(len(self._times) - 1) / span:.1f}/s" if span else ""
         took = int(self._times[-1] - (self._began or 0.0)) if self._times else 0
@@ -125,7 +126,9 @@ class Screen:
             head = Text(printable(drive.what), "bold")
             doing = drive.doing()
             heads.append(head if not doing.plain else head.append("  ").append_text(doing))
-        heads[-1].append(f"  {rate}  {when}".replace("    ", "  "), "dim")
+        for each in (when, rate):
+            if each and heads[-1].cell_len + 2 + len(each) <= width:
+                heads[-1].append(f"  {each}", "dim")
         return heads
 
     def _notes(self) -> list[Text]:

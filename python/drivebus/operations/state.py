@@ -208,7 +208,7 @@ async def _status(unit: Unit, seen: Seen) -> Status:
         ("overload_alarm", alarm),
     ):
         if field is None:
-            missing[what] = f"no status word of {unit.profile.title} that may be read tells it"
+            missing[what] = f"no status word of {unit.profile.title} that may be read has it"
     return Status(
         state=seen.state,
         ready=None if ready is None else ready == "ready",
