@@ -339,7 +339,7 @@ class Profile:
 
     @staticmethod
     def builtin(name: str, /) -> Profile:
-        """A shipped profile. NotAllowed names the closest for a misspelt one."""
+        """A shipped profile. NotAllowed names the closest one if it is misspelt."""
     @staticmethod
     def builtin_names() -> list[str]: ...
     @staticmethod
@@ -402,7 +402,7 @@ class Profile:
     def fault_history(self) -> list[str]:
         """The parameters that hold the last faults, the latest first."""
     def describe(self, name: str, /) -> dict[str, Any]:
-        """All that is known of one register or parameter.
+        """Everything that is known about one register or parameter.
 
         Keys: `name`, `code` (or None), `label`, `kind` (`"register"` or `"parameter"`), `address`, `unit`, `scale`,
         `signed`, `low`, `high`, `low_from`, `high_from` (parameters that narrow the range), `default`,
@@ -413,7 +413,7 @@ class Profile:
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """The address of *name*; with *store* given, the one to write to for RAM (False) or EEPROM (True)."""
     def read_back(self, name: str, /) -> int | None:
-        """Where what was written to *name* can be read; None where that would not tell whether the drive took it."""
+        """Where a write to *name* can be read back; None if that would not show whether the drive took it."""
     def decode(self, name: str, raw: int, /) -> int | float:
         """*raw* (0..=0xFFFF, or 32 bits where it takes two words) in engineering units.
 
@@ -635,7 +635,7 @@ class SimulatedDrive:
 
 @final
 class SimulatedLine:
-    """The wire: what it saw, and what it is told to spoil."""
+    """The simulated wire: what was on it, and how it spoils answers."""
 
     format: SerialFormat
     """The settings of all units on the line. May be set, as at their keypads; what is on its way is then lost.

@@ -102,7 +102,7 @@ class Bus(BusFace, Requests):
         self.close()
 
     def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
-        """Asks each of *units* who it is, with the line's own settings, and yields each one that answers at once.
+        """Asks each of *units* for its family, with the line's own settings, and yields those that answer at once.
 
         One read of the identification register each, not repeated, and a few more of those that answer and give no code
         that is known (see `identify`). A unit that refuses has answered too, and so has one whose answer is damaged:
@@ -124,7 +124,7 @@ class Bus(BusFace, Requests):
                 yield found
 
     def identify(self, unit: int) -> Identification:
-        """What the unit is, as far as it tells, and how sure that is. Only reads.
+        """Identifies the unit, and says how sure that is. Only reads.
 
         By its identification code; where it has none that is known, by which words it answers and which it refuses.
 
@@ -202,7 +202,7 @@ class Bus(BusFace, Requests):
         size: int = 10_000,
         callback: Callable[[Sample], object] | None = None,
     ) -> Poll[Any]:
-        """Asks drives again and again, in a thread of the core's own, and gives what comes as samples.
+        """Polls drives in a thread of the core's own, and gives the values as samples.
 
             with bus.poll({drive: ["running_frequency", "output_current"], other: None}, interval=0.1) as poll:
                 for sample in poll:

@@ -128,7 +128,7 @@ class Drive(DriveFace):
 
     @property
     def setpoint(self) -> float:
-        """The setpoint last given over the bus, in Hz. Setting it changes the speed of a motor that runs.
+        """The setpoint last given over the bus, in Hz. Setting it changes the speed of a running motor.
 
         Raises, when set:
             NotAllowed: Above the drive's own maximum or out of range, or another drive answers at this address since
@@ -228,7 +228,7 @@ class Drive(DriveFace):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
-        """Makes the drive act by itself after *timeout* seconds of silence, and asks it often enough inside the block.
+        """Makes the drive act by itself after *timeout* seconds of silence. Inside the block it is asked often enough.
 
             with drive.watchdog(1.0, unverified=True), drive.running(hz=10.0):
                 ...

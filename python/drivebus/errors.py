@@ -67,7 +67,7 @@ class DrivebusError(Exception):
 
 
 class PortError(DrivebusError, OSError):
-    """The port: not found, busy, not permitted, or lost. It is re-opened by itself at the next call.
+    """The port is missing, busy, not permitted, or lost. The next call opens it again.
 
     Did the drive take it? If the port was lost after the request had left, it may have.
     """
@@ -81,7 +81,7 @@ class NoAnswer(DrivebusError, TimeoutError):
 
 
 class BadAnswer(DrivebusError):
-    """Bytes came, but no valid answer to what was asked. They are in `raw`.
+    """Bytes came, but not a valid answer to the request. They are in `raw`.
 
     Did the drive take it? It may have: only its answer is known to be bad.
     """
@@ -95,7 +95,7 @@ class CrcError(BadAnswer):
 
 
 class Refused(DrivebusError):
-    """The drive said no: an exception answer.
+    """The drive refused: an exception answer.
 
     Did the drive take it? No. What it was doing before, it still does.
 
@@ -144,7 +144,7 @@ class StoreWarning(DrivebusWarning):
 
 
 class SharedCodeWarning(DrivebusWarning):
-    """A drive is taken for the one family with a profile among several that report its code. Name it by `profile`."""
+    """Several families report this code, and the only one with a profile is used. Name the family by `profile`."""
 
 
 def level_of_the_program() -> int:

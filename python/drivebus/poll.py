@@ -24,7 +24,7 @@ __all__ = ["Poll"]
 
 @known_only
 class Poll(Polling[Key]):
-    """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
+    """Polls the same values of the same drives until it, or its bus, is closed. `Bus.poll` makes it.
 
     Iterating over it gives each sample as it comes, and ends when the poll does; `batch` and `take` give many at once.
     Samples that nobody takes are kept, the latest *size* of them. Everything is safe from any thread.

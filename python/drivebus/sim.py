@@ -56,7 +56,7 @@ class SimulatedDrive:
 
     @property
     def state(self) -> str:
-        """What it does, in the words of `drivebus.State`; a rectifier that feeds is "running"."""
+        """What it is doing, in the words of `drivebus.State`; a rectifier that feeds is "running"."""
         return self._native.state
 
     @property
@@ -76,7 +76,7 @@ class SimulatedDrive:
 
     @property
     def fault_name(self) -> str:
-        """What the keypad shows of the present fault, such as `"OL1"`; empty for none, or where it is not known."""
+        """The letters on the keypad for the present fault, such as `"OL1"`; empty for none, or if not known."""
         return self._profile.fault(self.fault).mnemonic if self.fault else ""
 
     @property
@@ -98,7 +98,7 @@ class SimulatedDrive:
         self._native.inputs = checks.whole("inputs", bits, 0, 0xFFFF, hexadecimal=True)
 
     def trip(self, fault: int | str) -> None:
-        """Trips the drive with *fault*: its number, or what the keypad shows, such as `"OL1"`."""
+        """Trips the drive with *fault*: its number, or its letters on the keypad, such as `"OL1"`."""
         self._native.trip(
             self._fault_code(fault) if isinstance(fault, str) else checks.whole("fault", fault, 1, 0xFFFF)
         )
@@ -247,12 +247,12 @@ class Simulator:
 
     @property
     def port(self) -> str:
-        """What another program opens: a path or `socket://127.0.0.1:N`; `sim:…` in process."""
+        """The port that another program opens: a path or `socket://127.0.0.1:N`; `sim:…` in process."""
         return self._native.port
 
     @property
     def line(self) -> SimulatedLine:
-        """The wire: what it saw, and what it is told to spoil."""
+        """The simulated wire: what was on it, and how it spoils answers."""
         return self._native.line
 
     def drive(self, unit: int) -> SimulatedDrive:

@@ -69,12 +69,12 @@ class State(str, Enum):
 
     @property
     def running(self) -> bool:
-        """Whether the drive feeds the motor with the aim of turning it."""
+        """Whether the drive feeds the motor in order to turn it."""
         return self in (State.FORWARD, State.REVERSE)
 
     @property
     def at_rest(self) -> bool:
-        """Whether the drive feeds the motor nothing. One that magnetises it, before a start, neither rests nor runs."""
+        """Whether the output to the motor is off. While it is magnetised before a start, it is neither at rest nor running."""
         return self in (State.STOPPED, State.FAULT, State.POWER_OFF)
 
     def __str__(self) -> str:
@@ -206,7 +206,7 @@ class ControlItem:
 
 
 class Control(tuple[ControlItem, ...]):
-    """The list that `Drive.check_control` gives: true when every item is as it must be."""
+    """The list that `Drive.check_control` gives: true if every item is as required."""
 
     __slots__ = ()
 
@@ -225,7 +225,7 @@ class Control(tuple[ControlItem, ...]):
 
 @dataclass(frozen=True)
 class Description:
-    """All that is known of one register or parameter.
+    """Everything that is known about one register or parameter.
 
     Attributes:
         name: Its name, such as `"output_current"`, or its code if it has no other name.
@@ -278,7 +278,7 @@ class Description:
 
     @property
     def reason(self) -> str:
-        """Why it is not verified; empty where it is."""
+        """Why it is not verified; empty if it is."""
         return "" if self.verified else self.note
 
     @property

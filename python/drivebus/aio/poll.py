@@ -17,7 +17,7 @@ __all__ = ["Poll"]
 
 @known_only
 class Poll(Polling[Key]):
-    """Asks the same of the same drives again and again, until it is closed or its bus is: what `Bus.poll` gives.
+    """Polls the same values of the same drives until it, or its bus, is closed. `Bus.poll` makes it.
 
     `async for` gives each sample as it comes, and ends when the poll does; `batch` and `take` give many at once. The
     event loop is woken once for each wait, by the thread that asks. Whoever is cancelled while it waits takes no sample

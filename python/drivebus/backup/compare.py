@@ -42,7 +42,7 @@ class Difference:
 
 
 class Diff(Sequence[Difference]):
-    """The parameters that differ, in code order: empty, and false, where none does.
+    """The parameters that differ, in code order: empty, and false, if none differs.
 
     Attributes:
         left, right: What was compared, in words.

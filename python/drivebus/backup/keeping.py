@@ -71,7 +71,7 @@ async def restore(
     unverified: bool = False,
     progress: Progress | None = None,
 ) -> Restoration:
-    """Gives the drive back what *backup* has: only what differs, stored in EEPROM, and each read back.
+    """Writes the values of *backup* back to the drive: only those that differ, to EEPROM, and each is read back.
 
     Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
     settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
@@ -111,7 +111,7 @@ async def restore(
 async def diff(
     unit: Unit, backup: Kept | None = None, *, everything: bool = False, force: bool = False, unverified: bool = False
 ) -> Diff:
-    """How the drive differs from *backup*; from what the factory set, as far as that is known, for None.
+    """How the drive differs from *backup*. None: how it differs from the factory settings, as far as they are known.
 
     Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
     what can only be read) is left out, unless *everything*. The result is false where nothing differs.

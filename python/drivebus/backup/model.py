@@ -121,7 +121,7 @@ class Backup(Mapping[str, Value]):
         return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete, told=found.told)
 
     def diff(self, other: Backup | None = None, *, everything: bool = False) -> Diff:
-        """How *other* differs from this one; how this differs from what the factory set, as far as known, for None.
+        """How *other* differs from this backup. None: how this differs from the factory settings, as far as known.
 
         What tells nothing about how a drive is set (the fault history, what can only be read) is left out, unless
         *everything*.
@@ -141,7 +141,7 @@ class Backup(Mapping[str, Value]):
         return compare(self.profile, ours, theirs, everything=everything)
 
     def translated(self, profile: Profile) -> Backup:
-        """The same values in the words of another family, where a code is called the same there; else in `unread`."""
+        """The same values in the words of another family, where a code has the same name; the others in `unread`."""
         raw: dict[str, int] = {}
         unread: dict[str, str] = {}
         for code, value in self.items():
@@ -158,7 +158,7 @@ class Backup(Mapping[str, Value]):
         )
 
     def unproved(self, code: str) -> str | None:
-        """Why the word of *code* rests on what is not verified for the family; None where it does not.
+        """Why the word of *code* is not verified for the family; None if it is.
 
         What a drive told is its own word, whatever it means.
         """
@@ -168,11 +168,11 @@ class Backup(Mapping[str, Value]):
         return known.reason or "no document of this family says so"
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the file, whole or not at all: what was there before is there until the new one is."""
+        """Writes the file, whole or not at all: an older file stays until the new one is complete."""
         disk.write(Path(checks.path("file", path)), self.text())
 
     def text(self) -> str:
-        """What stands in the file: sorted, one parameter a line."""
+        """The text of the file: sorted, one parameter a line."""
         return text.text(self)
 
     def __getitem__(self, code: str) -> Value:

@@ -54,7 +54,7 @@ class Restored:
 
     @property
     def failed(self) -> bool:
-        """Whether the drive has another value than it was to have."""
+        """Whether the drive has another value than the backup."""
         return self.result in FAILED
 
     def __str__(self) -> str:
@@ -88,7 +88,7 @@ class Restoration(Sequence[Restored]):
         return not any(item.failed for item in self)
 
     def having(self, *results: str) -> list[Restored]:
-        """Those of which one of *results* became."""
+        """The parameters that ended as one of *results*."""
         return [item for item in self if item.result in results]
 
     @overload

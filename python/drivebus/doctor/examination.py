@@ -56,7 +56,7 @@ def examine(
     tell: Callable[[str], None] | None = None,
     open: Callable[..., Bus] = Bus,  # noqa: A002 - what it is
 ) -> Generator[Finding, None, None]:
-    """Looks at the adapter behind *port*, the line, and *unit* (None: whoever answers), and yields what it finds.
+    """Examines the adapter behind *port*, the line, and *unit* (None: each unit that answers), and yields its findings.
 
     Takes some seconds where somebody answers at these settings, half a minute where nobody does. Ending the iteration
     closes the port.

@@ -22,7 +22,7 @@ class Severity(str, Enum):
 
     @property
     def rank(self) -> int:
-        """0 for what is well, more for worse."""
+        """0 if all is well; the higher, the worse."""
         return list(Severity).index(self)
 
     def __str__(self) -> str:
@@ -34,7 +34,7 @@ class Severity(str, Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One thing that was examined.
 
     Attributes:
         step: `"adapter"`, `"line"` or `"unit"`.

@@ -31,7 +31,7 @@ class SerialPort:
 
 
 def ports() -> list[SerialPort]:
-    """Lists the serial ports of this machine, with what is plugged in, by their names. Nothing is opened or sent.
+    """Lists the serial ports of this machine and the adapters that are plugged in. Nothing is opened or sent.
 
     A bus takes each of them as its port: `drivebus.Bus(drivebus.ports()[0])`.
     """

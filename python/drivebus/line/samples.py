@@ -94,7 +94,7 @@ class Target(NamedTuple):
 
 
 class Sample(Mapping[str | int, Value]):
-    """What one drive said in one cycle: a mapping of names (of a unit without a profile: of addresses) to values.
+    """The values of one drive in one cycle: a mapping of names (without a profile: of addresses) to values.
 
     A missing sample is empty, and so it is false.
 

@@ -23,7 +23,7 @@ _INPUTS, _OUTPUTS = "input_state", "output_state"
 
 
 async def bits(unit: Unit, name: str, *, unverified: bool = False) -> dict[str, str]:
-    """What the bits of the word *name* say, such as `{"motor": "motor 1"}`; empty for a plain number.
+    """The bit fields of the word *name*, such as `{"motor": "motor 1"}`; empty for a plain number.
 
     Raises:
         NotAllowed: Unknown name, or not verified; nothing was sent.
@@ -34,12 +34,12 @@ async def bits(unit: Unit, name: str, *, unverified: bool = False) -> dict[str, 
 
 
 async def inputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
-    """The digital inputs by the names at their terminals: whether each is on. Errors as for `bits`."""
+    """The digital inputs by the names of their terminals: True if on. Errors as for `bits`."""
     return await _terminals(unit.trusting(unverified), _INPUTS)
 
 
 async def outputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
-    """The digital outputs by the names at their terminals: whether each is on. Errors as for `bits`."""
+    """The digital outputs by the names of their terminals: True if on. Errors as for `bits`."""
     return await _terminals(unit.trusting(unverified), _OUTPUTS)
 
 

@@ -19,7 +19,7 @@ __all__ = ["check_control", "check_heeded", "check_set", "prepare_control", "wan
 
 
 async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: bool = False) -> Control:
-    """Whether the drive is set to obey the bus: a list that is true when every item is as it must be.
+    """Checks whether the drive is set to obey the bus: a list that is true if every item is as required.
 
     Args:
         setpoint: Which setpoint the bus is to give, such as `"torque"` or `"pid"`; None is the frequency.
@@ -36,7 +36,7 @@ async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: 
 async def prepare_control(
     unit: Unit, store: bool = False, *, setpoint: str | None = None, unverified: bool = False
 ) -> Control:
-    """Sets the drive to obey the bus, writing only what differs, and returns what `check_control` then says.
+    """Sets the drive to obey the bus. Writes only the settings that differ, and returns what `check_control` says then.
 
     To RAM: the drive forgets it when it is switched off, unless *store*, which keeps what this object set in RAM
     before as well.

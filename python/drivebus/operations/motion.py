@@ -27,7 +27,7 @@ async def run(
     force: bool = False,
     unverified: bool = False,
 ) -> None:
-    """Starts the motor; with *hz*, the setpoint travels in the same frame where the drive takes it.
+    """Starts the motor. With *hz*, the setpoint is in the same frame, if the drive takes both together.
 
     Returns when the state word shows it running, not when it has reached its speed: see `wait_for_speed`. Where the
     family has no state that may be used, when the drive has confirmed the command and shows no fault.
@@ -89,7 +89,7 @@ async def jog(
 
 
 async def stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
-    """Stops the motor as the drive is set to: by a ramp, usually. Sent at once, whatever the state is.
+    """Stops the motor as the drive is set to stop it, usually by a ramp. Sent at once, whatever the state is.
 
     Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
     the bus tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped`
@@ -113,7 +113,7 @@ async def stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) ->
 
 
 async def coast(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
-    """Takes the voltage off the motor, which turns on until friction ends it. Errors as for `stop`.
+    """Switches the output off: the motor turns on until friction stops it. Errors as for `stop`.
 
     Returns when the drive is stopped: what coasts has no ramp.
     """
@@ -145,7 +145,7 @@ def has_jog_stop(unit: Unit) -> bool:
 
 
 async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
-    """Resets a fault whose cause is gone. Sends nothing where there is none.
+    """Resets a fault after its cause is gone. Sends nothing if there is no fault.
 
     Raises:
         NotAllowed: The command is not verified for the family, or another drive answers at this address since the

@@ -97,7 +97,7 @@ def readable(unit: Unit, *names: str) -> list[str]:
 
 
 async def contradiction(unit: Unit) -> str | None:
-    """What the unit says of itself that speaks against its profile, and what to do; None if nothing does.
+    """How the unit's own answer contradicts its profile, and what to do; None if it does not.
 
     Reads, as the first write does. For a *trust_profile* too.
 

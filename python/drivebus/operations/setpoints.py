@@ -32,7 +32,7 @@ __all__ = [
 SETPOINTS = {
     "torque": "The torque setpoint in percent.",
     "pid": "The PID setpoint in percent.",
-    "pid_feedback": "The PID feedback value in percent, where the bus brings it.",
+    "pid_feedback": "The PID feedback value in percent, if it comes over the bus.",
     "forward_limit": "The highest frequency while turning forward, in Hz: under torque control.",
     "reverse_limit": "The highest frequency while turning in reverse, in Hz: under torque control.",
     "motoring_torque_limit": "The highest torque while driving the load, in percent.",
@@ -95,7 +95,7 @@ async def ask(unit: Unit, setpoint: str, *, unverified: bool = False) -> float:
 
 
 async def give(unit: Unit, setpoint: str, value: float, *, unverified: bool = False) -> None:
-    """Writes *value* to *setpoint*, if the drive would heed it. A motor that runs follows it.
+    """Writes *value* to *setpoint*, if the drive would follow it. A running motor follows it at once.
 
     Args:
         setpoint: One of the family's `Profile.setpoint_names()`, such as `"torque"`.

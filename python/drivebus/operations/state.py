@@ -172,7 +172,7 @@ def _plan(evidence: Evidence) -> _Look:
 
 
 async def status(unit: Unit, *, unverified: bool = False) -> Status:
-    """State, readiness, control source, frequency and fault, in two reads where the family has them together.
+    """State, readiness, control source, frequency and fault, in two reads if the family has them side by side.
 
     What the family does not tell, or what is not verified, is None (the state: `State.UNKNOWN`), and `missing` has
     the reason.

@@ -20,7 +20,7 @@ _STANDSTILL = 0.05
 async def wait_for_speed(
     unit: Unit, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False
 ) -> Status:
-    """Waits until the output frequency is *hz*, or the setpoint in force if None.
+    """Waits until the output frequency is *hz*; None: the active setpoint.
 
     Args:
         hz: Wanted output frequency in Hz, whichever way the motor turns.

@@ -135,7 +135,7 @@ class Profile:
 
     @staticmethod
     def check(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
-        """All that is wrong with the profile in a folder; an empty list if it is sound.
+        """Every mistake in the profile in a folder; an empty list if there is none.
 
         Each is a dict of `file`, `line` (None where a file cannot be read) and `reason`.
         """
@@ -151,7 +151,7 @@ class Profile:
         return list(self._names)
 
     def search(self, text: str, limit: int = 20) -> list[str]:
-        """Names and codes in which all words of *text* occur, or what the field calls so (`"ramp"`); the best first."""
+        """Names and codes in which all words of *text*, or their synonyms (`"ramp"`), occur; the best first."""
         return self._native.search(text, checks.whole("limit", limit, 0, 10_000))
 
     def role(self, role: str, /) -> str | None:
@@ -180,7 +180,7 @@ class Profile:
         return self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
-        """All that is known of one register or parameter. NotAllowed names the closest for a misspelt one."""
+        """Everything that is known about one register or parameter. NotAllowed names the closest one if it is misspelt."""
         known = self._descriptions.get(name)
         if known is None:
             known = self._descriptions[name] = Description(**self._native.describe(name))
@@ -196,7 +196,7 @@ class Profile:
         return self._native.address(name, store=store)
 
     def read_back(self, name: str, /) -> int | None:
-        """Where what was written to *name* can be read; None where that would not tell whether the drive took it.
+        """Where a write to *name* can be read back; None if that would not show whether the drive took it.
 
         A command, and a parameter whose write does something (P00.15 tunes the motor), tell nothing.
         """
@@ -300,7 +300,7 @@ class Profile:
         return self._native.variants_chosen
 
     def with_variants(self, chosen: Mapping[str, str]) -> Profile:
-        """This profile for a drive of which is known what a parameter makes of some registers.
+        """This profile for a drive whose variants are known: parameters that change the meaning of registers.
 
         Raises:
             NotAllowed: There is no such variant, or it has no such choice; the message has those that there are.
@@ -320,7 +320,7 @@ class Profile:
         return [_fault(row) for row in self._native.faults()]
 
     def fault_named(self, mnemonic: str) -> Fault | None:
-        """One fault by what the keypad shows, such as `"OL1"`, or None. Capitals count: STo and STO differ."""
+        """One fault by its letters on the keypad, such as `"OL1"`, or None. Capitals count: STo and STO differ."""
         return next((fault for fault in self.faults() if fault.mnemonic == mnemonic), None)
 
     def exceptions(self) -> dict[int, tuple[str, str]]:
@@ -343,19 +343,19 @@ class Profile:
         return self._native.identifications()
 
     def signature(self) -> dict[str, list[int]] | None:
-        """How a unit without a code is told: addresses that it `answers` and `refuses`, read one word each."""
+        """How a unit without a code is identified: the addresses that it `answers` and `refuses`, one word each."""
         signature = self._native.signature()
         return None if signature is None else {"answers": signature[0], "refuses": signature[1]}
 
     @property
     def identification_address(self) -> int | None:
-        """Where the drive says what it is, 0..0xFFFF; None where that is not known."""
+        """The address of the identification code, 0..0xFFFF; None if it is not known."""
         register = self.role("identification")
         return None if register is None else self.address(register)
 
     @property
     def watchdog(self) -> WatchdogSettings | None:
-        """What makes the drive act by itself when its bus falls silent; None where the family has no such thing."""
+        """The settings that make the drive act by itself when its bus falls silent; None if the family has none."""
         settings = self._native.watchdog()
         return None if settings is None else WatchdogSettings(**settings)
 
@@ -376,7 +376,7 @@ class Profile:
         return tuple(self._native.fault_values())
 
     def acts(self) -> list[str]:
-        """The parameters whose write does something and is not simply kept, such as tuning the motor."""
+        """The parameters that act when they are written, such as one that tunes the motor."""
         return self._native.acts()
 
     def serial_parameters(self) -> list[str]:
