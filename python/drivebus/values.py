@@ -74,7 +74,7 @@ class State(str, Enum):
 
     @property
     def at_rest(self) -> bool:
-        """Whether the output to the motor is off. While it is magnetised before a start, it is neither at rest nor running."""
+        """Whether the output to the motor is off. A drive that magnetises the motor before a start is not at rest."""
         return self in (State.STOPPED, State.FAULT, State.POWER_OFF)
 
     def __str__(self) -> str:

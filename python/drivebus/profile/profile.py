@@ -180,7 +180,7 @@ class Profile:
         return self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
-        """Everything that is known about one register or parameter. NotAllowed names the closest one if it is misspelt."""
+        """Everything that is known about one register or parameter. NotAllowed names the closest name."""
         known = self._descriptions.get(name)
         if known is None:
             known = self._descriptions[name] = Description(**self._native.describe(name))
