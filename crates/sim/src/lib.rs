@@ -68,7 +68,8 @@
 //! - Assumption: two units never speak at once; the later one waits.
 //! - Assumption: a unit answers in the order it was asked, unless [`FaultKind::Overtaken`] says otherwise.
 //! - Assumption: whoever speaks in pieces ([`FaultKind::Split`]) holds the line in the pauses too.
-//! - Bits, parity and noise levels are not simulated: a character arrives, or it arrives spoilt.
+//! - Bits and noise levels are not simulated: a character arrives, or it arrives spoilt. Of a port whose speed, parity or
+//!   data bits are not those of the units, they understand nothing.
 //! - What a drive does that its manual does not say is marked "Assumption:" in the source, beside the code that does it.
 
 #![forbid(unsafe_code)]
