@@ -226,7 +226,7 @@ fn rs485_mode_is_refused_where_there_is_none() {
     assert_eq!(error.kind, PortErrorKind::Unsupported);
     assert!(error.to_string().contains("RS-485"), "{error}");
     let error = refused(Rs485::default().delay_after_ms(101));
-    assert!(error.to_string().contains("101 ms") && error.to_string().contains("0..=100 ms"), "{error}");
+    assert!(error.to_string().contains("101 ms") && error.to_string().contains("0 to 100 ms"), "{error}");
     // A pseudo-terminal has no modem lines either.
     for switch in [Switch::Program, Switch::Either] {
         let error = refused(Rs485::default().switch(switch));
