@@ -151,7 +151,7 @@ def test_the_factory_is_a_side(simulator: drivebus.Simulator, file: Path) -> Non
     store(simulator, "P14.03=5")
     assert run(simulator, "diff", "factory").exit_code == 0
     store(simulator, "P00.03=60")
-    assert "50.0  60.0  Hz" in run(simulator, "diff", "factory").stdout
+    assert "50.00  60.00  Hz" in run(simulator, "diff", "factory").stdout
     run(simulator, "backup", file)
     assert run(None, "diff", "factory", file).exit_code == 1
     assert run(None, "diff", file, "factory").exit_code == 2

@@ -125,14 +125,14 @@ def restore(
         plan = drive.restore(kept, dry_run=True, **options)
         planned = plan.having("planned")
         if dry_run or not planned:
-            _show_report(session, plan, "Nothing to write." if not planned else "Nothing was written.")
+            _show_report(session, kept.profile, plan, "Nothing to write." if not planned else "Nothing was written.")
         else:
             if not session.out.as_json:
-                _show_report(session, plan, "")
+                _show_report(session, kept.profile, plan, "")
             session.ask(_question(drive, [item.code for item in planned]), yes)
             with _progress(session, "writing") as progress:
                 plan = drive.restore(kept, progress=progress, **options)
-            _show_report(session, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
+            _show_report(session, kept.profile, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
     if not plan.ok:
         failed = sum(item.failed for item in plan)
         were = "would not be" if dry_run else "was not" if failed == 1 else "were not"
@@ -163,7 +163,7 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
     A and B are files. "factory" stands for the factory settings, as far as they are known. Only the parameters in A are
     compared with the drive. Exit code 0: nothing differs. 1: something differs. Other exit codes are as usual.
     """
-    found = _diff(session, a, b, everything, force)
+    found, profile = _diff(session, a, b, everything, force)
     if session.out.as_json:
         for each in found:
             session.out.record(vars(each))
@@ -173,7 +173,10 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
         hint = " --all lists them." if rest and not everything else ""
         session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.{rest}{hint}")
         if found:
-            rows = [[each.code, each.left, each.right, each.unit, each.label, each.reason] for each in found]
+            rows = [
+                [each.code, *_texts(profile, each.code, each.left, each.right), each.unit, each.label, each.reason]
+                for each in found
+            ]
             session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
         if everything and found.uncompared:
             session.out.say("Not compared:")
@@ -182,7 +185,10 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
         raise click.exceptions.Exit(1)
 
 
-def _diff(session: Session, a: str, b: str | None, everything: bool, force: bool) -> drivebus.Diff:
+def _diff(
+    session: Session, a: str, b: str | None, everything: bool, force: bool
+) -> tuple[drivebus.Diff, drivebus.Profile]:
+    """What differs, and the profile that says how its values are shown."""
     if a == b == _FACTORY:
         raise click.UsageError(f"{_FACTORY} does not differ from itself: give a FILE, or nothing for the drive, as B")
     if b == _FACTORY:
@@ -190,9 +196,12 @@ def _diff(session: Session, a: str, b: str | None, everything: bool, force: bool
     first = None if a == _FACTORY else _load(session, Path(a))
     if b is None:
         with session.drive() as drive:
-            return drive.diff(first, everything=everything, force=force)
+            found = drive.diff(first, everything=everything, force=force)
+            return found, drive.profile if first is None else first.profile
     second = _load(session, Path(b))
-    return second.diff(None, everything=everything) if first is None else first.diff(second, everything=everything)
+    if first is None:
+        return second.diff(None, everything=everything), second.profile
+    return first.diff(second, everything=everything), first.profile
 
 
 def _load(session: Session, file: Path) -> drivebus.Backup:
@@ -222,7 +231,7 @@ def _question(drive: drivebus.Drive, codes: list[str]) -> str:
     return text
 
 
-def _show_report(session: Session, report: drivebus.Restoration, end: str) -> None:
+def _show_report(session: Session, profile: drivebus.Profile, report: drivebus.Restoration, end: str) -> None:
     """Every parameter as JSON; for people, those of which there is something to say."""
     if session.out.as_json:
         for item in report:
@@ -230,13 +239,29 @@ def _show_report(session: Session, report: drivebus.Restoration, end: str) -> No
         return
     told = [item for item in report if _is_told(item)]
     if told:
-        rows = [[item.code, item.before, item.wanted, item.unit, item.result, item.label, item.reason] for item in told]
+        rows = [
+            [
+                item.code,
+                *_texts(profile, item.code, item.before, item.wanted),
+                item.unit,
+                item.result,
+                item.label,
+                item.reason,
+            ]
+            for item in told
+        ]
         session.out.rows(["code", "drive", "backup", "unit", "result", "label", "reason"], rows)
     counts = {result: len(report.having(result)) for result in ("same", "skipped")}
     session.out.say(
         f"{end} The same: {counts['same']}. Left alone: {counts['skipped']} (fault history, read-only, and what has to "
         "be asked for: serial settings, motor data).".strip()
     )
+
+
+def _texts(profile: drivebus.Profile, code: str, *values: Any) -> list[str]:
+    """*values* of *code* with as many digits as the drive counts; empty for None."""
+    known = profile.describe(code)
+    return ["" if value is None else known.text(value) for value in values]
 
 
 def _is_told(item: drivebus.Restored) -> bool:
