@@ -24,7 +24,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
+        machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -157,6 +157,9 @@ ONLY ?=
 
 bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 	$(BENCH_PEERS)/bin/python tools/bench_report.py $(ONLY)
+
+screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
+	DRIVEBUS_SCREENS=all $(BIN)/python -m pytest -q tests/python/test_cli_screens.py
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)

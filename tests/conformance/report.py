@@ -181,12 +181,12 @@ each row one register is read, except at first contact.
 - **error**: the call raised what is named, or returned an object that says it is an error.
 - **hung**: the call did not return in 5 s.
 
-"True end" is what a caller has to be told: in some rows there is no right answer, and an error tells the truth. The
+"True end" is the result that a caller should get. In some rows there is no right answer, and an error is the true end. The
 times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with one
 that is silent on it."""
 
 OPTIONS = """\
-pymodbus, minimalmodbus and modbus-tk can be told that an adapter hands back what it sends (`handle_local_echo`); that
+pymodbus, minimalmodbus and modbus-tk have an option for adapters that echo what they send (`handle_local_echo`); that
 is off by default. pymodbus needs to be told that a broadcast has no answer. tmodbus is measured from a thread beside
 its event loop; uModbus leaves locking to its caller."""
 
