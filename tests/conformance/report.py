@@ -181,8 +181,8 @@ each row one register is read, except at first contact.
 - **error**: the call raised what is named, or returned an object that says it is an error.
 - **hung**: the call did not return in 5 s.
 
-"True end" is the result that a caller should get. In some rows there is no right answer, and an error is the true end. The
-times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with one
+"True end" is the result that a caller should get. In some rows there is no right answer, and an error is the true end.
+The times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with one
 that is silent on it."""
 
 OPTIONS = """\
