@@ -182,8 +182,8 @@ each row one register is read, except at first contact.
 - **hung**: the call did not return in 5 s.
 
 "True end" is the result that a caller should get. In some rows there is no right answer, and an error is the true end.
-The times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with one
-that is silent on it."""
+The times are those of the judged call. Two columns are drivebus: with a unit that answers the loop-back 08H, and with
+one that is silent on it."""
 
 OPTIONS = """\
 pymodbus, minimalmodbus and modbus-tk have an option for adapters that echo what they send (`handle_local_echo`); that
