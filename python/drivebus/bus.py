@@ -214,10 +214,10 @@ class Bus(BusFace, Requests):
         opened again. Several polls of a bus take turns.
 
         Args:
-            targets: What to ask of whom: register names or parameter codes of a `Drive`, None for its monitor
-                registers; of a unit that no profile is known of, by its address, `[(address, count), …]`.
-            interval: Seconds from one cycle's beginning to the next one's. Beats do not drift; those that pass while
-                the line is taken are counted (`Poll.late`) and not made up for. None: as fast as the wire.
+            targets: The drives, and what to read from each: register names or parameter codes, or None for the monitor
+                registers. A unit without a profile is given by its address, with `[(address, count), …]`.
+            interval: Seconds from the start of one cycle to the start of the next. Starts do not drift. Those that pass
+                while the line is busy are counted (`Poll.late`) and not made up for. None: as fast as the wire.
             size: How many samples are kept for whoever takes them; then the oldest give way (`Poll.dropped`).
             callback: Is called for each sample, in a thread of its own. What it raises ends the poll and is raised by
                 `Poll.wait` or at the end of the `with` block. In virtual time it is `Poll.wait` that calls it.

@@ -30,7 +30,7 @@ class Poll(Polling[Key]):
     Samples that nobody takes are kept, the latest *size* of them. Everything is safe from any thread.
 
     On a line in virtual time nothing is asked by itself: whoever waits for samples does the asking, and meanwhile time
-    moves. Beats that passed while nobody waited count as late.
+    moves. Starts of cycles that passed while nobody waited count as late.
 
     Attributes as those of `Polling`.
     """

@@ -260,7 +260,7 @@ class Polling(Generic[Key]):
 
     @property
     def late(self) -> int:
-        """Beats of `interval` that passed before the line was free. They are not made up for."""
+        """Starts of cycles that passed before the line was free. They are not made up for."""
         return self._native.counts()["late"]
 
     @property
