@@ -115,7 +115,7 @@ def test_who_has_no_standard_input_is_not_asked() -> None:
     )
     assert (done.returncode, done.stderr.splitlines()[-1]) == (
         2,
-        "Error: without a terminal this needs --yes; nothing was written",
+        "Error: without a terminal this needs --yes; nothing was done",
     )
 
 

@@ -40,7 +40,7 @@ class _Run(click.Command):
 @yes_option
 @each_drive
 def run(session: Session, hz: float | None, reverse: bool, wait: float | None, force: bool, yes: bool) -> None:
-    """Start the motor, at HZ if given. The motor keeps running when this command has ended."""
+    """Start the motor, at HZ if given, or change its speed. It keeps running when this command has ended."""
     session.will_write()
     way = "in reverse" if reverse else "forward"
     speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
@@ -123,6 +123,8 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
         if store:
             _say_kept([item.code for item in before if item.ok])
         session.out.rows(["code", "is", "needed", "verified", "label"], rows)
+        if not store:
+            session.out.say("It is kept in RAM, until the drive is switched off; --store keeps it in EEPROM.")
 
 
 @click.command()

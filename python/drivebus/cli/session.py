@@ -285,7 +285,7 @@ def ask_once(texts: Sequence[str], yes: bool) -> None:
         return
     # Who closed standard input has none at all.
     if sys.stdin is None or not sys.stdin.isatty():
-        raise click.UsageError("without a terminal this needs --yes; nothing was written")
+        raise click.UsageError("without a terminal this needs --yes; nothing was done")
     try:
         wanted = click.confirm("Is the machine clear? Go ahead?", err=True)
     except click.Abort:
