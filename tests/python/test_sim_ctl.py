@@ -134,7 +134,7 @@ def test_people_see_the_line_and_each_drive() -> None:
     with served("--units", "1=gd350,7=vfd500"):
         shown = CliRunner().invoke(cli, ["sim", "ctl", "load", "7", "80%"]).stdout.splitlines()
         assert re.fullmatch(r"port +/dev/pts/\d+", shown[0])
-        assert shown[1:3] == ["settings  19200 8E1", "faults    none"]
+        assert shown[1:3] == ["settings     19200 8E1", "line faults  none"]
         assert shown[4].split() == ["unit", "family", "state", "frequency", "load", "fault"]
         assert [line.split() for line in shown[5:]] == [
             ["1", "gd350", "stopped", "0.00", "Hz", "30", "%", "none"],

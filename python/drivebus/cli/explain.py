@@ -153,7 +153,7 @@ def _range(row: drivebus.Description) -> str:
 @click.option("--all", "everything", is_flag=True, help="List every fault of the family. No drive is asked for faults.")
 @each_drive
 def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
-    """Explain the present fault, and list the last ones with the values that the drive kept of the latest.
+    """Explain the present fault, and list the last ones, with the values that the drive kept if they are known.
 
     FAULT is a number, the letters on the keypad (`drivebus faults OL1`), or words (`drivebus faults earth short`). No
     drive is asked for faults then.

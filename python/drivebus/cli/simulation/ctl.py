@@ -71,7 +71,7 @@ def _show(session: Session, now: Order) -> None:
         {
             "port": now["port"] if now["plugged"] else f"{now['port']}, unplugged",
             "settings": now["settings"],
-            "faults": faults or "none",
+            "line_faults": faults or "none",
         }
     )
     session.out.say("")
