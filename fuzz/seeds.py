@@ -353,6 +353,7 @@ def main() -> None:
         "listener": listened,
         "master": masters(),
         "profile": profiles(),
+        "sniffer": listened,
         "slave": {name: b"\0" + stream for name, stream in listened.items()},
     }
     for target, seeds in corpus.items():

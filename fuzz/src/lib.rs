@@ -15,6 +15,7 @@ mod master;
 mod oracle;
 mod profile;
 mod slave;
+mod sniffer;
 mod stream;
 mod told;
 
@@ -26,12 +27,13 @@ pub use listener::listener;
 pub use master::master;
 pub use profile::profile;
 pub use slave::slave;
+pub use sniffer::sniffer;
 
 /// A target: panics when its invariant does not hold.
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus and of its program.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("frame", frame),
     ("framer", framer),
     ("listener", listener),
@@ -40,4 +42,5 @@ pub const TARGETS: [(&str, Target); 8] = [
     ("profile", profile),
     ("bus", bus),
     ("guest", guest),
+    ("sniffer", sniffer),
 ];

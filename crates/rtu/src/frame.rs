@@ -162,6 +162,14 @@ impl Adu {
         self.len = body + CRC_LEN;
     }
 
+    /// A copy of `frame`.
+    pub(crate) fn copy_of(frame: &Frame<'_>) -> Self {
+        let mut adu = Self::new();
+        adu.len = frame.as_bytes().len();
+        adu.bytes[..adu.len].copy_from_slice(frame.as_bytes());
+        adu
+    }
+
     pub(crate) const fn clear(&mut self) {
         self.len = 0;
     }

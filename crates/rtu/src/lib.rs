@@ -17,6 +17,7 @@ mod raw;
 mod request;
 mod serial;
 mod slave;
+mod sniffer;
 mod time;
 mod unit_set;
 mod words;
@@ -37,5 +38,6 @@ pub use pdu::{AnswerLength, ExceptionCode, MAX_PDU, MAX_READ, MAX_WRITE, functio
 pub use request::{Request, RequestError};
 pub use serial::{DataBits, Parity, SerialFormat, SerialFormatError, Silence, StopBits};
 pub use slave::{Slave, SlaveEvent};
+pub use sniffer::{Heard, Role, Sniffer};
 pub use time::Instant;
 pub use words::Words;

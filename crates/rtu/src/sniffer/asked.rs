@@ -1,0 +1,117 @@
+//! A request that was heard, and what can be its answer.
+
+use crate::Instant;
+use crate::frame::{Adu, Frame};
+use crate::pdu::MAX_READ;
+use crate::pdu::function::EXCEPTION_BIT;
+use crate::request::Request;
+
+use super::lengths::{self, Length};
+
+/// Most bits of one 01H or 02H read.
+const MAX_BITS: u16 = 2_000;
+
+/// A request that was heard.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    adu: Adu,
+    /// When it had come.
+    pub(super) ended: Instant,
+    /// Whether its answer may still come.
+    pub(super) is_open: bool,
+    /// When something came that may have been its answer, or the same request once more.
+    pub(super) doubted: Option<Instant>,
+    /// Whether the unit has spoken since and was not understood: no late answer will come.
+    pub(super) has_spoken: bool,
+}
+
+impl Asked {
+    pub(super) fn new(frame: &[u8], ended: Instant) -> Self {
+        // Nobody answers what all are told.
+        let is_open = frame[0] != 0;
+        Self { adu: Adu::copy_of(&Frame::found(frame)), ended, is_open, doubted: None, has_spoken: false }
+    }
+
+    pub(super) fn bytes(&self) -> &[u8] {
+        self.adu.as_bytes()
+    }
+
+    /// Whether `frame` can be the answer.
+    pub(super) fn is_answered_by(&self, frame: &[u8]) -> bool {
+        is_pair(self.bytes(), frame)
+    }
+
+    /// Whether `bytes`, which are not a frame, look like a damaged answer.
+    pub(super) fn is_answered_badly_by(&self, bytes: &[u8]) -> bool {
+        let [unit, function, ..] = *self.bytes() else { return false };
+        bytes.windows(2).any(|pair| pair[0] == unit && pair[1] & !EXCEPTION_BIT == function)
+    }
+
+    /// Whether a unit's answer, of whichever unit, would not look like `frame`, which a master may have sent.
+    pub(super) fn is_followed_by(&self, frame: &[u8]) -> bool {
+        can_ask(frame) && !may_be_answer(frame) && !self.is_answered_by(frame)
+    }
+
+    /// How long the answer is, if `here` begins as it.
+    pub(super) fn answer_len(&self, here: &[u8]) -> Length {
+        let asked = self.bytes();
+        match *here {
+            [unit, function, ..] if unit == asked[0] && function == asked[1] && self.fits(here) => {
+                lengths::of_answer(here)
+            }
+            _ => Length::Never,
+        }
+    }
+
+    /// Whether the answer that begins with `here` has as many bytes as are asked for.
+    fn fits(&self, here: &[u8]) -> bool {
+        let asked = self.bytes();
+        let count = || usize::from(u16::from_be_bytes([asked[4], asked[5]]));
+        match *here {
+            [_, 0x01 | 0x02, bytes, ..] => usize::from(bytes) == count().div_ceil(8),
+            [_, 0x03 | 0x04 | 0x17, bytes, ..] => usize::from(bytes) == 2 * count(),
+            [_, 0x01..=0x04 | 0x17] => false,
+            _ => true,
+        }
+    }
+}
+
+/// Whether `answer` can be the answer to `request`.
+pub(super) fn is_pair(request: &[u8], answer: &[u8]) -> bool {
+    request[0] == answer[0]
+        && request[0] != 0
+        && Request::parse(pdu(request)).is_ok_and(|asked| asked.judge(pdu(answer)).is_ok())
+}
+
+/// Whether a master may have sent `frame`.
+pub(super) fn can_ask(frame: &[u8]) -> bool {
+    match lengths::of_request(frame) {
+        Length::Is(len) => len == frame.len() && keeps_limits(pdu(frame)),
+        Length::Unknown => true,
+        Length::Later | Length::Never => false,
+    }
+}
+
+/// Whether a unit may have sent `frame`.
+pub(super) fn may_be_answer(frame: &[u8]) -> bool {
+    match lengths::of_answer(frame) {
+        Length::Is(len) => len == frame.len(),
+        Length::Unknown => true,
+        Length::Later | Length::Never => false,
+    }
+}
+
+/// Whether the request `pdu` keeps to the limits of its function.
+fn keeps_limits(pdu: &[u8]) -> bool {
+    let count = |high, low| u16::from_be_bytes([high, low]);
+    match *pdu {
+        [0x01 | 0x02, _, _, high, low] => (1..=MAX_BITS).contains(&count(high, low)),
+        [0x04, _, _, high, low] => (1..=MAX_READ).contains(&count(high, low)),
+        [0x05, _, _, high, low] => matches!([high, low], [0x00 | 0xFF, 0x00]),
+        _ => Request::parse(pdu).is_ok(),
+    }
+}
+
+fn pdu(frame: &[u8]) -> &[u8] {
+    Frame::found(frame).pdu()
+}
