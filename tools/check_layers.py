@@ -69,7 +69,7 @@ ROOMS: list[set[str]] = [
     {"errors", "later", "named"},
     {"values", "checks", "rtu"},
     {"attributes"},
-    {"profile", "site"},
+    {"profile", "site", "capture"},
     {"sim"},
     {"line"},
     {"identify"},
@@ -78,12 +78,12 @@ ROOMS: list[set[str]] = [
     {"watchdog", "poll"},
     {"drive"},
     {"bus"},
-    {"aio", "doctor"},
+    {"aio", "doctor", "sniffer"},
     {"__init__"},
 ]
 
 # Rooms that may import the compiled core.
-ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", "bus", "aio", "doctor", "__init__"}
+ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", "bus", "aio", "doctor", "capture", "sniffer", "__init__"}
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {

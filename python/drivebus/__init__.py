@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from drivebus.poll import Poll
     from drivebus.profile import Profile, profiles
     from drivebus.sim import Simulator
+    from drivebus.sniffer import Exchange, sniff
     from drivebus.values import (
         Choice,
         Control,
@@ -70,6 +71,7 @@ __all__ = [
     "Drive",
     "DrivebusError",
     "DrivebusWarning",
+    "Exchange",
     "Fault",
     "Found",
     "Identification",
@@ -100,6 +102,7 @@ __all__ = [
     "profiles",
     "rtu",
     "sim",
+    "sniff",
 ]
 
 if not TYPE_CHECKING:
@@ -130,6 +133,7 @@ if not TYPE_CHECKING:
             "poll": ("Poll",),
             "profile": ("Profile", "profiles"),
             "sim": ("Simulator",),
+            "sniffer": ("Exchange", "sniff"),
             "values": (
                 "Choice",
                 "Control",

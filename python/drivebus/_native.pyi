@@ -6,11 +6,12 @@ Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing wa
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, Generic, TypeVar, final
+from typing import Any, Final, Generic, TypeAlias, TypeVar, final
 
 from typing_extensions import Buffer
 
 _T_co = TypeVar("_T_co", covariant=True)
+_Piece: TypeAlias = tuple[str, bytes, float, float, float | None, float, float | None, str | None]
 
 __version__: Final[str]
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "SimulatedDrive",
     "SimulatedLine",
     "Simulator",
+    "Sniffer",
     "__version__",
     "begin_of_child",
     "check_port_options",
@@ -195,6 +197,12 @@ class Bus:
         """Waits on the line's clock; a signal ends it at once."""
     def listen(self, seconds: float, /) -> list[tuple[float, bytes]]:
         """What comes while nothing is asked: pieces, each with its moment on the line's clock."""
+    def overhear(self, function: Callable[[float, bool, bytes], object], /) -> None:
+        """Calls *function* with all that goes over the line, until it returns something true.
+
+        It is given a moment on the line's clock, whether this bus (or the program that has the port) sent it, and the
+        bytes as they were handed over; no bytes where only time has passed. Raises what it raises, and PortError.
+        """
     def read(
         self,
         unit: int,
@@ -632,6 +640,23 @@ class SimulatedDrive:
     @property
     def words_written(self) -> int:
         """How many words the drive has taken from the bus, ever."""
+
+@final
+class Sniffer:
+    """Finds the frames of both directions on a line that others use, and says of each who said it.
+
+    Pieces are `(role, data, began, ended, gap, pause, turnaround, error)`, in the order of the wire; each byte comes
+    out once. `role` is `"request"`, `"answer"` (to the request before it), `"late"`, `"doubtful"`, `"stray"` or
+    `"noise"`, which alone has an error: why it is not a frame. Moments are those given, times are seconds.
+    """
+
+    def __new__(cls, format: SerialFormat) -> Sniffer: ...  # noqa: A002
+    def receive(self, at: float, data: Buffer) -> list[_Piece]:
+        """Takes bytes that were handed over at *at*; returns what was heard by then."""
+    def poll(self, at: float) -> list[_Piece]:
+        """What was heard by *at*, although nothing came."""
+    def finish(self) -> list[_Piece]:
+        """The rest: nothing more will come."""
 
 @final
 class SimulatedLine:

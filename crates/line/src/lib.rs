@@ -94,5 +94,5 @@ pub use ports::{rs485, tty};
 #[cfg(all(unix, feature = "share"))]
 pub use share::place::run_time_folder;
 pub use system::clock;
-pub use trace::{Direction, Traced, Watch};
+pub use trace::{Direction, Overheard, Traced, Watch};
 pub use turns::order::Priority;

@@ -3,13 +3,18 @@
 //! A line that nobody watches is used as it is. One that somebody watches is used through [`Watched`], which looks at what
 //! it carries and changes nothing of it.
 
+mod ear;
+
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use drivebus_rtu::{Frame, Instant, function};
 
 use crate::line::{Line, LineClock, PortError};
+
+pub(crate) use ear::Ear;
+pub use ear::Overheard;
 
 /// After how long a silence the bytes that came are shown although they are no frame. An adapter hands over what it collects
 /// within 16 ms.
@@ -58,9 +63,15 @@ impl fmt::Display for Traced {
 /// Who watches: called for each frame, in the thread that uses the line and while it does.
 pub type Watch = Arc<dyn Fn(Traced) + Send + Sync>;
 
-/// Who watches a bus now; all who use its line share it.
+/// Who watches a bus now, and who overhears it; all who use its line share it.
 #[derive(Clone, Default)]
-pub(crate) struct Trace(Arc<Mutex<Option<Watch>>>);
+pub(crate) struct Trace(Arc<Watchers>);
+
+#[derive(Default)]
+struct Watchers {
+    watch: Mutex<Option<Watch>>,
+    ears: Mutex<Vec<Weak<Ear>>>,
+}
 
 impl fmt::Debug for Trace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -70,11 +81,29 @@ impl fmt::Debug for Trace {
 
 impl Trace {
     pub(crate) fn set(&self, watch: Option<Watch>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = watch;
+        *self.0.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;
     }
 
     pub(crate) fn watch(&self) -> Option<Watch> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0.watch.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// An ear that has all that goes over the line for as long as it is kept.
+    pub(crate) fn ear(&self) -> Arc<Ear> {
+        let ear = Arc::new(Ear::default());
+        self.0.ears.lock().unwrap_or_else(PoisonError::into_inner).push(Arc::downgrade(&ear));
+        ear
+    }
+
+    fn tell_ears(&self, at: Instant, direction: Direction, bytes: &[u8]) {
+        let mut ears = self.0.ears.lock().unwrap_or_else(PoisonError::into_inner);
+        ears.retain(|ear| match ear.upgrade() {
+            Some(ear) => {
+                ear.put(Overheard { at, direction, bytes: bytes.to_vec() });
+                true
+            }
+            None => false,
+        });
     }
 }
 
@@ -140,6 +169,7 @@ impl Line for Watched {
         self.show_gathered();
         let at = self.line.now();
         let end = self.line.send(bytes)?;
+        self.trace.tell_ears(end, Direction::Sent, bytes);
         self.show(at, end, Direction::Sent, bytes);
         Ok(end)
     }
@@ -148,6 +178,7 @@ impl Line for Watched {
         let count = self.line.receive(buffer, until)?;
         let now = self.line.now();
         if count > 0 {
+            self.trace.tell_ears(now, Direction::Heard, &buffer[..count]);
             self.heard(now, &buffer[..count]);
         } else if self.is_quiet(now) {
             self.show_gathered();
@@ -174,6 +205,7 @@ impl Line for Watched {
     fn take_late(&mut self) -> Option<Vec<u8>> {
         let late = self.line.take_late()?;
         let now = self.line.now();
+        self.trace.tell_ears(now, Direction::Heard, &late);
         self.show(now, now, Direction::Heard, &late);
         Some(late)
     }

@@ -17,7 +17,7 @@ use crate::convert::{bytes_of, one_word, unit_address, words_of};
 use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
-use crate::trace;
+use crate::{overhear, trace};
 
 /// One line and its owner.
 #[pyclass(frozen, module = "drivebus._native")]
@@ -114,6 +114,11 @@ impl Bus {
     fn listen<'py>(&self, py: Python<'py>, seconds: f64) -> PyResult<Vec<(f64, Bound<'py, PyBytes>)>> {
         let time = duration("seconds", seconds)?;
         with_signals(py, |give_up| Heard::on(&self.core, time, give_up))?.into_python(py, self.core.name())
+    }
+
+    #[pyo3(signature = (function, /))]
+    fn overhear(&self, py: Python<'_>, function: &Bound<'_, PyAny>) -> PyResult<()> {
+        overhear::overhear(py, &self.core, function.as_unbound())
     }
 
     #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]

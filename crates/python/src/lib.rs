@@ -15,6 +15,7 @@ mod format;
 mod frames;
 mod mailbox;
 mod open;
+mod overhear;
 mod plan;
 mod poll;
 mod profile;
@@ -22,6 +23,7 @@ mod pyserial;
 mod requests;
 mod sim;
 mod sim_line;
+mod sniffer;
 mod tables;
 mod trace;
 
@@ -54,6 +56,8 @@ mod _native {
     use crate::sim::{SimulatedDrive, Simulator};
     #[pymodule_export]
     use crate::sim_line::{SimulatedLine, fault_kinds};
+    #[pymodule_export]
+    use crate::sniffer::Sniffer;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -30,6 +30,7 @@ use crate::share::message::{Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, 
 use crate::share::place::{Door, Place};
 use crate::system::clock::monotonic;
 use crate::system::process::{self, Process};
+use crate::trace::{Direction, Overheard};
 use crate::turns::order::Program;
 
 /// The longest message of a guest: one request with its options.
@@ -262,6 +263,16 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
             };
             let ended =
                 shared.listen_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            Told::Over(ended.err().as_ref().map(Said::from))
+        }
+        Wish::Overhear(time) => {
+            let mut hear = |piece: Overheard| {
+                let Overheard { at, direction, bytes } = piece;
+                let sent = direction == Direction::Sent;
+                let _ = channel.borrow_mut().say(&Told::Overheard { at: at.as_nanos(), sent, bytes });
+            };
+            let ended =
+                shared.overhear_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
             Told::Over(ended.err().as_ref().map(Said::from))
         }
         Wish::Stats => Told::Stats(Box::new(Figures::from(shared.stats()))),

@@ -229,11 +229,18 @@ impl Shared {
         self.clock.now().or_else(|| self.owner.try_lock().ok().map(|owner| owner.now()))
     }
 
-    /// From now on `watch` has what goes over the line; from inside of it, from the next line on.
+    /// From now on `watch` has what goes over the line.
     pub(super) fn watch(&self, watch: Option<Watch>) {
         let shows = watch.is_some();
         self.trace.set(watch);
-        if shows && !self.queue.has_this_thread() {
+        if shows {
+            self.show();
+        }
+    }
+
+    /// From now on those who watch have what goes over the line; from inside of it, from the next line on.
+    pub(super) fn show(&self) {
+        if !self.queue.has_this_thread() {
             self.lock().show_to(&self.trace);
         }
     }

@@ -17,7 +17,7 @@ use crate::share::failure::Said;
 use crate::share::guest::{Guest, Lost};
 use crate::share::message::{Order, Told, Wish, nanos};
 use crate::system::clock::monotonic;
-use crate::trace::{Direction, Traced};
+use crate::trace::{Direction, Overheard, Traced};
 use crate::turns::order::Priority;
 use crate::turns::queue::Turn;
 
@@ -25,6 +25,17 @@ use crate::turns::queue::Turn;
 const HANDS: u32 = 16;
 /// How long something may take that waits for no turn.
 const AT_ONCE: Duration = Duration::from_secs(1);
+
+/// Hears a piece of the line, asking now and then whether to go on.
+type Hear<'a> = dyn FnMut(&mut dyn FnMut() -> bool, Whose) -> Result<(), Failure> + 'a;
+
+/// Where the line is heard.
+enum Whose {
+    /// In this program, for so long.
+    Ours(Duration),
+    /// In another, which tells this.
+    Theirs(Told),
+}
 
 impl Shared {
     /// What becomes of a call on a port that is shared.
@@ -203,27 +214,59 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         hear: &mut dyn FnMut(Instant, &[u8]),
     ) -> Result<(), Failure> {
-        let Some(sharing) = &self.sharing else { return self.listen_here(time, give_up, hear) };
+        self.listen_where_the_line_is(time, Wish::Listen, give_up, &mut |give_up, heard| match heard {
+            Whose::Ours(left) => self.listen_here(left, give_up, hear),
+            Whose::Theirs(Told::Heard { at, bytes }) => {
+                hear(Instant::from_nanos(at), &bytes);
+                Ok(())
+            }
+            Whose::Theirs(_) => Ok(()),
+        })
+    }
+
+    pub(super) fn overhear(
+        &self,
+        time: Duration,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut dyn FnMut(Overheard),
+    ) -> Result<(), Failure> {
+        self.listen_where_the_line_is(time, Wish::Overhear, give_up, &mut |give_up, heard| match heard {
+            Whose::Ours(left) => self.overhear_here(left, give_up, hear),
+            Whose::Theirs(Told::Overheard { at, sent, bytes }) => {
+                let direction = if sent { Direction::Sent } else { Direction::Heard };
+                hear(Overheard { at: Instant::from_nanos(at), direction, bytes });
+                Ok(())
+            }
+            Whose::Theirs(_) => Ok(()),
+        })
+    }
+
+    /// Hears the line for `time` in this program or, by `wish`, in the one that has the port, whoever that is meanwhile.
+    fn listen_where_the_line_is(
+        &self,
+        time: Duration,
+        wish: impl Fn(u64) -> Wish,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut Hear<'_>,
+    ) -> Result<(), Failure> {
+        let Some(sharing) = &self.sharing else { return hear(give_up, Whose::Ours(time)) };
         let end = self.now() + time;
         for _ in 0..HANDS {
             let left = end.saturating_duration_since(self.now());
             let Some(guest) = sharing.guest() else {
-                match self.listen_here(left, give_up, hear) {
+                match hear(give_up, Whose::Ours(left)) {
                     Err(Failure::Port(_)) if sharing.is_guest() => continue,
                     result => return result,
                 }
             };
             let mut ended = None;
-            let mut give_up = || self.is_shut() || give_up();
-            let asked = guest.ask(&Wish::Listen(nanos(left)), false, &mut give_up, &mut |told| match told {
-                Told::Heard { at, bytes } => {
-                    hear(Instant::from_nanos(at), &bytes);
-                    false
-                }
+            let mut is_over = || self.is_shut() || give_up();
+            let asked = guest.ask(&wish(nanos(left)), false, &mut is_over, &mut |told| match told {
                 Told::Over(why) => {
                     ended = why.map(Failure::from);
                     true
                 }
+                Told::Heard { .. } | Told::Overheard { .. } => hear(&mut || false, Whose::Theirs(told)).is_err(),
                 _ => true,
             });
             match (asked, ended) {

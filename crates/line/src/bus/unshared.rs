@@ -16,6 +16,7 @@ use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions};
 use crate::ports::key::PortKey;
+use crate::trace::Overheard;
 use crate::turns::queue::Turn;
 
 /// There is none.
@@ -79,6 +80,15 @@ impl Shared {
         hear: &mut dyn FnMut(Instant, &[u8]),
     ) -> Result<(), Failure> {
         self.listen_here(time, give_up, hear)
+    }
+
+    pub(super) fn overhear(
+        &self,
+        time: Duration,
+        give_up: &mut dyn FnMut() -> bool,
+        hear: &mut dyn FnMut(Overheard),
+    ) -> Result<(), Failure> {
+        self.overhear_here(time, give_up, hear)
     }
 
     pub(super) fn stats(&self) -> Stats {

@@ -20,7 +20,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 1;
+pub(crate) const VERSION: u8 = 2;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -77,6 +77,8 @@ pub(crate) enum Wish {
     Call(Order),
     /// Hearing the line for so many nanoseconds.
     Listen(u64),
+    /// Hearing all that goes over the line for so many nanoseconds.
+    Overhear(u64),
     Stats,
     Link(u8),
     FreshWord,
@@ -103,6 +105,11 @@ pub(crate) enum Told {
     },
     Heard {
         at: u64,
+        bytes: Vec<u8>,
+    },
+    Overheard {
+        at: u64,
+        sent: bool,
         bytes: Vec<u8>,
     },
     /// Nothing more is heard; why, if it ended early.

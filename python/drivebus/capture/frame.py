@@ -1,0 +1,22 @@
+"""One frame of a capture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Captured"]
+
+
+@dataclass(frozen=True, slots=True)
+class Captured:
+    """A frame that went over a line, or bytes that are not one.
+
+    Attributes:
+        time: Unix time in seconds at which it had come or had left; None where the capture does not tell.
+        data: All of it, with address and CRC.
+        asks: Whether a master sent it; None where the capture does not tell.
+    """
+
+    time: float | None
+    data: bytes
+    asks: bool | None = None

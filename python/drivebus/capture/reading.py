@@ -1,0 +1,57 @@
+"""Opens a capture, whatever it is: pcapng, or hex text of any tool."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from drivebus.capture import links, pcapng, text
+from drivebus.capture.frame import Captured
+from drivebus.errors import NotAllowed
+
+__all__ = ["read"]
+
+_OLD_PCAP = (b"\xa1\xb2\xc3\xd4", b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\x3c\x4d", b"\x4d\x3c\xb2\xa1")
+_MOST_TEXT = 64 * 1024 * 1024
+
+
+def read(path: str | os.PathLike[str]) -> Iterator[Captured]:
+    """The frames of the capture at *path*, in its order.
+
+    Raises:
+        NotAllowed: It cannot be read, is not a capture, is one of another kind of line, or breaks off; what came before
+            was yielded.
+    """
+    name = os.fspath(path)
+    try:
+        with Path(path).open("rb") as stream:
+            magic = stream.read(4)
+            stream.seek(0)
+            if magic == pcapng.MAGIC:
+                for packet in pcapng.packets(stream, name):
+                    yield links.captured(packet, name)
+                return
+            if magic in _OLD_PCAP:
+                raise NotAllowed(
+                    f"{name} is a capture in the older pcap format; save it as pcapng (Wireshark: Save As)"
+                )
+            data = stream.read(_MOST_TEXT + 1)
+    except OSError as error:
+        raise NotAllowed(f"{name} cannot be read: {error.strerror or error}") from None
+    yield from _text(data, name)
+
+
+def _text(data: bytes, name: str) -> Iterator[Captured]:
+    if len(data) > _MOST_TEXT:
+        raise NotAllowed(f"{name} is not a pcapng file, and too long to be hex text: {_MOST_TEXT >> 20} MiB at most")
+    try:
+        written = data.decode()
+    except UnicodeDecodeError:
+        raise NotAllowed(f"{name} is neither a pcapng file nor hex text") from None
+    found = False
+    for frame in text.frames(written):
+        found = True
+        yield frame
+    if not found:
+        raise NotAllowed(f"{name} holds no frame: it is neither a pcapng file nor hex text with a frame on a line")

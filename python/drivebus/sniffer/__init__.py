@@ -1,0 +1,13 @@
+"""Listening to others on a line, without a word: who asks whom for what, and what comes of it.
+
+`frames` says what stands in a frame, `families` which family a unit may be, `pairing` makes exchanges of what the core
+has told apart, `figures` counts them and says what they mean for the line, and `listening` hears a port.
+"""
+
+from drivebus.sniffer.exchange import Exchange
+from drivebus.sniffer.families import Families
+from drivebus.sniffer.figures import Figures
+from drivebus.sniffer.listening import sniff
+from drivebus.sniffer.pairing import exchanges_in
+
+__all__ = ["Exchange", "Families", "Figures", "exchanges_in", "sniff"]
