@@ -87,7 +87,7 @@ ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", 
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"drivebus", "later", "line", "rtu", "sim", "site"},
+    "cli": {"capture", "drivebus", "later", "line", "rtu", "sim", "site", "sniffer"},
     "__main__": {"cli"},
 }
 

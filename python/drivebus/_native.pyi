@@ -645,9 +645,10 @@ class SimulatedDrive:
 class Sniffer:
     """Finds the frames of both directions on a line that others use, and says of each who said it.
 
-    Pieces are `(role, data, began, ended, gap, pause, turnaround, error)`, in the order of the wire; each byte comes
+    Pieces are `(role, data, began, ended, gap, kept, turnaround, error)`, in the order of the wire; each byte comes
     out once. `role` is `"request"`, `"answer"` (to the request before it), `"late"`, `"doubtful"`, `"stray"` or
-    `"noise"`, which alone has an error: why it is not a frame. Moments are those given, times are seconds.
+    `"noise"`, which alone has an error: why it is not a frame. `kept` is how long the adapter kept it back at least.
+    Moments are those given, times are seconds.
     """
 
     def __new__(cls, format: SerialFormat) -> Sniffer: ...  # noqa: A002

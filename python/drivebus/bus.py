@@ -22,7 +22,6 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads, Sample
 from drivebus.line.settings import BusFace, Opening, check_trust
-from drivebus.line.trace import Trace
 from drivebus.operations.program_end import end_over
 from drivebus.poll import Poll
 from drivebus.profile import Profile
@@ -63,6 +62,8 @@ class Bus(BusFace, Requests):
             has it and serves the others, who comes next uses it through that one; `"own"`: nobody is served where this
             program has the port; `"never"`: nobody is served, and a port that another program has is busy. For serial
             ports and `socket://`.
+        trace: A file that gets every frame of this bus, for Wireshark: pcapng, which it dissects as Modbus RTU without
+            a setting. A file that is there is replaced. None keeps nothing, and costs nothing.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.
@@ -75,8 +76,12 @@ class Bus(BusFace, Requests):
 
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
-        self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
-        Trace(self._native, opening.known).as_asked_for()
+        try:
+            self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
+        except BaseException:
+            opening.close()
+            raise
+        opening.trace.begin(self._native)
         Requests.__init__(self, self._native, opening.known)
 
     def _core(self) -> _native.Bus:
@@ -90,8 +95,7 @@ class Bus(BusFace, Requests):
         """
         end_over(self.line)
         self._native.close()
-        if self._opening.owned is not None:
-            self._opening.owned.close()
+        self._opening.close()
 
     def __enter__(self) -> Bus:
         return self

@@ -10,8 +10,8 @@ use pyo3::types::PyBytes;
 use crate::convert::bytes_of;
 use crate::format::SerialFormat;
 
-/// A piece of what was heard: who said it, its bytes, when it began and ended, the gap before it, the longest pause within
-/// it, the turnaround, and why it is not a frame.
+/// A piece of what was heard: who said it, its bytes, when it began and ended, the gap before it, how long it was kept
+/// back, the turnaround, and why it is not a frame.
 type Piece<'py> = (&'static str, Bound<'py, PyBytes>, f64, f64, Option<f64>, f64, Option<f64>, Option<String>);
 
 /// Finds the frames of both directions, and says of each who said it.
@@ -83,7 +83,7 @@ fn piece<'py>(py: Python<'py>, heard: &Heard<'_>) -> Piece<'py> {
     let seconds = |moment: Instant| moment.saturating_duration_since(Instant::ZERO).as_secs_f64();
     let (gap, turnaround) = (heard.gap.map(|gap| gap.as_secs_f64()), heard.turnaround.map(|time| time.as_secs_f64()));
     let bytes = PyBytes::new(py, heard.bytes);
-    (role, bytes, seconds(heard.began), seconds(heard.ended), gap, heard.pause.as_secs_f64(), turnaround, error)
+    (role, bytes, seconds(heard.began), seconds(heard.ended), gap, heard.kept.as_secs_f64(), turnaround, error)
 }
 
 /// A moment in seconds; what is no moment is the start of the clock.

@@ -83,6 +83,9 @@ pub struct Heard<'a> {
     pub gap: Option<Duration>,
     /// The longest time between two of its characters that was not theirs.
     pub pause: Duration,
+    /// How long its first character was kept back at least, by whatever hands over several at once. What is shorter than
+    /// this, the moments do not tell.
+    pub kept: Duration,
     /// Of an answer, the time since the end of its request.
     pub turnaround: Option<Duration>,
 }
@@ -202,7 +205,10 @@ impl Sniffer {
         if !matches!(role, Role::Noise(_)) {
             self.talk.paused(pause);
         }
-        Heard { bytes: &self.bytes[range], role, began, ended, gap, pause, turnaround }
+        let characters = u32::try_from(came.len() - 1).unwrap_or(u32::MAX);
+        let spread = came[came.len() - 1].saturating_duration_since(came[0]);
+        let kept = pause.max(self.format.chars(characters).saturating_sub(spread));
+        Heard { bytes: &self.bytes[range], role, began, ended, gap, pause, kept, turnaround }
     }
 
     /// When the first character of `range` began and when the last one had come.

@@ -496,11 +496,14 @@ fn a_frame_tells_when_it_came() {
     let request = sniffer.poll(at(36_000)).unwrap();
     // Eight characters of eleven bits at 19 200 bit/s take 4.583 ms.
     assert_eq!((request.ended, request.gap), (at(10_000), None));
+    // All eight came at once, so that the first was kept for the time of the seven behind it.
+    assert_eq!(request.kept, format.chars(7));
     assert_eq!(request.ended.saturating_duration_since(request.began), format.chars(8));
     let answer = sniffer.poll(at(36_000)).unwrap();
     assert_eq!(answer.ended, at(36_000));
     assert_eq!(answer.began, at(20_000));
     assert_eq!((answer.gap, answer.turnaround), (Some(Duration::from_millis(10)), Some(Duration::from_millis(10))));
+    assert_eq!(answer.kept, answer.pause);
     assert_eq!(answer.pause, Duration::from_millis(16).saturating_sub(format.char_time()));
 }
 

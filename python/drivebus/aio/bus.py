@@ -26,7 +26,6 @@ from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
-from drivebus.line.trace import Trace
 from drivebus.operations.face import documented_by
 from drivebus.operations.program_end import end_over
 from drivebus.profile import Profile
@@ -73,11 +72,10 @@ class Bus(BusFace):
         try:
             line = await Line.open(opening.target, opening.format, opening.keywords)
         except BaseException:
-            if opening.owned is not None:
-                opening.owned.close()
+            opening.close()
             raise
         self._native = line.native
-        Trace(line.native, opening.known).as_asked_for()
+        opening.trace.begin(line.native)
         self._line = line
         self._requests = AwaitedRequests(line, opening.known)
         return self
@@ -115,8 +113,7 @@ class Bus(BusFace):
         end_over(self.line)
         with self._line.undisturbed() as line:
             await line.close()
-            if self._opening.owned is not None:
-                self._opening.owned.close()
+            self._opening.close()
 
     @documented_by(Requests.read)
     async def read(

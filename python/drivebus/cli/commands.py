@@ -17,6 +17,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write")},
     "Keep": {"backup": ("backup", "restore", "diff")},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
+    "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
     "Tools": {"frames": ("raw", "decode"), "simulation": ("sim",), "tools": ("completion", "demo")},
 }
 """The names of each file's `COMMANDS`, in the order of the help. A test compares the two."""

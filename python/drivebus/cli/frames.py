@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from contextlib import suppress
 from datetime import datetime
 
@@ -103,15 +104,52 @@ def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None
 
 
 @click.command()
-@click.argument("data", metavar="HEX...", nargs=-1, required=True)
+@click.argument("data", metavar="FILE|HEX...", nargs=-1, required=True)
 @pass_session
 def decode(session: Session, data: tuple[str, ...]) -> None:
-    """Take a whole frame apart, CRC included. With --profile, registers are shown by name."""
+    """Take a whole frame apart, CRC included, or all frames of a capture.
+
+    A capture is a pcapng file of Wireshark's or `sniff -w`, or hex text of any tool. With --profile, registers are
+    shown by name; 3=gd350,5=vfd500 names the family of each unit.
+    """
+    if len(data) == 1 and _is_file(data[0]):
+        _decode_file(session, data[0])
+        return
     frame = names.parse_hex(data)
     kind = drivebus.rtu.decode(frame).kind
     _show_frame(session, "frame", frame, kind in _REQUESTS)
     if kind in _ALIKE:
         session.out.say(f"{'':<7}or the answer to it, which is the same")
+
+
+def _is_file(text: str) -> bool:
+    """Whether *text* is the name of a file: one that is there, or what no hex looks like."""
+    there = os.path.isfile(text)  # noqa: PTH113 - Path raises where a name is too long
+    return there or os.path.splitext(text)[1].lower() in (".pcapng", ".pcap", ".txt", ".log")  # noqa: PTH122
+
+
+def _decode_file(session: Session, file: str) -> None:
+    from drivebus.capture import Captured, read
+    from drivebus.cli.exchanges import Lines
+    from drivebus.sniffer import Families, exchanges_in
+
+    bits, parity, stop = session.line_format
+    line = drivebus.SerialFormat(session.baud, parity, int(stop), int(bits))
+    families = Families(names.parse_families(session.profile))
+    whole: list[Captured] = []
+    broken = None
+    try:
+        whole.extend(read(file))
+    except drivebus.NotAllowed as error:
+        # What came before it breaks off is shown.
+        if not whole:
+            raise
+        broken = error
+    shown = Lines(session.out, families, any(frame.time is not None for frame in whole))
+    for exchange in exchanges_in(whole, line, families):
+        shown.show(exchange)
+    if broken is not None:
+        raise broken
 
 
 def _check_commands(unit: int, body: bytes) -> None:

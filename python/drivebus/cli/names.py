@@ -20,6 +20,7 @@ __all__ = [
     "evidence",
     "named",
     "parse_assignment",
+    "parse_families",
     "parse_hex",
     "parse_units",
     "parse_variants",
@@ -112,6 +113,19 @@ def parse_units(text: str) -> list[int]:
             )
         units.extend(range(first, last + 1))
     return units
+
+
+def parse_families(text: str | None) -> dict[int, str] | str | None:
+    """What `--profile` says of several units: `3=gd350,5=vfd500`; one name is for all of them."""
+    if text is None or "=" not in text:
+        return text
+    families: dict[int, str] = {}
+    for part in text.split(","):
+        units, _, name = part.partition("=")
+        if not name.strip():
+            raise click.UsageError(f'"{part}" is not a unit and its family; write 3=gd350, or a list such as 1-4=gd350')
+        families |= dict.fromkeys(parse_units(units), name.strip())
+    return families
 
 
 def parse_variants(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, str]:

@@ -5,7 +5,7 @@ The functions check what is given, before anything is sent; `drivebus.aio.reques
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from drivebus import _native, checks
 from drivebus.errors import NotAllowed
@@ -57,19 +57,6 @@ class Requests:
         are theirs.
         """
         return self._native.listen(seconds_of(seconds))
-
-    def overhear(self, function: Callable[[float, bool, bytes], object], /) -> None:
-        """Calls *function* with all that goes over the line, until it returns something true. Nothing is sent.
-
-        It is given a moment on the line's clock, whether this bus sent it, or the program that has the port, and the
-        bytes as they were handed over: no bytes where 50 ms have passed without any. What others on the line say is
-        heard as well as what is asked on this bus and what comes of it. See `drivebus.sniff`, which makes exchanges of
-        it.
-
-        Raises:
-            PortError: The line was lost, or the bus closed.
-        """
-        self._native.overhear(function)
 
     def read(self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
         """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
@@ -14,6 +14,9 @@ from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
 from drivebus.line.write_guard import KnownUnits
 from drivebus.sim import Simulator, core_of
+
+if TYPE_CHECKING:
+    from drivebus.line.wire_file import WireFile
 
 __all__ = ["BusFace", "Opening", "check_trust"]
 
@@ -28,6 +31,7 @@ class Opening:
         simulator: The simulator behind it, if there is one.
         owned: What was made here, and ends with the bus.
         known: What is known of its units.
+        trace: Who watches its frames.
         shown: What was given as its port, for people.
     """
 
@@ -46,6 +50,7 @@ class Opening:
         low_latency: bool,
         queue: int,
         share: str,
+        trace: object,
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
@@ -74,12 +79,25 @@ class Opening:
         self.target = target
         self.known = KnownUnits()
         self.shown = str(port)
+        self.trace = Trace(self.known, None if trace is None else _wire_file(trace, self.shown, self.format))
+
+    def close(self) -> None:
+        """Ends what was made here: the bus is closed, or was never opened."""
+        self.trace.end()
+        if self.owned is not None:
+            self.owned.close()
 
 
 def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
         raise NotAllowed("trust_profile needs a profile: give profile=… (`--profile`) too")
+
+
+def _wire_file(path: object, port: str, line: SerialFormat) -> WireFile:
+    from drivebus.line.wire_file import WireFile
+
+    return WireFile(path, port, line)
 
 
 def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
@@ -136,6 +154,7 @@ class BusFace:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        trace: str | os.PathLike[str] | None = None,
     ) -> None:
         opening = Opening(
             port,
@@ -150,11 +169,12 @@ class BusFace:
             low_latency=low_latency,
             queue=queue,
             share=share,
+            trace=trace,
         )
         self.simulator = opening.simulator
         self.format = opening.format
         self._timeout = opening.timeout
-        self._traced = opening.known
+        self._trace = opening.trace
         self._begin(opening)
 
     def _begin(self, opening: Opening) -> None:
@@ -220,7 +240,8 @@ class BusFace:
         Args:
             on: False ends it.
         """
-        Trace(self._core(), self._traced).switch(checks.flag("on", on))
+        self._core()
+        self._trace.switch(checks.flag("on", on))
 
     @property
     def reconnects(self) -> int:

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import rtu
 from drivebus.errors import DrivebusError
 from drivebus.line.write_guard import KnownUnits
 from drivebus.profile import Profile
 from drivebus.values import Choice, Description
+
+if TYPE_CHECKING:
+    from drivebus.line.wire_file import WireFile
 
 __all__ = ["LOGGER", "Trace", "meaning"]
 
@@ -28,30 +31,50 @@ class _Watched(Protocol):
     """A bus of the core, as far as it is watched."""
 
     def watch(self, function: Any, /) -> None: ...
+    def now(self) -> float: ...
 
 
 class Trace:
-    """Logs each frame of a line with what it means.
+    """Logs each frame of a line with what it means, and keeps it in a file, as far as either is wanted.
 
     Args:
-        native: The bus of the core.
         known: The families of its units, as far as they are known.
+        file: Where frames are kept; None keeps none.
     """
 
-    def __init__(self, native: _Watched, known: KnownUnits) -> None:
-        self._native = native
+    def __init__(self, known: KnownUnits, file: WireFile | None) -> None:
+        self._native: _Watched | None = None
         self._known = known
+        self._file = file
+        self._logs = False
         self._asked: bytes | None = None
 
-    def as_asked_for(self) -> None:
-        """Begins where somebody wants the records already. Who never imported `logging` does not."""
+    def begin(self, native: _Watched) -> None:
+        """The line is open. Who never imported `logging` does not want its records."""
+        self._native = native
         logging = sys.modules.get("logging")
-        if logging is not None and logging.getLogger(LOGGER).isEnabledFor(logging.DEBUG):
-            self.switch(True)
+        self._logs = logging is not None and logging.getLogger(LOGGER).isEnabledFor(logging.DEBUG)
+        if self._file is not None:
+            self._file.begin(native.now())
+        if self._logs or self._file is not None:
+            native.watch(self._show)
 
     def switch(self, on: bool) -> None:
-        """Begins, or ends."""
-        self._native.watch(self._log if on else None)
+        """Begins to log, or ends."""
+        self._logs = on
+        if self._native is not None:
+            self._native.watch(self._show if on or self._file is not None else None)
+
+    def end(self) -> None:
+        """The line is closed."""
+        if self._file is not None:
+            self._file.end()
+
+    def _show(self, at: float, gap: float | None, sent: bool, frame: bytes, elsewhere: bool) -> None:
+        if self._file is not None:
+            self._file.write(at, sent, frame)
+        if self._logs:
+            self._log(at, gap, sent, frame, elsewhere)
 
     def _log(self, at: float, gap: float | None, sent: bool, frame: bytes, elsewhere: bool) -> None:
         import logging

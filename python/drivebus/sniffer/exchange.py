@@ -27,6 +27,7 @@ class Exchange:
         time: Unix time in seconds at which the first of it began.
         gap: Seconds since the end of what was heard before it; None of the first.
         turnaround: Seconds from the end of the request to the start of its answer; None where there is none.
+        answered: Unix time in seconds at which its answer had come; None where there is none.
         error: What went wrong, as an error that is not raised: `NoAnswer`, `Refused`, or `BadAnswer` with the bytes in
             `raw`. None of an exchange that is whole.
         profile: The name of the family that its values were read by; None where none is known.
@@ -41,6 +42,7 @@ class Exchange:
     gap: float | None
     turnaround: float | None
     error: DrivebusError | None
+    answered: float | None = None
     values: Mapping[str | int, Value] = field(default_factory=lambda: MappingProxyType({}))
     profile: str | None = None
     repeated: int = 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from drivebus import checks
 from drivebus.errors import DrivebusError
@@ -26,7 +26,7 @@ class Families:
     """The families of the units on a line that others use.
 
     A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed where
-    all registers that it is asked for stand in one profile and in no other; a guess says so.
+    all registers that it is asked for stand in one profile, or in some that mean the same by them; a guess says so.
 
     Args:
         given: A profile for each unit by its address, one for all, or None.
@@ -97,12 +97,15 @@ class Families:
         asked = self._asked.get(unit, set())
         if unit not in self._guessed:
             able = [Profile.builtin(name) for name in profiles()] if len(asked) >= _LEAST else []
-            fitting = [profile for profile in able if all(_has(profile, address) for address in asked)]
-            # Sisters share their registers: what they agree on is shown by the first of them, if one heads them all.
-            families = {profile.command_address for profile in fitting}
-            self._guessed[unit] = fitting[0] if len(fitting) == 1 or (fitting and len(families) == 1) else None
+            meant = {profile.name: _meant(profile, asked) for profile in able}
+            fitting = [profile for profile in able if None not in meant[profile.name]]
+            # Sisters share registers: where they mean the same by all of these, it does not matter which it is.
+            agree = len({meant[profile.name] for profile in fitting}) == 1
+            self._guessed[unit] = fitting[0] if agree else None
         return self._guessed[unit]
 
 
-def _has(profile: Profile, address: int) -> bool:
-    return profile.name_at(profile.plain_address(address)) is not None
+def _meant(profile: Profile, addresses: Iterable[int]) -> tuple[object, ...]:
+    """What *profile* means by each of *addresses*: name, unit, and what a word of 1000 is; None where it has none."""
+    names = [profile.name_at(profile.plain_address(address)) for address in sorted(addresses)]
+    return tuple(name and (name, profile.describe(name).unit, profile.decode(name, 1000)) for name in names)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 import queue
 import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from contextlib import closing
 from time import time
 
+from drivebus import _native, checks
 from drivebus.bus import Bus
 from drivebus.errors import PortError
 from drivebus.sniffer.exchange import Exchange
@@ -16,6 +18,8 @@ from drivebus.sniffer.families import Families, Given
 from drivebus.sniffer.pairing import Pairing
 
 __all__ = ["heard", "sniff"]
+
+_LONGEST = 31_536_000.0
 
 _LOOK_UP = 0.2
 """Seconds after which a listener looks up: Python runs signal handlers between two waits."""
@@ -29,8 +33,9 @@ def sniff(
     stopbits: int = 1,
     bytesize: int = 8,
     profiles: Given | Families = None,
+    duration: float | None = None,
     tap: Callable[[float, bytes], object] | None = None,
-) -> Iterator[Exchange]:
+) -> Generator[Exchange, None, None]:
     """Listens on *port* and yields each exchange as it is heard. Nothing is sent, ever.
 
         for exchange in drivebus.sniff("/dev/ttyUSB0", baudrate=9600, parity="N"):
@@ -38,7 +43,7 @@ def sniff(
 
     Who asks and who answers is worked out of the frames themselves. What cannot be told is said so: see
     `Exchange.error`. Where another program of this user has the port, or this one as a bus, all that goes over it is
-    heard too, what they ask included. Ends when the generator is closed.
+    heard too, what they ask included. Ends after *duration*, or when the generator is closed.
 
     Args:
         port: As `Bus` takes it, or a bus that is open, which is listened to with its own settings.
@@ -48,24 +53,27 @@ def sniff(
         bytesize: 7 or 8.
         profiles: What a unit's words mean: a profile for each unit by its address, one for all, or None, which takes
             what the units tell and guesses otherwise; see `Families`.
+        duration: Seconds to listen; None listens on.
         tap: Is called with each piece as it comes: Unix time in seconds, and the bytes as they were handed over.
 
     Raises:
         NotAllowed: An argument is wrong.
         PortError: The port is not there, busy or not permitted, or was lost.
     """
+    limit = math.inf if duration is None else checks.number("duration", duration, 0.0, _LONGEST)
     families = profiles if isinstance(profiles, Families) else Families(profiles)
     bus = port if isinstance(port, Bus) else None
     own = None
     if bus is None:
         bus = own = Bus(port, baudrate=baudrate, parity=parity, stopbits=stopbits, bytesize=bytesize, read_only=True)
-    return _exchanges(bus, own, families, tap)
+    return _exchanges(bus, own, families, limit, tap)
 
 
 def _exchanges(
-    bus: Bus, own: Bus | None, families: Families, tap: Callable[[float, bytes], object] | None
-) -> Iterator[Exchange]:
-    ahead = time() - bus.now()
+    bus: Bus, own: Bus | None, families: Families, limit: float, tap: Callable[[float, bytes], object] | None
+) -> Generator[Exchange, None, None]:
+    began = bus.now()
+    ahead = time() - began
     pairing = Pairing(bus.format, families, ahead)
     try:
         with closing(heard(bus)) as pieces:
@@ -73,6 +81,8 @@ def _exchanges(
                 if tap is not None and data:
                     tap(at + ahead, data)
                 yield from pairing.receive(at, data)
+                if bus.now() - began >= limit:
+                    break
         yield from pairing.finish()
     finally:
         if own is not None:
@@ -89,6 +99,8 @@ def heard(bus: Bus) -> Generator[tuple[float, bytes], None, None]:
     """
     pieces: queue.SimpleQueue[tuple[float, bytes] | BaseException | None] = queue.SimpleQueue()
     over = threading.Event()
+    core = bus.line
+    assert isinstance(core, _native.Bus)
 
     def put(at: float, _sent: bool, data: bytes) -> bool:
         pieces.put((at, data))
@@ -96,7 +108,7 @@ def heard(bus: Bus) -> Generator[tuple[float, bytes], None, None]:
 
     def hear() -> None:
         try:
-            bus.overhear(put)
+            core.overhear(put)
             pieces.put(None)
         except BaseException as error:
             pieces.put(error)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TypedDict
 
-from drivebus._native import SerialFormat, Sniffer
+from drivebus._native import SerialFormat, Sniffer, crc16, decode_answer
+from drivebus.capture import Captured
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.profile import Profile
 from drivebus.sniffer.exchange import Exchange
@@ -53,6 +55,12 @@ class Pairing:
         if self._open is not None and at - self._open[3] > _GIVEN_UP:
             yield self._unheard(self._open)
 
+    def take(self, pieces: Iterable[_Piece]) -> Iterator[Exchange]:
+        """The exchanges in *pieces* that were told apart elsewhere."""
+        yield from self._told(pieces)
+        if self._open is not None:
+            yield self._unheard(self._open)
+
     def finish(self) -> Iterator[Exchange]:
         """The rest: nothing more will come."""
         yield from self._told(self._sniffer.finish())
@@ -95,6 +103,7 @@ class Pairing:
             gap=asked[4],
             turnaround=None if answer is None else answer[6],
             error=error,
+            answered=None if answer is None else answer[3] + self._ahead,
             values=self._families.values(request, came),
             profile=None if profile is None else profile.name,
             repeated=repeated,
@@ -126,7 +135,7 @@ class Pairing:
 
     def _beside(self, piece: _Piece) -> Exchange:
         """What belongs to no request that is open."""
-        role, data, began, _, gap, _, _, why = piece
+        role, data, began, ended, gap, _, _, why = piece
         if role == "noise":
             error = CrcError if len(data) >= 4 else BadAnswer
             text = f"{len(data)} bytes are not a frame: {why}"
@@ -137,14 +146,75 @@ class Pairing:
         }
         text = texts.get(role, f"unit {data[0]} answered something that was not asked of it")
         wrong = BadAnswer(text, unit=data[0], raw=data)
-        return Exchange(data[0], None, data, began + self._ahead, gap, None, wrong, lump=self._lump)
+        return Exchange(
+            data[0], None, data, began + self._ahead, gap, None, wrong, ended + self._ahead, lump=self._lump
+        )
 
 
 def exchanges_in(
-    pieces: Iterable[tuple[float, bytes]], line: SerialFormat, families: Families | None = None
+    frames: Iterable[Captured], line: SerialFormat, families: Families | None = None
 ) -> Iterator[Exchange]:
-    """The exchanges in *pieces* of a line: Unix times in seconds, and the bytes that had come by then."""
+    """The exchanges in the *frames* of a capture.
+
+    Where the capture tells who sent each, that is believed; otherwise it is worked out, as of a line that is heard.
+    Frames without a time are taken to follow each other.
+    """
     pairing = Pairing(line, Families() if families is None else families)
-    for at, data in pieces:
-        yield from pairing.receive(at, data)
-    yield from pairing.finish()
+    known, began = list(frames), 0.0
+    if known and all(frame.asks is not None or not _is_frame(frame.data) for frame in known):
+        yield from pairing.take(_pieces(known, line))
+        return
+    for index, frame in enumerate(known):
+        # Moments near to zero: a float has no room for nanoseconds since 1970.
+        began = began or frame.time or 0.0
+        at = _BETWEEN * index if frame.time is None else frame.time - began
+        for exchange in pairing.receive(at + 1.0, frame.data):
+            yield _later(exchange, began - 1.0)
+    for exchange in pairing.finish():
+        yield _later(exchange, began - 1.0)
+
+
+_BETWEEN = 0.01
+"""Seconds between frames that have no time."""
+
+
+def _later(exchange: Exchange, by: float) -> Exchange:
+    answered = None if exchange.answered is None else exchange.answered + by
+    return replace(exchange, time=exchange.time + by, answered=answered)
+
+
+def _pieces(frames: Iterable[Captured], line: SerialFormat) -> Iterator[_Piece]:
+    """What the core would have told of *frames*, of which it is known who sent them."""
+    open_, asked = b"", 0.0
+    last: float | None = None
+    for frame in frames:
+        ended = frame.time or 0.0
+        began = ended - len(frame.data) * line.char_time
+        gap = None if last is None else max(began - last, 0.0)
+        last = ended
+        if not _is_frame(frame.data):
+            yield "noise", frame.data, began, ended, gap, 0.0, None, "its CRC does not match"
+        elif frame.asks:
+            open_, asked = frame.data, ended
+            yield "request", frame.data, began, ended, gap, 0.0, None, None
+        elif _answers(open_, frame.data):
+            open_ = b""
+            yield "answer", frame.data, began, ended, gap, 0.0, max(began - asked, 0.0), None
+        else:
+            yield "stray", frame.data, began, ended, gap, 0.0, None, None
+
+
+def _answers(request: bytes, answer: bytes) -> bool:
+    if not request or request[0] != answer[0]:
+        return False
+    try:
+        decode_answer(request, answer)
+    except Refused:
+        return True
+    except DrivebusError:
+        return False
+    return True
+
+
+def _is_frame(data: bytes) -> bool:
+    return len(data) >= 4 and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")

@@ -1,0 +1,181 @@
+"""`drivebus sniff`: what others say on a line, without a word of ours."""
+
+from __future__ import annotations
+
+import io
+import sys
+from contextlib import ExitStack, closing, nullcontext
+from pathlib import Path
+from typing import BinaryIO
+
+import click
+from click.core import ParameterSource
+from rich.live import Live
+
+import drivebus
+from drivebus.capture import Captured, Writer
+from drivebus.cli.exchanges import Filter, Lines
+from drivebus.cli.names import parse_families
+from drivebus.cli.output import remark
+from drivebus.cli.session import Session, pass_session
+from drivebus.cli.sniff_table import SniffTable
+from drivebus.cli.types import Place, Seconds, Whole
+from drivebus.sniffer import Exchange, Families, Figures
+
+__all__ = ["COMMANDS"]
+
+_EACH = 0.2
+"""Seconds between two looks of the live table."""
+
+
+@click.command()
+@click.argument("port", required=False)
+@click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
+@click.option("--count", "-n", type=Whole(1), help="Stop after so many exchanges.")
+@click.option("--write", "-w", "target", type=Place(), metavar="FILE", help="Also keep it for Wireshark; - is a pipe.")
+@click.option(
+    "--link",
+    type=click.Choice(["upper", "rtac"]),
+    default="upper",
+    show_default=True,
+    help="Link type of that file. upper: Wireshark needs no setting. rtac: line events, with `decode as`.",
+)
+@click.option("--force", is_flag=True, help="Replace the file if it is there.")
+@click.option(
+    "--function", "functions", multiple=True, metavar="HEX", help="Only this function, such as 06. Repeatable."
+)
+@click.option("--errors", is_flag=True, help="Only what went wrong: refusals, silence, damage, late answers.")
+@click.option("--table", is_flag=True, help="Show a live table of units and registers instead of lines.")
+@pass_session
+@click.pass_context
+def sniff(
+    context: click.Context,
+    session: Session,
+    port: str | None,
+    duration: float | None,
+    count: int | None,
+    target: str | None,
+    link: str,
+    force: bool,
+    functions: tuple[str, ...],
+    errors: bool,
+    table: bool,
+) -> None:
+    """Listen to other masters on a line and show who asks whom for what. Nothing is sent.
+
+    --unit shows these units only. --profile names the family of all units, or of each: 3=gd350,5=vfd500. Without it,
+    families are taken from what units say of themselves, or guessed.
+    """
+    port = port or session.port
+    if port is None:
+        raise click.UsageError("no port: give it, as in `drivebus sniff /dev/ttyUSB0`; `drivebus ports` lists them")
+    families = Families(parse_families(session.profile))
+    units = _units(context, session)
+    shown = Filter(units, frozenset(_function(text) for text in functions), errors)
+    bits, parity, stop = session.line_format
+    out = session.out
+    line = drivebus.SerialFormat(session.baud, parity, int(stop), int(bits))
+    figures = Figures(line.t35)
+    screen = SniffTable(port, families, figures) if table and out.live else None
+    lines = Lines(out, families)
+    seen, wrote = 0, False
+    with ExitStack() as opened:
+        writer = None
+        if target is not None:
+            stream = opened.enter_context(_opened(target, force))
+            writer, wrote = Writer(stream, port, f"{session.baud} {bits}{parity}{stop}", link), True
+        heard = drivebus.sniff(
+            port,
+            baudrate=session.baud,
+            parity=parity,
+            stopbits=int(stop),
+            bytesize=int(bits),
+            profiles=families,
+            duration=duration,
+        )
+        opened.enter_context(closing(heard))
+        live = opened.enter_context(
+            Live(screen, console=out.console, refresh_per_second=1 / _EACH, screen=True) if screen else nullcontext()
+        )
+        quiet = target == "-" or (table and live is not None)
+        if not out.as_json and live is None:
+            remark(f"Listening on {port}, {session.baud} {bits}{parity}{stop}. Ctrl-C ends it.")
+        try:
+            for exchange in heard:
+                figures.take(exchange)
+                if writer is not None:
+                    _keep(writer, exchange)
+                if not shown.lets_pass(exchange):
+                    continue
+                seen += 1
+                if screen is not None:
+                    screen.take(exchange)
+                elif not quiet:
+                    lines.show(exchange)
+                if count is not None and seen >= count:
+                    break
+        except KeyboardInterrupt:
+            pass
+    _told(session, figures, target if wrote else None)
+
+
+def _units(context: click.Context, session: Session) -> frozenset[int]:
+    """The units that were named; none where the option is left to its default."""
+    if context.find_root().get_parameter_source("units") is ParameterSource.DEFAULT:
+        return frozenset()
+    return frozenset(each.unit for each in session.several or (session,))
+
+
+def _function(text: str) -> int:
+    try:
+        function = int(text.upper().removesuffix("H"), 16)
+    except ValueError:
+        function = 0
+    if not 1 <= function <= 0x7F:
+        raise click.UsageError(f'"{text}" is not a function; give one in hexadecimal, 01 to 7F')
+    return function
+
+
+def _opened(target: str, force: bool) -> BinaryIO:
+    if target == "-":
+        return io.BufferedWriter(io.FileIO(sys.stdout.fileno(), "wb", closefd=False))
+    try:
+        return Path(target).open("wb" if force else "xb")
+    except FileExistsError:
+        raise click.UsageError(f"{target} is there already; give another name, or --force") from None
+    except OSError as error:
+        raise drivebus.NotAllowed(f"{target} cannot be written: {error.strerror}; nothing was opened") from None
+
+
+def _keep(writer: Writer, exchange: Exchange) -> None:
+    """Writes what was heard of *exchange*."""
+    if exchange.request is not None:
+        writer.write(Captured(exchange.time, exchange.request, True))
+    if exchange.answer is not None:
+        writer.write(Captured(exchange.answered or exchange.time, exchange.answer, False))
+    elif exchange.error is not None and exchange.error.raw:
+        writer.write(Captured(exchange.time, exchange.error.raw, None))
+
+
+def _told(session: Session, figures: Figures, target: str | None) -> None:
+    """Says what was heard, and what it means."""
+    asked = sum(unit.requests for unit in figures.units.values())
+    answered = sum(unit.answers for unit in figures.units.values())
+    if session.out.as_json:
+        session.out.record(
+            {"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": list(figures.hints())}
+        )
+    else:
+        remark(f"{asked} requests to {len(figures.units)} units, {answered} answered.")
+        for hint in figures.hints():
+            remark(f"- {hint}")
+    if not figures.exchanges:
+        remark(
+            "Nothing was heard: nobody speaks there, the wires are off or crossed, or the adapter only hears itself. "
+            f"`{session.doctor()}` looks at the line."
+        )
+    if target not in (None, "-"):
+        remark(f"Wireshark opens {target}; with `-o mbrtu.tcp.port:502` it tells a write from its answer.")
+
+
+COMMANDS = [sniff]

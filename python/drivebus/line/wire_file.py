@@ -1,0 +1,64 @@
+"""The frames of a bus as a file that Wireshark opens: what `Bus(trace=…)` writes."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from time import time
+
+from drivebus import checks
+from drivebus._native import SerialFormat
+from drivebus.capture import Captured, Writer
+from drivebus.errors import DrivebusWarning, NotAllowed
+
+__all__ = ["WireFile"]
+
+
+class WireFile:
+    """A capture of one bus, from its opening to its end. What is written there already is replaced.
+
+    Args:
+        path: The file.
+        port: The name of the port.
+        line: How characters look on it.
+
+    Raises:
+        NotAllowed: The file cannot be written; nothing was opened.
+    """
+
+    def __init__(self, path: object, port: str, line: SerialFormat) -> None:
+        if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
+            raise NotAllowed(f"trace is {checks.shown(path)}, which is not a file; give the path of a pcapng file")
+        self._name = str(os.fspath(path))
+        settings = f"{line.baudrate} {line.bytesize}{line.parity}{line.stopbits}"
+        try:
+            self._stream = Path(self._name).open("wb")  # noqa: SIM115 - it is open for as long as the bus
+            self._writer = Writer(self._stream, port, settings)
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            raise NotAllowed(f"{self._name} cannot be written: {reason}; nothing was opened") from None
+        self._ahead = 0.0
+
+    def begin(self, now: float) -> None:
+        """The line's clock stands at *now*."""
+        self._ahead = time() - now
+
+    def write(self, at: float, sent: bool, frame: bytes) -> None:
+        """Writes *frame*, which went over the line at *at*; a disk that is full ends the file, and not the line."""
+        if self._stream.closed:
+            return
+        try:
+            self._writer.write(Captured(at + self._ahead, frame, sent))
+        except OSError as error:
+            self.end()
+            warnings.warn(
+                f"{self._name} is not written any more: {error.strerror or error}", DrivebusWarning, stacklevel=2
+            )
+
+    def end(self) -> None:
+        """Closes the file."""
+        try:
+            self._stream.close()
+        except OSError:  # it was said when it was written
+            return

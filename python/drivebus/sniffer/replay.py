@@ -1,0 +1,170 @@
+"""Units that answer as those of a capture did."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+from collections import deque
+from collections.abc import Iterable
+from types import TracebackType
+
+from drivebus import checks
+from drivebus._native import SerialFormat, crc16
+from drivebus.errors import NotAllowed
+from drivebus.sniffer.exchange import Exchange
+
+__all__ = ["Replay"]
+
+_LOOK_UP = 0.2
+_CHUNK = 4096
+
+
+class Replay:
+    """Serves the answers of *exchanges* on a pseudo-terminal or over TCP, until it is closed.
+
+    Each request gets the answers that it got, in their order, and then the last of them again and again. An echo (08H)
+    of a unit that answered anything is returned: its word is new each time. Answers come at once, after the silence
+    that frames need.
+
+    Args:
+        exchanges: What was heard; what answers nothing is passed over.
+        line: How characters look, for the silence between frames.
+        transport: `"pty"`, `"tcp"`, or `"auto"`: the first of them that this system has.
+
+    Raises:
+        NotAllowed: No exchange has an answer, or this system has no pseudo-terminals.
+
+    Attributes:
+        port: What a program opens: a path, or `socket://127.0.0.1:…`.
+        unknown: Requests that came and that are not in the capture.
+    """
+
+    def __init__(self, exchanges: Iterable[Exchange], line: SerialFormat, transport: str = "auto") -> None:
+        checks.one_of("transport", transport, ("auto", "pty", "tcp"))
+        self._answers: dict[bytes, deque[bytes | None]] = {}
+        for exchange in exchanges:
+            if exchange.request is not None:
+                self._answers.setdefault(exchange.request, deque()).append(exchange.answer)
+        if not any(answer for answers in self._answers.values() for answer in answers):
+            raise NotAllowed("no request in the capture has an answer: there is nothing to replay")
+        self._units = {request[0] for request, answers in self._answers.items() if any(answers)}
+        self._line = line
+        self.unknown: set[bytes] = set()
+        self._over = threading.Event()
+        self._wake, self._woken = os.pipe()
+        if transport == "tcp" or (transport == "auto" and not hasattr(os, "openpty")):
+            self._open_tcp()
+        else:
+            self._open_pty()
+        self._thread = threading.Thread(target=self._serve, name="drivebus replay", daemon=True)
+        self._thread.start()
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Waits until it is closed, for *timeout* seconds at most."""
+        self._over.wait(timeout)
+
+    def close(self) -> None:
+        """Ends it."""
+        if not self._over.is_set():
+            self._over.set()
+            os.write(self._woken, b"!")
+            self._thread.join()
+            for descriptor in (self._wake, self._woken, *self._descriptors):
+                os.close(descriptor)
+            if self._server is not None:
+                self._server.close()
+
+    def __enter__(self) -> Replay:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open_pty(self) -> None:
+        if not hasattr(os, "openpty"):
+            raise NotAllowed('this system has no pseudo-terminals; say transport="tcp" (`--transport tcp`)')
+        import tty
+
+        ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        self._server: socket.socket | None = None
+        self._descriptors = [ours, theirs]
+        self.port = os.ttyname(theirs)
+
+    def _open_tcp(self) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self._descriptors = []
+        self.port = "socket://{}:{}".format(*self._server.getsockname())
+
+    def _serve(self) -> None:
+        """Answers whoever asks, one after the other."""
+        if self._server is None:
+            self._talk(self._descriptors[0])
+            return
+        while not self._over.is_set():
+            ready, _, _ = select.select([self._server.fileno(), self._wake], [], [])
+            if self._wake in ready:
+                return
+            client, _ = self._server.accept()
+            with client:
+                self._talk(client.fileno())
+
+    def _talk(self, descriptor: int) -> None:
+        heard = b""
+        while not self._over.is_set():
+            ready, _, _ = select.select([descriptor, self._wake], [], [], _LOOK_UP)
+            if self._wake in ready:
+                return
+            if not ready:
+                heard = b""
+                continue
+            try:
+                came = os.read(descriptor, _CHUNK)
+            except OSError:
+                return
+            if not came:
+                return
+            heard = self._answer_all(descriptor, heard + came)
+
+    def _answer_all(self, descriptor: int, heard: bytes) -> bytes:
+        """Answers the requests in *heard*; returns what is none yet."""
+        while (request := _first_frame(heard)) is not None:
+            heard = heard[heard.index(request) + len(request) :]
+            answer = self._answer(request)
+            if answer is not None:
+                threading.Event().wait(self._line.t35)
+                try:
+                    os.write(descriptor, answer)
+                except OSError:
+                    return b""
+        return heard
+
+    def _answer(self, request: bytes) -> bytes | None:
+        answers = self._answers.get(request)
+        if answers is not None:
+            return answers.popleft() if len(answers) > 1 else answers[0]
+        if request[1] == 0x08 and request[0] in self._units:
+            return request
+        self.unknown.add(request)
+        return None
+
+
+def _first_frame(heard: bytes) -> bytes | None:
+    """The first whole request in *heard*."""
+    for start in range(len(heard) - 3):
+        for length in _lengths(heard[start:]):
+            frame = heard[start : start + length]
+            if len(frame) == length and crc16(frame[:-2]) == int.from_bytes(frame[-2:], "little"):
+                return frame
+    return None
+
+
+def _lengths(here: bytes) -> list[int]:
+    """How long a request may be that begins so; of a function that does not tell, as long as there is."""
+    if here[1] in (0x0F, 0x10):
+        return [9 + here[6]] if len(here) > 6 else []
+    return [8] if here[1] in range(0x01, 0x09) else [len(here)]
