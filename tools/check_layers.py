@@ -83,7 +83,21 @@ ROOMS: list[set[str]] = [
 ]
 
 # Rooms that may import the compiled core.
-ON_THE_CORE = {"rtu", "profile", "sim", "line", "operations", "backup", "poll", "bus", "aio", "doctor", "capture", "sniffer", "__init__"}
+ON_THE_CORE = {
+    "rtu",
+    "profile",
+    "capture",
+    "sim",
+    "line",
+    "operations",
+    "backup",
+    "poll",
+    "bus",
+    "aio",
+    "doctor",
+    "sniffer",
+    "__init__",
+}
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {

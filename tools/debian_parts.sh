@@ -1,6 +1,6 @@
 #!/bin/sh
-# Brings mbpoll and libmodbus, which the interop tests talk to, and valgrind, which counts instructions, into .tools/
-# without touching the system.
+# Brings mbpoll and libmodbus, which the interop tests talk to, tshark, which reads captures, and valgrind, which counts
+# instructions, into .tools/ without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -17,11 +17,12 @@ have_valgrind() {
     [ "$(uname -sm)" != "Linux x86_64" ] || command -v valgrind >/dev/null 2>&1 ||
         [ -x "$tools/usr/libexec/valgrind/callgrind-amd64-linux" ]
 }
-have_all() { have_program && have_library && have_valgrind; }
+have_tshark() { command -v tshark >/dev/null 2>&1 || [ -x "$tools/usr/bin/tshark" ]; }
+have_all() { have_program && have_library && have_valgrind && have_tshark; }
 lacking() {
-    echo "of mbpoll, libmodbus and valgrind some are missing ($1); the checks that need them will be skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 valgrind" >&2
-    echo "    macOS:           brew install libmodbus, and mbpoll from its source" >&2
+    echo "of mbpoll, libmodbus, tshark and valgrind some are missing ($1); the checks that need them will be skipped." >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind" >&2
+    echo "    macOS:           brew install libmodbus wireshark, and mbpoll from its source" >&2
     exit 0
 }
 
@@ -29,6 +30,8 @@ have_all && exit 0
 packages=
 have_program && have_library || packages="mbpoll libmodbus5"
 have_valgrind || packages="$packages valgrind"
+wants_tshark=
+have_tshark || wants_tshark=yes
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"
 
 mkdir -p "$tools/apt/lists/partial" "$tools/apt/cache/archives/partial" "$tools/apt/debs"
@@ -37,6 +40,14 @@ cd "$tools/apt/debs" || exit 1
 as_is="-q -o APT::Sandbox::User=root -o Acquire::Retries=5"
 # Where the system's package lists are empty or old: lists of our own.
 own="$as_is -o Dir::State::lists=$tools/apt/lists -o Dir::Cache=$tools/apt/cache"
+# tshark needs libraries of its own: those that apt would install with it here.
+with_libraries() { apt-get "$@" -s install --no-install-recommends tshark 2>/dev/null | awk '/^Inst/ { print $2 }'; }
+# shellcheck disable=SC2086  # options, to be split
+if [ -n "$wants_tshark" ]; then
+    found=$(with_libraries $as_is)
+    [ -n "$found" ] || { apt-get $own update >/dev/null && found=$(with_libraries $own); }
+    packages="$packages $found"
+fi
 # shellcheck disable=SC2086  # options, to be split
 apt-get $as_is download $packages ||
     { apt-get $own update && apt-get $own download $packages; } ||

@@ -202,12 +202,12 @@ impl Sniffer {
         let pause = came.windows(2).map(|pair| pair[1].saturating_duration_since(pair[0])).max().unwrap_or_default();
         self.taken = range.end;
         let pause = pause.saturating_sub(self.format.char_time());
-        if !matches!(role, Role::Noise(_)) {
-            self.talk.paused(pause);
-        }
         let characters = u32::try_from(came.len() - 1).unwrap_or(u32::MAX);
         let spread = came[came.len() - 1].saturating_duration_since(came[0]);
         let kept = pause.max(self.format.chars(characters).saturating_sub(spread));
+        if !matches!(role, Role::Noise(_)) {
+            self.talk.kept_back(kept);
+        }
         Heard { bytes: &self.bytes[range], role, began, ended, gap, pause, kept, turnaround }
     }
 

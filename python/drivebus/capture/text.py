@@ -20,6 +20,8 @@ _BYTES = re.compile(
 )
 """Two bytes or more with something between them, or four and more without."""
 
+_MOMENT = re.compile(r"\b\d{4}-\d\d-\d\d\b|\b\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?\b")
+
 _BYTE = re.compile(r"[0-9a-f]{2}(?![0-9a-f]x)", re.IGNORECASE)
 _PREFIX = re.compile(r"0x", re.IGNORECASE)
 _ASKS = re.compile(r"->|>>|\b(?:tx|send|sent|sending|request|query|master|write)\b", re.IGNORECASE)
@@ -28,7 +30,8 @@ _ANSWERS = re.compile(r"<-|<<|\b(?:rx|recv|received|receiving|response|answer|re
 
 def frames(text: str) -> Iterator[Captured]:
     """The frames in *text*, one for each line that has one."""
-    for line in text.splitlines():
+    for written in text.splitlines():
+        line = _MOMENT.sub(lambda moment: "_" * len(moment[0]), written)
         found = max(_BYTES.finditer(line), key=lambda match: len(match[0]), default=None)
         if found is None:
             continue

@@ -6,6 +6,7 @@ import os
 import warnings
 from pathlib import Path
 from time import time
+from typing import BinaryIO, cast
 
 from drivebus import checks
 from drivebus._native import SerialFormat
@@ -33,12 +34,19 @@ class WireFile:
         self._name = str(os.fspath(path))
         settings = f"{line.baudrate} {line.bytesize}{line.parity}{line.stopbits}"
         try:
-            self._stream = Path(self._name).open("wb")  # noqa: SIM115 - it is open for as long as the bus
-            self._writer = Writer(self._stream, port, settings)
+            self._stream = cast(BinaryIO, Path(self._name).open("wb", buffering=0))  # noqa: SIM115 - open as long as the bus
         except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise NotAllowed(f"{self._name} cannot be written: {reason}; nothing was opened") from None
+            raise self._unwritten(error) from None
+        try:
+            self._writer = Writer(self._stream, port, settings)
+        except OSError as error:
+            self.end()
+            raise self._unwritten(error) from None
         self._ahead = 0.0
+
+    def _unwritten(self, error: OSError | ValueError) -> NotAllowed:
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        return NotAllowed(f"{self._name} cannot be written: {reason}; nothing was opened")
 
     def begin(self, now: float) -> None:
         """The line's clock stands at *now*."""

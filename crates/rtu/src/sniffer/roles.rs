@@ -58,7 +58,7 @@ pub(super) struct Talk {
     before: Option<Asked>,
     /// The usual turnaround, of what was surely an answer.
     usual: Duration,
-    /// The longest pause within a frame: how long the adapter collects.
+    /// The longest that a frame was kept back: how long the adapter collects.
     lump: Duration,
     /// The silence between two frames.
     silence: Duration,
@@ -119,9 +119,9 @@ impl Talk {
         }
     }
 
-    /// The longest time between two characters of a frame that was not theirs.
-    pub(super) fn paused(&mut self, pause: Duration) {
-        self.lump = self.lump.max(pause);
+    /// A frame was kept back for so long: moments tell no more than that.
+    pub(super) fn kept_back(&mut self, kept: Duration) {
+        self.lump = self.lump.max(kept);
     }
 
     /// Keeps what matters of `bytes`, and returns the turnaround of an answer.
