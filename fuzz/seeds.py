@@ -201,7 +201,7 @@ def guests() -> dict[str, bytes]:
 
     read, write, echo = bytes([3, 0x21, 3, 0, 1]), bytes([6, 0x80, 11, 0, 5]), bytes([8, 0, 0, 0x12, 0xAB])
     many = bytes([16, 0x80, 11, 0, 2, 4, 0, 1, 0, 2])
-    hello = b"drivebus share \1\1f\x80\x96\1\x08E\1"
+    hello = b"drivebus share \2\1f\x80\x96\1\x08E\1"
     greet = b"\0" + bytes([len(hello)]) + hello
     return {
         "read": say(call(read)),
@@ -222,7 +222,7 @@ def guests() -> dict[str, bytes]:
         "listens-for-ever": say(bytes([listening]) + for_ever),
         "cancels": say(bytes([cancel]), bytes([listening]) + second + bytes([cancel])),
         "greets-itself": greet + bytes([1, word]),
-        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \1", b" \2"),
+        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \2", b" \3"),
         "other-characters": b"\0" + bytes([len(hello)]) + hello.replace(b"E", b"N"),
         "no-greeting": b"\0" + b"\5hello",
         "too-long": b"\1\xff\4\xff\xff\0\0",

@@ -57,7 +57,7 @@ def test_a_file_of_the_other_byte_order_is_read(tmp_path: Path) -> None:
 def test_a_file_that_breaks_off_says_so(tmp_path: Path, cut: int) -> None:
     path = written(tmp_path / "a.pcapng", Captured(TIME, ASKED, True), Captured(TIME, ANSWER, False))
     path.write_bytes(path.read_bytes()[:-cut])
-    found = []
+    found: list[Captured] = []
     with pytest.raises(drivebus.NotAllowed, match=r"a\.pcapng (breaks off|has a block|holds no frame|is neither)"):
         found.extend(read(path))
     assert len(found) < 2

@@ -1,0 +1,319 @@
+"""Listening to others: what is heard, as exchanges, on a line of one's own, of another program's, and of nobody's."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import drivebus
+from drivebus import Exchange
+from drivebus.capture import Captured, Writer, read
+from drivebus.cli import cli
+from drivebus.sim import Simulator
+from drivebus.sniffer import Families, Figures, exchanges_in
+from drivebus.sniffer.replay import Replay
+
+LINE = drivebus.SerialFormat(parity="N")
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350", 2: "vfd500"}, parity="N", transport="pty") as simulator:
+        yield simulator
+
+
+@contextmanager
+def hearing(bus: drivebus.Bus, **keywords: object) -> Iterator[list[Exchange]]:
+    """What is heard on *bus* until a request that ends it is heard."""
+    heard: list[Exchange] = []
+    begun = threading.Event()
+
+    def listen() -> None:
+        told = drivebus.sniff(bus, tap=lambda _at, _data: begun.set(), **keywords)  # type: ignore[arg-type]
+        for exchange in told:
+            heard.append(exchange)
+            if exchange.request is not None and exchange.request[1:6] == b"\x03\x21\x01\x00\x02":
+                return
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    try:
+        while not begun.is_set():
+            bus.read(1, 0x2102)
+        yield heard
+        bus.read(1, 0x2101, 2)
+    finally:
+        thread.join(30)
+        assert not thread.is_alive()
+
+
+def test_a_bus_hears_what_it_asks_itself(simulator: Simulator) -> None:
+    with drivebus.Bus(simulator.port, parity="N") as bus:
+        drive = bus.drive(1)
+        with hearing(bus, profiles="gd350") as heard:
+            drive.write("P00.11", 5.0)
+            with pytest.raises(drivebus.Refused):
+                bus.read(1, 0x9999)
+    written = next(exchange for exchange in heard if exchange.function == 6)
+    assert dict(written.values) == {"P00.11": 5.0}
+    refused = next(exchange for exchange in heard if isinstance(exchange.error, drivebus.Refused))
+    assert refused.request is not None
+    assert refused.request.hex() == "010399990001" + refused.request[-2:].hex()
+    assert refused.turnaround is not None
+
+
+def test_what_another_program_asks_is_heard(simulator: Simulator) -> None:
+    # The other program has the port; this one is its guest.
+    other = (
+        "import sys, drivebus\n"
+        "with drivebus.Bus(sys.argv[1], parity='N') as bus:\n"
+        "    print('ready', flush=True)\n"
+        "    for line in sys.stdin:\n"
+        "        bus.read(2, 0x7000 + int(line), 1)\n"
+    )
+    with (
+        subprocess.Popen(
+            [sys.executable, "-c", other, simulator.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as process,
+        drivebus.Bus(simulator.port, parity="N") as bus,
+    ):
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        with hearing(bus, profiles={2: "vfd500"}) as heard:
+            process.stdin.write("0\n")
+            process.stdin.flush()
+            while not any(exchange.unit == 2 for exchange in heard):
+                bus.read(1, 0x2102)
+        process.stdin.close()
+    theirs = [exchange for exchange in heard if exchange.unit == 2]
+    assert theirs[0].profile == "vfd500"
+    assert theirs[0].answer is not None
+
+
+def test_nothing_is_sent_by_who_listens(simulator: Simulator) -> None:
+    with drivebus.Bus(simulator.port, parity="N", read_only=True) as bus:
+        before = len(simulator.line.trace())
+        assert list(drivebus.sniff(bus, duration=0.2)) == []
+        assert len(simulator.line.trace()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        ({"duration": -1}, "duration -1 is out of range"),
+        ({"profiles": "nobody"}, "nobody"),
+        ({"profiles": {0: "gd350"}}, "unit 0"),
+        ({"baudrate": 3}, "baud rate 3"),
+    ],
+)
+def test_a_wrong_argument_opens_nothing(arguments: dict[str, object], why: str) -> None:
+    with pytest.raises(drivebus.NotAllowed, match=why):
+        drivebus.sniff("/dev/nowhere", **arguments)  # type: ignore[arg-type]
+
+
+def test_a_port_that_is_not_there_is_told() -> None:
+    with pytest.raises(drivebus.PortError):
+        drivebus.sniff("/dev/nowhere")
+
+
+def frame(body: str) -> bytes:
+    data = bytes.fromhex(body)
+    return data + drivebus.crc16(data).to_bytes(2, "little")
+
+
+def talk(*bodies: str) -> list[Captured]:
+    """Requests (`>`) and answers (`<`), a tenth of a second apart."""
+    return [Captured(0.1 * at + 1, frame(body[1:]), body[0] == ">") for at, body in enumerate(bodies)]
+
+
+def test_a_family_is_told_or_guessed_or_left_open() -> None:
+    told = Families()
+    list(exchanges_in(talk(">01 03 21 03 00 01", "<01 03 02 01 A0"), LINE, told))
+    assert (told.of(1), told.is_guess(1)) == (drivebus.Profile.builtin("gd350"), False)
+    guessed = Families()
+    list(exchanges_in(talk(">02 03 70 00 00 08", "<02 03 10" + " 00 00" * 8), LINE, guessed))
+    profile = guessed.of(2)
+    assert profile is not None
+    assert (profile.name, guessed.is_guess(2)) == ("vfd500", True)
+    nobody = Families()
+    [exchange] = exchanges_in(talk(">03 03 4E 20 00 04", "<03 03 08 00 01 00 02 00 03 00 04"), LINE, nobody)
+    assert nobody.of(3) is None
+    assert dict(exchange.values) == {0x4E20: 1, 0x4E21: 2, 0x4E22: 3, 0x4E23: 4}
+
+
+def test_figures_count_and_say_what_is_wrong() -> None:
+    figures = Figures(LINE.t35)
+    silent = [">05 03 21 00 00 01"] * 30
+    answered = [">01 03 21 00 00 01", "<01 03 02 00 03"] * 10
+    refused = [">02 03 21 00 00 01", "<02 83 02"] * 30
+    for exchange in exchanges_in(talk(*silent, *answered, *refused), LINE):
+        figures.take(exchange)
+    assert {unit: (each.requests, each.answers) for unit, each in figures.units.items()} == {
+        5: (30, 0),
+        1: (10, 10),
+        2: (30, 30),
+    }
+    assert (figures.units[5].silent, figures.units[5].repeated, figures.units[2].refusals) == (30, 29, {2: 30})
+    register = figures.units[1].registers[0x2100]
+    assert (register.reads, register.writes, register.value, register.changes) == (10, 0, 3, 0)
+    assert register.period == pytest.approx(0.2)
+    assert [hint.split(":")[0] for hint in figures.hints()] == [
+        "unit 2 refuses 30 of 30 requests (02H)",
+        "unit 5 was asked 30 times and never answered",
+    ]
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Path:
+    path = tmp_path / "seen.pcapng"
+    exchanges = talk(
+        ">01 03 21 00 00 01", "<01 03 02 00 03", ">01 06 20 01 07 D0", "<01 06 20 01 07 D0",
+        ">01 03 21 00 00 01", "<01 03 02 00 01", ">09 03 21 00 00 01", ">01 03 99 99 00 01", "<01 83 02",
+    )  # fmt: skip
+    with path.open("wb") as stream:
+        writer = Writer(stream, "COM3", "19200 8N1")
+        for each in exchanges:
+            writer.write(each)
+    return path
+
+
+@contextmanager
+def opened(port: str) -> Iterator[int]:
+    """A descriptor of what *port* names."""
+    if port.startswith("socket://"):
+        host, _, number = port.removeprefix("socket://").rpartition(":")
+        with socket.create_connection((host, int(number))) as connection:
+            yield connection.fileno()
+    else:
+        descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        yield descriptor
+        os.close(descriptor)
+
+
+@pytest.mark.parametrize("transport", ["pty", "tcp"])
+def test_a_capture_answers_as_its_units_did(capture: Path, transport: str) -> None:
+    exchanges = list(exchanges_in(read(capture), LINE))
+    with Replay(exchanges, LINE, transport) as units, opened(units.port) as port:
+
+        def ask(body: str) -> str:
+            os.write(port, frame(body))
+            ready, _, _ = select.select([port], [], [], 0.3)
+            return os.read(port, 256)[:-2].hex(" ").upper() if ready else ""
+
+        state = [ask("01 03 21 00 00 01") for _ in range(3)]
+        assert state == ["01 03 02 00 03", "01 03 02 00 01", "01 03 02 00 01"], "in their order, then the last"
+        assert ask("01 06 20 01 07 D0") == "01 06 20 01 07 D0"
+        assert ask("01 03 99 99 00 01") == "01 83 02"
+        assert ask("01 08 00 00 AB CD") == "01 08 00 00 AB CD", "an echo is new each time"
+        assert ask("09 03 21 00 00 01") == "", "as in the capture"
+        assert ask("01 03 30 00 00 01") == ""
+    assert units.unknown == {frame("01 03 30 00 00 01")}
+
+
+def test_a_program_gets_the_same_answers_from_its_capture(simulator: Simulator, tmp_path: Path) -> None:
+    def program(port: str, trace: Path | None) -> list[object]:
+        with drivebus.Bus(port, parity="N", trace=trace, share="never") as bus:
+            drive = bus.drive(1)
+            drive.prepare_control()
+            with drive.running(hz=5.0):
+                drive.wait_for_speed(timeout=30)
+                seen = [drive.status().state, drive.monitor("running_frequency", "bus_voltage"), drive.setpoint]
+            drive.wait_until_stopped(timeout=30)
+            return [*seen, drive.status().state]
+
+    path = tmp_path / "job.pcapng"
+    first = program(simulator.port, path)
+    with Replay(exchanges_in(read(path), LINE), LINE) as units:
+        assert program(units.port, None) == first
+        assert not units.unknown
+
+
+def test_the_commands_show_a_capture(capture: Path) -> None:
+    done = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(capture)])
+    assert done.exit_code == 0, done.output
+    lines = [line[30:] for line in done.stdout.splitlines()]
+    assert lines[0].startswith("unit 1: read status_word_1 (2100H) -> status_word_1 = 3 (stopped), after ")
+    assert lines[1].startswith("unit 1: write set_frequency = 20.00 Hz -> took set_frequency = 20.00 Hz, after ")
+    assert lines[3] == "unit 9: read 2100H -> did not answer"
+    assert lines[4].startswith("unit 1: read 9999H -> refused: exception 02H illegal_address, after ")
+    as_json = CliRunner().invoke(cli, ["--json", "decode", str(capture)])
+    rows = [json.loads(line) for line in as_json.stdout.splitlines()]
+    assert rows[0]["values"] == {"0x2100": 3}
+    assert [row.get("exit_code") for row in rows] == [None, None, None, 3, 4]
+
+
+def test_what_cannot_be_replayed_is_said(tmp_path: Path) -> None:
+    (tmp_path / "silent.txt").write_text("TX: 01 03 21 00 00 01 8E 36\n")
+    done = CliRunner().invoke(cli, ["replay", str(tmp_path / "silent.txt"), "--for", "0"])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "no request in the capture has an answer" in done.stderr
+
+
+def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> None:
+    path = tmp_path / "heard.pcapng"
+    words = ["-f", "8N1", "--json", "sniff", simulator.port, "-n", "2", "-w", str(path)]
+    with (
+        drivebus.Bus(simulator.port, parity="N") as bus,
+        subprocess.Popen([sys.executable, "-m", "drivebus", *words], stdout=subprocess.PIPE, text=True) as process,
+    ):
+        while process.poll() is None:
+            bus.read(1, 0x2100, 3)
+        assert process.stdout is not None
+        rows = [json.loads(line) for line in process.stdout]
+    assert process.returncode == 0
+    assert [row["unit"] for row in rows[:2]] == [1, 1]
+    assert rows[0]["values"] == {"0x2100": 3, "0x2101": 0x0C41, "0x2102": 0}
+    assert rows[2]["answered"] == 2
+    kept = list(read(path))
+    assert [each.asks for each in kept] == [True, False, True, False]
+    # What is there already is not replaced unasked.
+    again = CliRunner().invoke(cli, ["sniff", simulator.port, "-w", str(path), "--for", "0"])
+    assert again.exit_code == 2
+    assert "is there already; give another name, or --force" in again.stderr
+    assert list(read(path)) == kept
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "why"),
+    [
+        (["sniff"], 2, "no port: give it"),
+        (["sniff", "/dev/nowhere"], 5, "/dev/nowhere"),
+        (["sniff", "sim://gd350", "--function", "GG", "--for", "0"], 2, '"GG" is not a function'),
+        (["--profile", "3=", "sniff", "sim://gd350", "--for", "0"], 2, "is not a unit and its family"),
+        (["sniff", "sim://gd350", "-w", "/nowhere/x.pcapng", "--for", "0"], 2, "/nowhere/x.pcapng cannot be written"),
+        (["decode", "/nowhere/x.pcapng"], 2, "cannot be read"),
+        (["replay", "/nowhere/x.pcapng"], 2, "cannot be read"),
+    ],
+)
+def test_a_wrong_word_is_told_in_one_line(words: list[str], code: int, why: str) -> None:
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == code, done.output
+    assert why in done.stderr
+    assert "Traceback" not in done.output
+
+
+def test_a_reader_that_goes_ends_it_quietly(simulator: Simulator) -> None:
+    read_end, write_end = os.pipe()
+    words = [sys.executable, "-m", "drivebus", "-f", "8N1", "sniff", simulator.port, "-w", "-"]
+    with (
+        drivebus.Bus(simulator.port, parity="N") as bus,
+        subprocess.Popen(words, stdout=write_end, stderr=subprocess.PIPE, text=True) as process,
+    ):
+        os.close(write_end)
+        os.close(read_end)
+        while process.poll() is None:
+            bus.read(1, 0x2100)
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
