@@ -274,7 +274,8 @@ def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> Non
         rows = [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
     assert [row["unit"] for row in rows[:2]] == [1, 1]
-    assert rows[0]["values"] == {"0x2100": 3, "0x2101": 0x0C41, "0x2102": 0}
+    assert rows[0]["values"]["status_word_1"] == {"value": 3, "label": "stopped"}
+    assert (rows[0]["profile"], rows[0]["guessed"]) == ("gd350", True)
     assert rows[2]["answered"] == 2
     kept = list(read(path))
     assert [each.asks for each in kept] == [True, False, True, False]

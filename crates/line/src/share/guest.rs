@@ -188,7 +188,7 @@ impl Guest {
     ) -> Result<(), Lost> {
         channel.say(wish).map_err(|_| Lost::Unsent)?;
         let mut taken_back: Option<Instant> = None;
-        let mut heard = monotonic();
+        let (mut heard, mut looked) = (monotonic(), monotonic());
         loop {
             match channel.hear::<Told>(monotonic() + LOOK_UP) {
                 Ok(Some(told)) => {
@@ -196,22 +196,26 @@ impl Guest {
                     if hear(told) {
                         return Ok(());
                     }
-                }
-                Ok(None) => {
-                    let now = monotonic();
-                    if taken_back.is_none() && give_up() {
-                        taken_back = Some(now);
-                        channel.say(&Wish::Cancel).map_err(|_| Lost::Unknown)?;
-                    }
-                    if taken_back.is_some_and(|moment| now >= moment + LETS_GO) {
-                        return Err(Lost::Silent(format!("{} has the port and does not answer", self.host)));
-                    }
-                    if now >= heard + SILENT {
-                        heard = now;
-                        self.look()?;
+                    // Where much is told, it is not asked each time.
+                    if heard < looked + LOOK_UP {
+                        continue;
                     }
                 }
+                Ok(None) => {}
                 Err(_) => return Err(Lost::Unknown),
+            }
+            let now = monotonic();
+            looked = now;
+            if taken_back.is_none() && give_up() {
+                taken_back = Some(now);
+                channel.say(&Wish::Cancel).map_err(|_| Lost::Unknown)?;
+            }
+            if taken_back.is_some_and(|moment| now >= moment + LETS_GO) {
+                return Err(Lost::Silent(format!("{} has the port and does not answer", self.host)));
+            }
+            if now >= heard + SILENT {
+                heard = now;
+                self.look()?;
             }
         }
     }
