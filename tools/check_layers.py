@@ -78,6 +78,7 @@ ROOMS: list[set[str]] = [
     {"watchdog", "poll"},
     {"drive"},
     {"bus"},
+    {"searching"},
     {"aio", "doctor", "sniffer"},
     {"__init__"},
 ]
@@ -93,8 +94,8 @@ ON_THE_CORE = {
     "backup",
     "poll",
     "bus",
+    "searching",
     "aio",
-    "doctor",
     "sniffer",
     "__init__",
 }

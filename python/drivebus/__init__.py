@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from drivebus.line.stats import Link, Stats
     from drivebus.poll import Poll
     from drivebus.profile import Profile, profiles
+    from drivebus.searching import Located, Progress, Search, Settings, search
     from drivebus.sim import Simulator
     from drivebus.sniffer import Exchange, sniff
     from drivebus.values import (
@@ -76,17 +77,21 @@ __all__ = [
     "Found",
     "Identification",
     "Link",
+    "Located",
     "NoAnswer",
     "NotAllowed",
     "Poll",
     "PortError",
     "Profile",
+    "Progress",
     "Refused",
     "Restoration",
     "Restored",
     "Sample",
+    "Search",
     "SerialFormat",
     "SerialPort",
+    "Settings",
     "SharedCodeWarning",
     "Simulator",
     "Snapshot",
@@ -101,6 +106,7 @@ __all__ = [
     "ports",
     "profiles",
     "rtu",
+    "search",
     "sim",
     "sniff",
 ]
@@ -132,6 +138,7 @@ if not TYPE_CHECKING:
             "line.stats": ("Link", "Stats"),
             "poll": ("Poll",),
             "profile": ("Profile", "profiles"),
+            "searching": ("Located", "Progress", "Search", "Settings", "search"),
             "sim": ("Simulator",),
             "sniffer": ("Exchange", "sniff"),
             "values": (

@@ -12,9 +12,10 @@ import pytest
 import drivebus
 from drivebus import Bus, NotAllowed, PortError, Simulator
 from drivebus.doctor import Finding, Severity, examine
-from drivebus.doctor.frames import frames_in
-from drivebus.doctor.search_order import Settings, candidates
 from drivebus.line import ports
+from drivebus.line.frames import frames_in
+from drivebus.searching.order import candidates
+from drivebus.searching.settings import Settings
 
 READ = bytes.fromhex("01 03 00 04 00 02 85 CA")  # GD350 manual, chapter 9.4.1, request and answer
 ANSWER = bytes.fromhex("01 03 04 13 88 00 00 7E 9D")
@@ -146,7 +147,7 @@ class TestOtherSettings:
 
     def test_a_wrong_baud_rate_is_named(self) -> None:
         opened, tried = self.unit_at(Settings(38400, 8, "E", 1), {"deaf": 1.0})
-        findings = list(examine("sim://", 1, open=opened))
+        findings = list(examine("/dev/line", 1, open=opened))
         found = named(findings, "wrong_baud")
         assert (found.severity, found.values) == (Severity.FAULT, {"baudrate": 38400, "format": "8E1"})
         assert "38400 8E1, not at 19200 8E1" in found.text
@@ -163,13 +164,13 @@ class TestOtherSettings:
 
     def test_a_wrong_parity_is_named(self) -> None:
         opened, _ = self.unit_at(Settings(19200, 8, "N", 1), {"flip_bit": 1.0})
-        findings = list(examine("sim://", open=opened))
+        findings = list(examine("/dev/line", open=opened))
         assert "wrong_parity" in wrong(findings)
         assert "two_units" not in wrong(findings)
 
     def test_who_is_nowhere_is_looked_for_everywhere_once(self) -> None:
         opened, tried = self.unit_at(Settings(1), {"silence": 1.0})
-        assert wrong(list(examine("sim://", 5, open=opened))) == {"nobody_answers"}
+        assert wrong(list(examine("/dev/line", 5, open=opened))) == {"nobody_answers"}
         assert len(set(tried)) == len(tried) == 1 + len(list(candidates(Settings(19200), full=False)))
 
     def test_a_speed_that_the_adapter_does_not_make_is_passed_over(self) -> None:
@@ -180,7 +181,7 @@ class TestOtherSettings:
                 raise PortError("the driver does not make it")
             return opened(port, **options)
 
-        assert "wrong_parity" in wrong(list(examine("sim://", 1, open=only_one_speed)))
+        assert "wrong_parity" in wrong(list(examine("/dev/line", 1, open=only_one_speed)))
 
     @pytest.mark.parametrize("transport", ["tcp", "wire"])
     def test_nothing_else_is_tried_where_no_speed_can_be_set(self, transport: str) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import click
+from click.core import ParameterSource
 from rich.progress import Progress
 
 import drivebus
-from drivebus.cli import names, rules
+from drivebus.cli import names, rules, searching
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, exit_code, pass_session, tell
@@ -33,9 +34,27 @@ def ports(session: Session) -> None:
 @click.command()
 @click.option("--units", default="1-247", show_default=True, metavar="LIST", help="Addresses to ask, such as 1-31,40.")
 @click.option("--timeout", type=Seconds(0.001, 3600), help="Seconds to wait for each answer.  [default: 0.1]")
+@click.option(
+    "--search",
+    is_flag=True,
+    help="Also find out the baud rate and the format, the likeliest first. Takes about a minute.",
+)
+@click.option("--full", is_flag=True, help="With --search: try every address at every setting. Takes 20 minutes.")
 @pass_session
-def scan(session: Session, units: str, timeout: float | None) -> None:
-    """Find the drives on the line. Each address is asked once."""
+@click.pass_context
+def scan(context: click.Context, session: Session, units: str, timeout: float | None, search: bool, full: bool) -> None:
+    """Find the drives on the line. Each address is asked once.
+
+    With --search, nothing needs to be known of the line: baud rate, format and address are found. Only reads are sent.
+    The port must be free, because its settings change.
+    """
+    if search:
+        if context.get_parameter_source("units") is not ParameterSource.DEFAULT:
+            raise click.UsageError("--search decides itself which addresses it asks: leave --units out, or --search")
+        searching.search(session, timeout, full)
+        return
+    if full:
+        raise click.UsageError("--full is for --search: give that too")
     wanted = names.parse_units(units)
     count = 0
     # On the console that the lines go to, so that they stand above the bar.

@@ -108,9 +108,8 @@ class Session:
         """What `drivebus.Bus` is given for that."""
         return None if self.rs485 is None else {"mode": self.rs485}
 
-    @contextmanager
-    def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
-        """The bus that the options name, opened."""
+    def one_port(self) -> str:
+        """The port that the options name, for a command that takes one drive at a time."""
         if self.several:
             named = ", ".join(each.called for each in self.several)
             command = click.get_current_context().info_name
@@ -120,6 +119,12 @@ class Session:
                 "no port: give --port or set DRIVEBUS_PORT, or name a drive of drivebus.toml with --drive; "
                 "`drivebus ports` lists what is there"
             )
+        return self.port
+
+    @contextmanager
+    def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
+        """The bus that the options name, opened."""
+        port = self.one_port()
         bits, parity, stop = self.line_format
         settings: dict[str, Any] = {
             "baudrate": self.baud,
@@ -131,9 +136,9 @@ class Session:
             **options,
         }
         if self.crew is not None:
-            yield self.crew.bus(self.port, settings)
+            yield self.crew.bus(port, settings)
             return
-        with drivebus.Bus(self.port, **settings) as bus:
+        with drivebus.Bus(port, **settings) as bus:
             yield bus
 
     @contextmanager

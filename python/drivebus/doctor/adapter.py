@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.search_order import Settings
 from drivebus.errors import PortError
 from drivebus.line import ports
+from drivebus.searching.settings import Settings
 
 __all__ = ["adapter_findings", "port_finding"]
 

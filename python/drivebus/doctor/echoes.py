@@ -9,8 +9,8 @@ from typing import Any
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.frames import frames_in, is_frame
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
+from drivebus.line.frames import frames_in, is_frame
 
 __all__ = ["Echoes"]
 

@@ -16,13 +16,13 @@ from drivebus.doctor.adapter import adapter_findings, port_finding
 from drivebus.doctor.findings import Finding
 from drivebus.doctor.hints import hint_findings
 from drivebus.doctor.presence import found_elsewhere, look, nobody, units_to_ask, whole
-from drivebus.doctor.search_order import Settings, candidates
 from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard, overheard
 from drivebus.doctor.unit import UnitExamination
 from drivebus.errors import PortError
 from drivebus.identify.results import Found
 from drivebus.profile import Profile
-from drivebus.sim import Simulator
+from drivebus.searching.order import candidates
+from drivebus.searching.settings import Settings, can_be_changed
 
 __all__ = ["Examination", "examine"]
 
@@ -179,7 +179,7 @@ class Examination:
         yield traffic
         if traffic.name == OTHER_MASTER:
             return None
-        if traffic.name == UNKNOWN and self._has_settings():
+        if traffic.name == UNKNOWN and can_be_changed(self.port):
             held.close()
             other = self._another_master()
             if other is not None:
@@ -209,7 +209,7 @@ class Examination:
 
     def _ask_elsewhere(self) -> Iterator[Finding]:
         """Finds who answers at other settings, where there are any, up to the first at which somebody does."""
-        for settings in candidates(self.given, self.full) if self._has_settings() else ():
+        for settings in candidates(self.given, self.full) if can_be_changed(self.port) else ():
             better = self._whole_at(settings)
             if better:
                 if not self._answers_after_all(better[0].unit):
@@ -244,12 +244,6 @@ class Examination:
     def _opened(self, settings: Settings) -> Bus:
         """The line at *settings*, for reading only, and to itself: its figures tell of nobody else's requests."""
         return self.open(self.port, **vars(settings), rs485=self.rs485, read_only=True, share="never")
-
-    def _has_settings(self) -> bool:
-        """Whether another baud rate can be tried on the port: not behind a server, nor on what is open already."""
-        if isinstance(self.port, str):
-            return not self.port.startswith(("socket://", "tcp://"))
-        return isinstance(self.port, (os.PathLike, Simulator))
 
     def _count_noise(self, bus: Bus) -> None:
         self.noise += int(bus.stats()["noise_bytes"])

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.search_order import Settings
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify.results import Found
+from drivebus.searching.settings import Settings
 
 __all__ = ["found_elsewhere", "look", "nobody", "units_to_ask", "whole"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
-from drivebus.doctor.frames import frames_in, in_words
-from drivebus.doctor.search_order import Settings
 from drivebus.errors import BadAnswer
+from drivebus.line.frames import frames_in, in_words
+from drivebus.searching.settings import Settings
 
 __all__ = ["OTHER_MASTER", "UNKNOWN", "heard", "overheard"]
 

@@ -1,6 +1,6 @@
 """A scan of a line: which units are asked, how long each is given, and what is told of one that answers.
 
-It asks with the settings that the line has. Other speeds and parities are tried by `doctor/search_order.py`.
+It asks with the settings that the line has. Other speeds and formats are tried by `searching`.
 """
 
 from __future__ import annotations

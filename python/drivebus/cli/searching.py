@@ -1,0 +1,117 @@
+"""`drivebus scan --search`: what `drivebus.search` finds, how long it still takes, and what it left out."""
+
+from __future__ import annotations
+
+import shlex
+from contextlib import nullcontext
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn
+from rich.progress import Progress as Bar
+
+import drivebus
+from drivebus.cli.output import remark
+from drivebus.cli.session import Session
+
+__all__ = ["search"]
+
+
+def search(session: Session, timeout: float | None, full: bool) -> None:
+    """Searches the line of *session*, and shows who was found."""
+    out = session.out
+    bits, parity, stop = session.line_format
+    port = session.one_port()
+    bar = _Countdown(out.console) if out.live else None
+    found: list[drivebus.Located] = []
+    with drivebus.search(
+        port,
+        baudrate=session.baud,
+        bytesize=int(bits),
+        parity=parity,
+        stopbits=int(stop),
+        full=full,
+        timeout=timeout,
+        rs485=session.direction,
+        progress=None if bar is None else bar.show,
+    ) as searching:
+        try:
+            with bar or nullcontext():
+                for located in searching:
+                    found.append(located)
+                    if out.as_json:
+                        out.record(_record(located))
+                    elif bar is not None:
+                        bar.found += 1
+        finally:
+            # Also what was found before Ctrl-C, or before the port was lost.
+            if found and not out.as_json:
+                out.rows(["unit", "settings", "family", "certainty", "problem"], [_row(each) for each in found])
+                out.say(f"{len(found)} unit{'' if len(found) == 1 else 's'}. {_how(found[0], port)}")
+        left_out = "; ".join(searching.untried)
+    if found:
+        remark(f"Not tried: {left_out}.")
+        return
+    remark(
+        f"Error: nobody answered. Not tried: {left_out}. Check power, + to + and - to -, and the common wire; a port "
+        f"on a board, wired to a bare transceiver, needs --rs485. `{session.doctor()}` looks at adapter and line."
+    )
+    raise click.exceptions.Exit(3)
+
+
+class _Countdown(Bar):
+    """The bar on a terminal, with the time that is left.
+
+    Attributes:
+        found: How many were found.
+    """
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(TextColumn("{task.description}"), BarColumn(20), console=console, transient=True)
+        self.found = 0
+        self._spent = 0.0
+        self._left: float | None = None
+        self._task = self.add_task("opening", total=None)
+
+    def show(self, at: drivebus.Progress) -> None:
+        """Shows how far it has come."""
+        # Who answers makes the plan longer.
+        self._spent += max((at.left if self._left is None else self._left) - at.left, 0.0)
+        self._left = at.left
+        doing = "listening" if at.unit is None else f"unit {at.unit}"
+        self.update(
+            self._task,
+            description=f"{at.settings} {doing}, {self.found} found, {at.left:.0f} s left",
+            completed=self._spent,
+            total=self._spent + at.left,
+        )
+
+
+def _row(located: drivebus.Located) -> list[Any]:
+    """What is shown of *located*."""
+    known = located.identification
+    may_be = " or ".join(known.candidates) if known is not None else ""
+    family = located.profile or may_be or "unknown family"
+    return [located.unit, str(located.settings), family, located.certainty, located.problem]
+
+
+def _record(located: drivebus.Located) -> dict[str, Any]:
+    """The same for a program."""
+    known = located.identification
+    return {
+        "unit": located.unit,
+        "baudrate": located.settings.baudrate,
+        "format": located.settings.format,
+        "profile": located.profile,
+        "certainty": located.certainty,
+        "candidates": () if known is None else known.candidates,
+        "identification": None if known is None or known.code is None else f"{known.code:#06x}",
+        "problem": located.problem,
+    }
+
+
+def _how(located: drivebus.Located, port: str) -> str:
+    """What to type to talk to *located*."""
+    line = f"--port {shlex.quote(port)} --baud {located.settings.baudrate} --format {located.settings.format}"
+    return f"Talk to the first: `drivebus {line} --unit {located.unit} info`"

@@ -1,0 +1,13 @@
+"""A search for drives on a line of which nothing is known: neither speed nor format nor address. Only reads.
+
+    for located in drivebus.search("/dev/ttyUSB0"):
+        print(located)
+
+The room is not called `search`, because the function is: a module of that name would take its place in the package.
+"""
+
+from drivebus.searching.finder import Search, search
+from drivebus.searching.located import Located, Progress
+from drivebus.searching.settings import Settings
+
+__all__ = ["Located", "Progress", "Search", "Settings", "search"]
