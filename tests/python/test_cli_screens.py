@@ -46,6 +46,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "help": (["--help"], 0),
     "ports": (["ports"], 0),
     "scan": (["--port", TWO, "scan", "--units", "1-5"], 0),
+    "scan of all settings": (["--port", ONE, "scan", "--search"], 0),
     "info": (["--port", ONE, "info"], 0),
     "status": (["--port", ONE, "status"], 0),
     "status of two": (["--drive", "all", "--unverified", "status"], 0),
@@ -80,6 +81,9 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "profiles new": (["profiles", "new", "acme", "--like", "gd350"], 0),
     "raw": (["--port", ONE, "raw", "01", "03", "2100", "0001"], 0),
     "decode": (["decode", "01 03 02 00 03 F8 45"], 0),
+    "decode a capture": (["decode", "line.pcapng"], 0),
+    "sniff": (["--port", ONE, "sniff", "--for", "1"], 0),
+    "replay": (["replay", "line.pcapng"], 0),
     "completion": (["completion", "bash"], 0),
     "nobody answers": (["--port", ONE, "--unit", "9", "status"], 3),
     "no such port": (["--port", "/dev/nowhere", "status"], 5),
@@ -91,6 +95,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
 
 WHILE: dict[str, Callable[[list[str]], bool]] = {
     "sim": lambda lines: any("Ctrl-C" in line for line in lines),
+    "replay": lambda lines: any("Ctrl-C" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
 }
 """When a command is ended that does not end by itself."""
@@ -109,13 +114,15 @@ ESCAPES = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where the commands are given: with a site file, and a backup that differs from the drive."""
+    """Where the commands are given: with a site file, a capture, and a backup that differs from the drive."""
     place = tmp_path_factory.mktemp("work")
     (place / "drivebus.toml").write_text(SITE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         seen = on_a_terminal(["--port", ONE, "backup", "older.toml"], SIZES[0], cwd=place)
+        assert seen.code == 0, seen.text
+        seen = on_a_terminal(["--port", ONE, "--capture", "line.pcapng", "status"], SIZES[0], cwd=place)
         assert seen.code == 0, seen.text
         older = place / "older.toml"
         older.write_text(

@@ -21,7 +21,7 @@ from drivebus.cli.listing import first_sentence
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
 from drivebus.cli.output import Output, laid_out, printable, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
-from drivebus.cli.types import Whole
+from drivebus.cli.types import Place, Whole
 
 __all__ = ["cli", "main"]
 
@@ -220,6 +220,12 @@ class _Program(click.Group):
     envvar="DRIVEBUS_TRACE",
     help="Show each frame on the line, with its meaning, on standard error.",
 )
+@click.option(
+    "--capture",
+    type=Place(),
+    metavar="FILE",
+    help="Keep each frame on the line in a new file, which Wireshark opens.",
+)
 @click.option("--json", "as_json", is_flag=True, envvar="DRIVEBUS_JSON", help="Print one JSON object a line.")
 @click.version_option(drivebus.__version__, prog_name="drivebus")
 @click.pass_context
@@ -238,6 +244,7 @@ def cli(
     read_only: bool,
     variants: dict[str, str],
     trace: bool,
+    capture: str | None,
     as_json: bool,
 ) -> None:
     """Control and watch variable-frequency drives over RS-485.
@@ -250,11 +257,27 @@ def cli(
         from drivebus.cli.frames import show_frames
 
         show_frames(context)
+    if capture is not None and os.path.exists(capture):  # noqa: PTH110 - pathlib would be loaded for a stop
+        raise click.UsageError(f"{capture} is there already; give --capture another name")
     out = Output(as_json)
     base = Session(
-        port, baud, line_format, units[0], profile, out, rs485, unverified, variants, trust_profile, read_only
+        port,
+        baud,
+        line_format,
+        units[0],
+        profile,
+        out,
+        rs485,
+        unverified,
+        variants,
+        trust_profile,
+        read_only,
+        capture=capture,
     )
     context.obj = chosen(context, base, drives, units, config)
+    ports = sorted({str(each.port) for each in context.obj.several})
+    if capture is not None and len(ports) > 1:
+        raise click.UsageError(f"--capture keeps one line, and these drives are on several: {', '.join(ports)}")
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from rich.progress import Progress as Bar
 
 import drivebus
 from drivebus.cli.output import remark
-from drivebus.cli.session import Session
+from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session
 
 __all__ = ["search"]
 
@@ -113,5 +113,11 @@ def _record(located: drivebus.Located) -> dict[str, Any]:
 
 def _how(located: drivebus.Located, port: str) -> str:
     """What to type to talk to *located*."""
-    line = f"--port {shlex.quote(port)} --baud {located.settings.baudrate} --format {located.settings.format}"
-    return f"Talk to the first: `drivebus {line} --unit {located.unit} info`"
+    words = ["--port", shlex.quote(port)]
+    if located.settings.baudrate != DEFAULT_BAUD:
+        words += ["--baud", str(located.settings.baudrate)]
+    if located.settings.format != "".join(DEFAULT_FORMAT):
+        words += ["--format", located.settings.format]
+    if located.unit != 1:
+        words += ["--unit", str(located.unit)]
+    return f"Talk to the first: `drivebus {' '.join(words)} info`"

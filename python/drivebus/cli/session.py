@@ -78,6 +78,7 @@ class Session:
         variants: What parameters of the drive make of its registers, by name.
         trust_profile: Whether the profile is meant, whatever the drive says of itself.
         read_only: Whether nothing may be written to a drive.
+        capture: The file that gets each frame on the line; None: no file.
         name: What the drive is called in `drivebus.toml`; empty where it was not chosen by name.
         several: One session for each drive, where several were chosen.
         crew: The others that work beside this one, where several drives were chosen.
@@ -94,6 +95,7 @@ class Session:
     variants: Mapping[str, str] = field(default_factory=dict)
     trust_profile: bool = False
     read_only: bool = False
+    capture: str | None = None
     name: str = ""
     several: tuple[Session, ...] = ()
     crew: Crew | None = None
@@ -132,6 +134,7 @@ class Session:
             "parity": parity,
             "stopbits": int(stop),
             "rs485": self.direction,
+            "trace": self.capture,
             "read_only": self.read_only,
             **options,
         }

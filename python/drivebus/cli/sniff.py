@@ -104,7 +104,7 @@ def sniff(
             for exchange in heard:
                 figures.take(exchange)
                 if writer is not None:
-                    _keep(writer, exchange)
+                    _keep(writer, exchange, line.char_time)
                 if not shown.lets_pass(exchange):
                     continue
                 seen += 1
@@ -147,14 +147,15 @@ def _opened(target: str, force: bool) -> BinaryIO:
         raise drivebus.NotAllowed(f"{target} cannot be written: {error.strerror}; nothing was opened") from None
 
 
-def _keep(writer: Writer, exchange: Exchange) -> None:
-    """Writes what was heard of *exchange*."""
+def _keep(writer: Writer, exchange: Exchange, char_time: float) -> None:
+    """Writes what was heard of *exchange*, each frame with the moment of its end."""
     if exchange.request is not None:
-        writer.write(Captured(exchange.time, exchange.request, True))
+        writer.write(Captured(exchange.time + char_time * len(exchange.request), exchange.request, True))
     if exchange.answer is not None:
         writer.write(Captured(exchange.answered or exchange.time, exchange.answer, False))
     elif exchange.error is not None and exchange.error.raw:
-        writer.write(Captured(exchange.time, exchange.error.raw, None))
+        raw = exchange.error.raw
+        writer.write(Captured(exchange.answered or exchange.time + char_time * len(raw), raw, None))
 
 
 def _told(session: Session, figures: Figures, target: str | None) -> None:
