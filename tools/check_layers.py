@@ -79,7 +79,7 @@ ROOMS: list[set[str]] = [
     {"drive"},
     {"bus"},
     {"searching"},
-    {"aio", "doctor", "sniffer"},
+    {"aio", "doctor", "sniffer", "record"},
     {"__init__"},
 ]
 
@@ -97,12 +97,13 @@ ON_THE_CORE = {
     "searching",
     "aio",
     "sniffer",
+    "record",
     "__init__",
 }
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "later", "line", "rtu", "sim", "site", "sniffer"},
+    "cli": {"capture", "drivebus", "later", "line", "record", "rtu", "sim", "site", "sniffer"},
     "__main__": {"cli"},
 }
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from drivebus.line.stats import Link, Stats
     from drivebus.poll import Poll
     from drivebus.profile import Profile, profiles
+    from drivebus.record import Recorder
     from drivebus.searching import Located, Progress, Search, Settings, search
     from drivebus.sim import Simulator
     from drivebus.sniffer import Exchange, sniff
@@ -84,6 +85,7 @@ __all__ = [
     "PortError",
     "Profile",
     "Progress",
+    "Recorder",
     "Refused",
     "Restoration",
     "Restored",
@@ -137,6 +139,7 @@ if not TYPE_CHECKING:
             "line.samples": ("Batch", "Sample"),
             "line.stats": ("Link", "Stats"),
             "poll": ("Poll",),
+            "record": ("Recorder",),
             "profile": ("Profile", "profiles"),
             "searching": ("Located", "Progress", "Search", "Settings", "search"),
             "sim": ("Simulator",),

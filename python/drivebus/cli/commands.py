@@ -15,7 +15,7 @@ __all__ = ["GROUPS", "Commands"]
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write")},
-    "Keep": {"backup": ("backup", "restore", "diff")},
+    "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",)},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
     "Tools": {"frames": ("raw", "decode"), "simulation": ("sim",), "tools": ("completion", "demo")},

@@ -16,6 +16,7 @@ from rich.live import Live
 
 import drivebus
 from drivebus.cli import names
+from drivebus.cli.lines import opened_lines
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.screen import Screen, Watched
 from drivebus.cli.session import Session, exit_code, pass_session
@@ -48,7 +49,10 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
     out = session.out
     interrupted = False
     with ExitStack() as open_lines:
-        lines = _lines(session, wanted, open_lines)
+        lines: list[tuple[drivebus.Bus, _Drives]] = [
+            (bus, [(_watched(one, drive, wanted), drive) for one, drive in drives])
+            for bus, drives in opened_lines(session, open_lines)
+        ]
         drives = [drive for _, line in lines for drive in line]
         seen = _Seen(out, [watched for watched, _ in drives])
         polls = [
@@ -79,19 +83,6 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
 
 
 _Drives = list[tuple[Watched, drivebus.Drive]]
-
-
-def _lines(session: Session, wanted: Sequence[str], opened: ExitStack) -> list[tuple[drivebus.Bus, _Drives]]:
-    """The drives that are watched, those of each line together."""
-    lines: dict[str, tuple[drivebus.Bus, _Drives]] = {}
-    for one in session.several or (session,):
-        key = repr((one.port, one.baud, one.line_format, one.rs485, one.read_only))
-        if key not in lines:
-            lines[key] = opened.enter_context(one.bus()), []
-        bus, drives = lines[key]
-        drive = one.drive_on(bus)
-        drives.append((_watched(one, drive, wanted), drive))
-    return list(lines.values())
 
 
 def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> Watched:

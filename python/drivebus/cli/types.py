@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import os
 import re
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
-__all__ = ["Hertz", "Place", "Seconds", "Whole", "with_a_point"]
+__all__ = ["Hertz", "Place", "Seconds", "Size", "Whole", "with_a_point"]
 
 
 class Number(click.FloatRange):
@@ -55,6 +55,23 @@ class Whole(click.IntRange):
         if _is_outside(number, self.min, self.max):
             self.fail(f"{value} is out of range; allowed is {allowed}.", parameter, context)
         return number
+
+
+class Size(click.ParamType[int]):
+    """A number of bytes, such as 500kB, 10MB or 1GB."""
+
+    name = "size"
+    _factors: ClassVar = {"": 1, "B": 1, "K": 10**3, "KB": 10**3, "M": 10**6, "MB": 10**6, "G": 10**9, "GB": 10**9}
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as whole bytes."""
+        if isinstance(value, int):
+            return value
+        known = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([A-Za-z]*)\s*", value)
+        factor = self._factors.get(known[2].upper()) if known else None
+        if known is None or factor is None or float(known[1]) * factor < 1:
+            self.fail(f'"{value}" is not a size; write one such as 10MB.', parameter, context)
+        return int(float(known[1]) * factor)
 
 
 class Place(click.Path):

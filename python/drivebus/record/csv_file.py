@@ -1,0 +1,35 @@
+"""Recordings as CSV: a line of titles, then a line for each row, times in ISO 8601."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from drivebus.record.appended import Appended
+from drivebus.record.table import Row, Table
+
+__all__ = ["open_new"]
+
+
+class _Csv(Appended):
+    every = 0.2
+
+    def __init__(self, path: Path, table: Table) -> None:
+        super().__init__(path)
+        self._table = table
+        self._append([table.titles])
+
+    def write(self, rows: Sequence[Row]) -> None:
+        self._append(self._table.text(row) for row in rows)
+
+    def _append(self, lines: Iterable[Sequence[str]]) -> None:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(lines)
+        self.append(text.getvalue())
+
+
+def open_new(path: Path, table: Table) -> _Csv:
+    """A new file at *path*."""
+    return _Csv(path, table)

@@ -1,0 +1,85 @@
+"""What a format of recordings has to do, and which one a file's name asks for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol
+
+from drivebus.errors import NotAllowed
+from drivebus.record.table import Row, Table
+
+__all__ = ["FORMATS", "Sink", "format_of", "sink_for"]
+
+FORMATS = {".csv": "csv_file", ".jsonl": "json_lines", ".parquet": "parquet", ".sqlite": "sqlite", ".db": "sqlite"}
+"""The file of this room that has the format, by the end of the name."""
+
+
+class Sink(Protocol):
+    """One file that grows.
+
+    What `write` has returned from is in the file, whole, and a kill of this process cannot take it away.
+
+    Attributes:
+        every: Seconds between two calls of `write` that this format is made for.
+        path: Where it is.
+    """
+
+    every: float
+    path: Path
+
+    def write(self, rows: Sequence[Row]) -> None:
+        """Writes *rows*, all of them or none.
+
+        Raises:
+            OSError: It cannot be written now; the file is as it was.
+        """
+
+    def size(self) -> int:
+        """Bytes that it has by now."""
+
+    def close(self) -> None:
+        """Ends it.
+
+        Raises:
+            OSError: The last of it cannot be written.
+        """
+
+
+def format_of(path: str | os.PathLike[str]) -> str:
+    """The format that the name of *path* asks for.
+
+    Raises:
+        NotAllowed: None does.
+    """
+    ending = Path(path).suffix.lower()
+    try:
+        return FORMATS[ending]
+    except KeyError:
+        raise NotAllowed(
+            f"the name {os.fspath(path)} does not say which format it is; end it with {', '.join(FORMATS)}"
+        ) from None
+
+
+def sink_for(path: Path, table: Table, replace: bool) -> Sink:
+    """A new file at *path*, in the format of its name.
+
+    Raises:
+        NotAllowed: It is there already and must not be replaced, cannot be written, or what its format needs is not
+            installed. Nothing was changed.
+    """
+    module = import_module(f"drivebus.record.{format_of(path)}")
+    make: Callable[[Path, Table], Sink] = module.open_new
+    if path.exists() and not replace:
+        raise NotAllowed(f"{path} is there already; give another name, or replace=True")
+    try:
+        if replace:
+            path.unlink(missing_ok=True)
+        return make(path, table)
+    except ImportError:
+        extra = module.EXTRA
+        raise NotAllowed(f"{path.suffix} files need {extra}: pip install 'drivebus[{extra}]'") from None
+    except OSError as error:
+        raise NotAllowed(f"{path} cannot be written: {error.strerror or error}; nothing was recorded") from None
