@@ -79,6 +79,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "profiles check": (["profiles", "check", "."], 2),
     "profiles new": (["profiles", "new", "acme", "--like", "gd350"], 0),
     "raw": (["--port", ONE, "raw", "01", "03", "2100", "0001"], 0),
+    "raw by a script": (["--port", ONE, "raw", "--script", "requests.txt", "--yes"], 4),
+    "raw by a wrong script": (["--port", ONE, "raw", "--script", "wrong.txt"], 2),
     "decode": (["decode", "01 03 02 00 03 F8 45"], 0),
     "completion": (["completion", "bash"], 0),
     "nobody answers": (["--port", ONE, "--unit", "9", "status"], 3),
@@ -112,6 +114,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Where the commands are given: with a site file, and a backup that differs from the drive."""
     place = tmp_path_factory.mktemp("work")
     (place / "drivebus.toml").write_text(SITE)
+    (place / "requests.txt").write_text("read output_current P00.11 x2\nwrite P00.11=2.5\n01 03 6300 0001\n")
+    (place / "wrong.txt").write_text("01 03 2100 0001\nread output_curent\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))

@@ -18,7 +18,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Keep": {"backup": ("backup", "restore", "diff")},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
-    "Tools": {"frames": ("raw", "decode"), "simulation": ("sim",), "tools": ("completion", "demo")},
+    "Tools": {"raw": ("raw",), "frames": ("decode",), "simulation": ("sim",), "tools": ("completion", "demo")},
 }
 """The names of each file's `COMMANDS`, in the order of the help. A test compares the two."""
 
