@@ -79,7 +79,7 @@ ROOMS: list[set[str]] = [
     {"drive"},
     {"bus"},
     {"searching"},
-    {"aio", "doctor", "sniffer"},
+    {"aio", "doctor", "sniffer", "trial"},
     {"__init__"},
 ]
 
@@ -102,7 +102,7 @@ ON_THE_CORE = {
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "later", "line", "rtu", "sim", "site", "sniffer"},
+    "cli": {"capture", "drivebus", "later", "line", "rtu", "sim", "site", "sniffer", "trial"},
     "__main__": {"cli"},
 }
 

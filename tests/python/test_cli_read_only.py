@@ -18,6 +18,7 @@ WRITING = [
     ["stop"],
     ["coast"],
     ["jog", "--yes"],
+    ["try", "step", "--from", "5", "--to", "9", "--max-current", "9", "--for", "1", "--yes"],
     ["reset", "--yes"],
     ["prepare", "--yes"],
     ["prepare", "--store", "--yes"],

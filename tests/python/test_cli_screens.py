@@ -41,6 +41,8 @@ unit = 2
 all = ["pump1", "fan"]
 """
 
+TRY = ["try", "step", "--from", "5", "--to", "10", "--max-current", "9", "--for", "1"]
+
 COMMANDS: dict[str, tuple[list[str], int]] = {
     "version": (["--version"], 0),
     "help": (["--help"], 0),
@@ -60,6 +62,9 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "stop": (["--port", ONE, "stop"], 0),
     "coast": (["--port", ONE, "coast"], 0),
     "jog": (["--port", ONE, "jog", "--yes"], 2),
+    "try": (["--port", ONE, *TRY, "--yes"], 2),
+    "try without leave": (["--port", ONE, *TRY], 2),
+    "try step --help": (["try", "step", "--help"], 0),
     "reset": (["--port", ONE, "reset", "--yes"], 0),
     "write": (["--port", ONE, "write", "P00.11=2.5", "P00.12=3"], 0),
     "write what is out of range": (["--port", ONE, "write", "P00.11=99999"], 2),
@@ -93,6 +98,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
 
 WHILE: dict[str, Callable[[list[str]], bool]] = {
     "sim": lambda lines: any("Ctrl-C" in line for line in lines),
+    "try without leave": lambda lines: any("Go ahead?" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
 }
 """When a command is ended that does not end by itself."""
