@@ -7,8 +7,6 @@ import itertools
 import json
 import os
 import re
-import select
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -28,6 +26,9 @@ from drivebus.cli.raw.request import Request
 from drivebus.cli.raw.script import requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
 from drivebus.cli.session import Session
+
+if sys.platform != "win32":
+    from .conversation import Conversation
 
 VIRTUAL = "sim://1=gd350,2=vfd500?clock=virtual"
 GD350 = drivebus.Profile.builtin("gd350")
@@ -54,105 +55,52 @@ def run(*words: str, port: str = VIRTUAL, typed: str | None = None) -> Result:
     return CliRunner().invoke(cli, ["--port", port, *words], prog_name="drivebus", input=typed)
 
 
-class Conversation:
-    """`drivebus` on a terminal of its own: what it says is waited for, and answered."""
-
-    def __init__(self, *words: str) -> None:
-        import pty
-
-        self._leader, follower = pty.openpty()
-        self._program = subprocess.Popen(
-            [sys.executable, "-m", "drivebus", *words],
-            stdin=follower,
-            stdout=follower,
-            stderr=follower,
-            env={**os.environ, "TERM": "dumb", "COLUMNS": "200"},
-            start_new_session=True,
-            preexec_fn=lambda: _control(follower),
-        )
-        os.close(follower)
-        self.text = ""
-        self._seen = 0
-
-    def until(self, pattern: str) -> str:
-        """Waits for *pattern* in what comes next, and returns that."""
-        while (match := re.search(pattern, self.text[self._seen :])) is None:
-            ready, _, _ = select.select([self._leader], [], [], 60)
-            assert ready, f"{pattern!r} does not come:\n{self.text}"
-            self.text += os.read(self._leader, 65536).decode()
-        came = self.text[self._seen : self._seen + match.end()]
-        self._seen += match.end()
-        return came
-
-    def say(self, text: str, until: str = "raw> ") -> str:
-        os.write(self._leader, text.encode())
-        return self.until(until)
-
-    def end(self) -> int:
-        """Ctrl-D, and the exit code."""
-        os.write(self._leader, b"\x04")
-        while select.select([self._leader], [], [], 60)[0]:
-            try:
-                self.text += os.read(self._leader, 65536).decode()
-            except OSError:
-                break
-        os.close(self._leader)
-        return self._program.wait(60)
-
-
-def _control(terminal: int) -> None:
-    import fcntl
-    import termios
-
-    fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
-
-
 @no_pty
 def test_the_prompt_takes_bytes_and_names_asks_before_a_write_and_outlives_mistakes() -> None:
-    talk = Conversation("--port", VIRTUAL, "raw")
-    talk.until("raw> ")
-    assert "unit 1 answers 2100H = 3" in talk.say("01 03 2100 0001\n")
-    assert "status_word_1 = 3 (stopped)" in talk.say("read status_word_1\n")
-    assert 'the closest is "output_current"' in talk.say("read output_curent\n")
-    assert "begins no line" in talk.say("status\n")
-    asked = talk.say("write P00.11=2.5\n", "Go ahead.*: ")
-    assert "01 06 80 0B 00 19 (write P00.11 acceleration_time_1 = 2.5 s)" in asked
-    assert "Cancelled. Nothing was written." in talk.say("n\n")
-    assert "acceleration_time_1 = 10.0 s" in talk.say("read P00.11\n")
-    talk.say("write P00.11=2.5\n", "Go ahead.*: ")
-    assert "took P00.11 acceleration_time_1 = 2.5 s" in talk.say("y\n")
-    talk.say("unit 2\n")
-    assert "--profile" in talk.say("read P00.11\n")
-    talk.say("unit 1\n")
-    talk.say("01 06 2000 0005\n", "Go ahead.*: ")
-    talk.say("y\n")
-    assert "ten times" in talk.say("help\n")
-    assert talk.end() == 0
-    assert "stop` stops it" in talk.text
+    with Conversation("--port", VIRTUAL, "raw") as talk:
+        talk.until("raw> ")
+        assert "unit 1 answers 2100H = 3" in talk.say("01 03 2100 0001\n")
+        assert "status_word_1 = 3 (stopped)" in talk.say("read status_word_1\n")
+        assert 'the closest is "output_current"' in talk.say("read output_curent\n")
+        assert "begins no line" in talk.say("status\n")
+        asked = talk.say("write P00.11=2.5\n", "Go ahead.*: ")
+        assert "01 06 80 0B 00 19 (write P00.11 acceleration_time_1 = 2.5 s)" in asked
+        assert "Cancelled. Nothing was written." in talk.say("n\n")
+        assert "acceleration_time_1 = 10.0 s" in talk.say("read P00.11\n")
+        talk.say("write P00.11=2.5\n", "Go ahead.*: ")
+        assert "took P00.11 acceleration_time_1 = 2.5 s" in talk.say("y\n")
+        talk.say("unit 2\n")
+        assert "--profile" in talk.say("read P00.11\n")
+        talk.say("unit 1\n")
+        talk.say("01 06 2000 0005\n", "Go ahead.*: ")
+        talk.say("y\n")
+        assert "ten times" in talk.say("help\n")
+        assert talk.end() == 0
+        assert "stop` stops it" in talk.text
 
 
 @no_pty
 def test_the_prompt_completes_names_and_keeps_its_history() -> None:
-    talk = Conversation("--port", VIRTUAL, "--profile", "gd350", "raw", "--yes")
-    talk.until("raw> ")
-    assert "output_current = 0.0 A" in talk.say("read output_cu\t\n")
-    assert talk.end() == 0
-    later = Conversation("--port", VIRTUAL, "--profile", "gd350", "raw")
-    later.until("raw> ")
-    assert "output_current = 0.0 A" in later.say("\x10\n")
-    assert later.end() == 0
+    with Conversation("--port", VIRTUAL, "--profile", "gd350", "raw", "--yes") as talk:
+        talk.until("raw> ")
+        assert "output_current = 0.0 A" in talk.say("read output_cu\t\n")
+        assert talk.end() == 0
+    with Conversation("--port", VIRTUAL, "--profile", "gd350", "raw") as later:
+        later.until("raw> ")
+        assert "output_current = 0.0 A" in later.say("\x10\n")
+        assert later.end() == 0
 
 
 @no_pty
 def test_ctrl_c_ends_a_loop_and_tells_how_far_it_came(line: drivebus.Simulator) -> None:
-    talk = Conversation("--port", line.port, "raw")
-    talk.until("raw> ")
-    talk.say("01 03 2100 0001 x100000\n", "(?s)answer.*answer")
-    told = talk.say("\x03", r"Interrupted\. .*sent")
-    assert re.search(r"Interrupted\. \d+ of 100000 requests were sent", told)
-    talk.until("raw> ")
-    assert "2100H = 3" in talk.say("01 03 2100 0001\n")
-    assert talk.end() == 0
+    with Conversation("--port", line.port, "raw") as talk:
+        talk.until("raw> ")
+        talk.say("01 03 2100 0001 x100000\n", "(?s)answer.*answer")
+        told = talk.say("\x03", r"Interrupted\. .*sent")
+        assert re.search(r"Interrupted\. \d+ of 100000 requests were sent", told)
+        talk.until("raw> ")
+        assert "2100H = 3" in talk.say("01 03 2100 0001\n")
+        assert talk.end() == 0
 
 
 @pytest.mark.parametrize(
@@ -234,6 +182,18 @@ def test_repetitions_begin_when_they_are_said_to() -> None:
         # The first write of all has its adapter looked at before.
         assert gaps[1:] == pytest.approx([0.5, 4.0, 0.5, 0.5], abs=0.05)
         assert gaps[3:] == pytest.approx([0.5, 0.5], abs=1e-6)
+
+
+def test_names_are_as_sure_as_every_command_wants_them() -> None:
+    rows = [GD350.describe(name) for name in GD350.names()]
+    unsure = next(row for row in rows if row.evidence == "unverified" and row.writable and row.address is not None)
+    assumed = next(row for row in rows if row.evidence == "assumed" and row.access != "wo" and row.address is not None)
+    for text in (f"write {unsure.name}=1", f"read {assumed.name}"):
+        [typed] = typed_in([text], "", 1, False)
+        with pytest.raises(drivebus.NotAllowed, match="is not verified"):
+            requests_of(typed, lambda _: GD350)
+    [typed] = typed_in([f"read {unsure.name} {assumed.name}"], "", 1, False)
+    assert requests_of(typed, lambda _: GD350, unverified=True) is not None
 
 
 def test_completion_offers_what_fits_the_place() -> None:

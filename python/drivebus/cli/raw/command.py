@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import click
 
@@ -11,7 +11,7 @@ import drivebus
 from drivebus.cli.output import remark
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.request import request_of
-from drivebus.cli.raw.script import Send, Step, requests_of, typed_in
+from drivebus.cli.raw.script import Send, Step, Typed, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
 from drivebus.cli.session import Session, exit_code, pass_session, yes_option
 from drivebus.cli.types import Place, Seconds, Whole
@@ -81,7 +81,7 @@ def raw(
         _send(
             session,
             bus,
-            lambda families: [step for line in typed if (step := requests_of(line, families.find)) is not None],
+            lambda families: _steps(session, typed, families),
             count or 1,
             interval,
             keep_going,
@@ -106,6 +106,12 @@ def _lines(script: str | None) -> list[str]:
         raise click.UsageError(f"{script or 'standard input'} is not text; nothing was sent") from None
     except OSError as error:
         raise click.UsageError(f"{script} cannot be read: {error.strerror or error}") from None
+
+
+def _steps(session: Session, typed: Sequence[Typed], families: Families) -> list[Step]:
+    """What all lines ask for."""
+    found = (requests_of(line, families.find, session.unverified) for line in typed)
+    return [step for step in found if step is not None]
 
 
 def _send(

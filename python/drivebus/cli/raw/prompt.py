@@ -47,17 +47,17 @@ def prompt(session: Session, bus: drivebus.Bus, force: bool, yes: bool) -> None:
             if line.strip().lower() in ("help", "?"):
                 remark(_HELP)
                 continue
-            unit = _done(line, unit, sender, families, force)
+            unit = _done(line, unit, sender, families, session.unverified, force)
     sender.remind()
 
 
-def _done(line: str, unit: int, sender: Sender, families: Families, force: bool) -> int:
+def _done(line: str, unit: int, sender: Sender, families: Families, unverified: bool, force: bool) -> int:
     """Does what *line* says, and returns the unit whose names are meant from then on. No error ends the prompt."""
     total = 0
     try:
         for typed in typed_in([line], "", unit, force):
             unit = typed.unit
-            step = requests_of(typed, families.find)
+            step = requests_of(typed, families.find, unverified)
             if step is None:
                 continue
             sender.prepare([step])

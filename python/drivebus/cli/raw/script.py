@@ -170,15 +170,16 @@ def _repeated(words: tuple[str, ...]) -> tuple[tuple[str, ...], int, float | Non
     return words[:-1], int(digits), every
 
 
-def requests_of(typed: Typed, family: Callable[[int], drivebus.Profile]) -> Step | None:
+def requests_of(typed: Typed, family: Callable[[int], drivebus.Profile], unverified: bool = False) -> Step | None:
     """What *typed* asks for; None for what is only said.
 
     Args:
         typed: The line.
         family: What tells the family of a unit, asked only where names are used.
+        unverified: Whether names may be used that no document of the very family proves. Bytes always may.
 
     Raises:
-        NotAllowed: A name or a value is wrong.
+        NotAllowed: A name or a value is wrong, or not verified.
         NoAnswer, BadAnswer, PortError: The unit did not tell its family.
     """
     with located(typed.where):
@@ -188,26 +189,28 @@ def requests_of(typed: Typed, family: Callable[[int], drivebus.Profile]) -> Step
             case "wait":
                 return Wait(typed.seconds)
             case "read":
-                requests = _reads(typed, family(typed.unit))
+                requests = _reads(typed, family(typed.unit), unverified)
             case "write":
-                requests = tuple(_write(typed.unit, word, family(typed.unit)) for word in typed.words)
+                requests = tuple(_write(typed.unit, word, family(typed.unit), unverified) for word in typed.words)
             case _:
                 requests = (request_of(typed.words, True),)
         return Send(typed.where, requests, typed.times, typed.every)
 
 
-def _reads(typed: Typed, profile: drivebus.Profile) -> tuple[Request, ...]:
+def _reads(typed: Typed, profile: drivebus.Profile, unverified: bool) -> tuple[Request, ...]:
     """The fewest reads of all that is named."""
     places = [names.resolve(profile, word) for word in typed.words]
     reads = [(place, 1) for place in places if isinstance(place, int)]
     wanted = [place for place in places if isinstance(place, str)]
+    for name in wanted:
+        _check_proved(profile.describe(name), ("verified", "unverified"), "reading", unverified)
     reads += profile.plan(wanted) if wanted else []
     return tuple(
         Request(typed.unit, b"\x03" + address.to_bytes(2, "big") + count.to_bytes(2, "big")) for address, count in reads
     )
 
 
-def _write(unit: int, text: str, profile: drivebus.Profile) -> Request:
+def _write(unit: int, text: str, profile: drivebus.Profile, unverified: bool) -> Request:
     """The write of *text*, a name and a value. A parameter goes to RAM."""
     name, value = names.parse_assignment(text)
     place = names.resolve(profile, name)
@@ -219,6 +222,17 @@ def _write(unit: int, text: str, profile: drivebus.Profile) -> Request:
         known = profile.describe(place)
         if not known.writable:
             raise drivebus.NotAllowed(f"{place} ({known.label}) is read-only")
+        _check_proved(known, ("verified",), "writing", unverified)
         address = profile.address(place, store=False)
         word = profile.encode(place, names.without_unit(value, known.unit))
     return Request(unit, b"\x06" + address.to_bytes(2, "big") + word.to_bytes(2, "big"))
+
+
+def _check_proved(row: drivebus.Description, enough: tuple[str, ...], doing: str, unverified: bool) -> None:
+    """Raises `NotAllowed` where less is known of *row* than every command asks for."""
+    if row.evidence not in enough and not unverified:
+        reason = (row.reason or "no document of this family says so").rstrip(".")
+        raise drivebus.NotAllowed(
+            f"{doing} {row.code or row.name} ({row.label}) is not verified: {reason}. With --unverified it is done "
+            "nevertheless, and so it is in hex"
+        )
