@@ -255,3 +255,19 @@ class TestCommand:
             assert aborted.exit_code == 1, aborted.stderr
             assert "above the 1 A that it was given" in aborted.stderr
             assert simulator.drive(1).state == "stopped"
+
+    def test_ctrl_c_stops_the_motor_and_says_what_it_does(self) -> None:
+        from .conversation import Conversation
+
+        with drivebus.Simulator({1: "gd350"}, transport="pty") as simulator:
+            with drivebus.Bus(simulator) as bus:
+                drive = bus.drive(1)
+                drive.prepare_control()
+                drive.write({"P00.11": 2.0, "P00.12": 2.0})
+            words = ["try", "step", "--from", "5", "--to", "10", "--max-current", "40", "--for", "600", "--yes"]
+            with Conversation("--port", simulator.port, "-v", *words, terminal="xterm") as talk:
+                talk.until("-> .*write set_frequency = 10.00 Hz")
+                talk.until("set_frequency_actual 10.00 Hz")
+                assert talk.end("\x03") == 130
+                assert re.search(r"Interrupted\.\s+unit 1: (stopping|stopped)", talk.text), talk.text
+            assert [word for _, address, word in simulator.drive(1).writes() if address == 0x2000][-1] == 5

@@ -5,17 +5,19 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
 import click
+from rich.live import Live
+from rich.text import Text
 
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.csv_rows import CsvRows
-from drivebus.cli.output import remark
+from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
 from drivebus.cli.types import Amperes, Hertz, Place, Seconds
 from drivebus.trial import RampFigures, SineFigures, StepFigures, Trial
@@ -146,16 +148,26 @@ def _do(
         session.ask(
             f"This starts the motor {way}, {what}, and stops it {duration:g} s later, or as soon as {sooner}", yes
         )
-        trial = carry_out(
-            drive,
-            duration=duration,
-            max_current=limit,
-            margin=margin,
-            also=recorded,
-            reverse=reverse,
-            told=None if file is None else _Kept(opened, file, drive),
-            **how,
-        )
+        kept = None if file is None else _Kept(opened, file, drive)
+        shown = _Shown(session.out, drive) if session.out.live else None
+        told = [each for each in (kept, shown) if each is not None]
+        try:
+            with shown.live if shown else nullcontext():
+                trial = carry_out(
+                    drive,
+                    duration=duration,
+                    max_current=limit,
+                    margin=margin,
+                    also=recorded,
+                    reverse=reverse,
+                    told=lambda time, values: [each(time, values) for each in told],
+                    **how,
+                )
+        except KeyboardInterrupt as error:
+            if hasattr(error, "add_note"):
+                for text in _now(session, drive):
+                    error.add_note(text)
+            raise
         _show(session, drive, trial)
     if trial.aborted is not None:
         remark(f"Error: the trial was aborted: {trial.aborted}")
@@ -179,6 +191,26 @@ class _Kept:
             }
             self._rows = CsvRows(self._file, rows, doubtful)
         self._rows.write(time, values)
+
+
+class _Shown:
+    """Shows the latest sample as a line that goes away in the end.
+
+    Attributes:
+        live: The line.
+    """
+
+    def __init__(self, out: Output, drive: drivebus.Drive) -> None:
+        self.live = Live(Text(), console=out.console, refresh_per_second=5, transient=True)
+        self._drive = drive
+        self._begun: float | None = None
+
+    def __call__(self, time: float, values: Mapping[str, float]) -> None:
+        self._begun = time if self._begun is None else self._begun
+        rows = {name: self._drive.describe(name) for name in values}
+        shown = (f"{name} {row.text(values[name])} {row.unit}".rstrip() for name, row in rows.items())
+        line = f"{time - self._begun:6.1f} s  {'  '.join(shown)}"
+        self.live.update(Text(line, no_wrap=True, overflow="crop"))
 
 
 def _new(file: str) -> TextIO:
@@ -217,10 +249,16 @@ def _show(session: Session, drive: drivebus.Drive, trial: Trial) -> None:
     interval = trial.samples.interval
     told["samples"] = f"{len(trial.samples)}{'' if interval is None else f', one each {interval * 1000:.0f} ms'}"
     session.out.facts(told)
+    for text in _now(session, drive):
+        session.out.say(text)
+
+
+def _now(session: Session, drive: drivebus.Drive) -> Iterator[str]:
+    """What the motor does now, if the drive tells."""
     with suppress(drivebus.DrivebusError):
         status = drive.status()
         where = "" if status.frequency is None else f", {status.frequency:.2f} Hz"
-        session.out.say(f"{session.called}: {f'stopping{where}' if status.state.running else status}")
+        yield f"{session.called}: {f'stopping{where}' if status.state.running else status}"
 
 
 def _figures(trial: Trial) -> Iterator[tuple[str, str]]:
