@@ -79,7 +79,7 @@ ROOMS: list[set[str]] = [
     {"drive"},
     {"bus"},
     {"searching"},
-    {"aio", "doctor", "sniffer", "record"},
+    {"aio", "doctor", "sniffer", "record", "trial"},
     {"__init__"},
 ]
 
@@ -103,7 +103,7 @@ ON_THE_CORE = {
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "later", "line", "record", "rtu", "sim", "site", "sniffer"},
+    "cli": {"capture", "drivebus", "later", "line", "record", "rtu", "sim", "site", "sniffer", "trial"},
     "__main__": {"cli"},
 }
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from drivebus.later import later
 
 if TYPE_CHECKING:
-    from drivebus import doctor, rtu, sim
+    from drivebus import doctor, rtu, sim, trial
     from drivebus._native import SerialFormat, __version__, crc16
     from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
     from drivebus.bus import Bus
@@ -111,6 +111,7 @@ __all__ = [
     "search",
     "sim",
     "sniff",
+    "trial",
 ]
 
 if not TYPE_CHECKING:
@@ -156,7 +157,7 @@ if not TYPE_CHECKING:
                 "Status",
             ),
         },
-        modules=("doctor", "rtu", "sim"),
+        modules=("doctor", "rtu", "sim", "trial"),
     )
 
 

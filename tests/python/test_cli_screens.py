@@ -41,6 +41,8 @@ unit = 2
 all = ["pump1", "fan"]
 """
 
+TRY = ["try", "step", "--from", "5", "--to", "10", "--max-current", "9", "--for", "1"]
+
 COMMANDS: dict[str, tuple[list[str], int]] = {
     "version": (["--version"], 0),
     "help": (["--help"], 0),
@@ -54,6 +56,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "read what is none": (["--port", ONE, "read", "output_curent"], 2),
     "monitor": (["--port", ONE, "monitor", "--count", "3", "--interval", "0"], 0),
     "monitor of two": (["--drive", "all", "--unverified", "monitor", "--count", "3", "--interval", "0"], 0),
+    "record": (["--port", ONE, "record", "kept.csv", "--count", "3"], 0),
+    "record what is there": (["--port", ONE, "record", "requests.csv"], 2),
     "drives": (["drives"], 0),
     "run": (["--port", ONE, "run", "10", "--yes"], 2),
     "run without leave": (["--port", ONE, "run", "10"], 2),
@@ -61,6 +65,9 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "stop": (["--port", ONE, "stop"], 0),
     "coast": (["--port", ONE, "coast"], 0),
     "jog": (["--port", ONE, "jog", "--yes"], 2),
+    "try": (["--port", ONE, *TRY, "--yes"], 2),
+    "try without leave": (["--port", ONE, *TRY], 2),
+    "try step --help": (["try", "step", "--help"], 0),
     "reset": (["--port", ONE, "reset", "--yes"], 0),
     "write": (["--port", ONE, "write", "P00.11=2.5", "P00.12=3"], 0),
     "write what is out of range": (["--port", ONE, "write", "P00.11=99999"], 2),
@@ -80,6 +87,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "profiles check": (["profiles", "check", "."], 2),
     "profiles new": (["profiles", "new", "acme", "--like", "gd350"], 0),
     "raw": (["--port", ONE, "raw", "01", "03", "2100", "0001"], 0),
+    "raw by a script": (["--port", ONE, "raw", "--script", "requests.txt", "--yes"], 4),
+    "raw by a wrong script": (["--port", ONE, "raw", "--script", "wrong.txt"], 2),
     "decode": (["decode", "01 03 02 00 03 F8 45"], 0),
     "decode a capture": (["decode", "line.pcapng"], 0),
     "sniff": (["--port", ONE, "sniff", "--for", "1"], 0),
@@ -96,6 +105,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
 WHILE: dict[str, Callable[[list[str]], bool]] = {
     "sim": lambda lines: any("Ctrl-C" in line for line in lines),
     "replay": lambda lines: any("Ctrl-C" in line for line in lines),
+    "try without leave": lambda lines: any("Go ahead?" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
 }
 """When a command is ended that does not end by itself."""
@@ -117,6 +127,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Where the commands are given: with a site file, a capture, and a backup that differs from the drive."""
     place = tmp_path_factory.mktemp("work")
     (place / "drivebus.toml").write_text(SITE)
+    (place / "requests.txt").write_text("read output_current P00.11 x2\nwrite P00.11=2.5\n01 03 6300 0001\n")
+    (place / "requests.csv").touch()
+    (place / "wrong.txt").write_text("01 03 2100 0001\nread output_curent\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
@@ -133,7 +146,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 def looked_at(name: str, size: tuple[int, int], colours: bool, folder: Path) -> Seen:
     """What *name* showed; kept for whoever looks."""
-    (folder / "kept.toml").unlink(missing_ok=True)
+    for kept in folder.glob("kept.*"):
+        kept.unlink()
     for path in (folder / "acme").glob("*"):
         path.unlink()
     words, _ = COMMANDS[name]

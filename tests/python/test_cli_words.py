@@ -47,7 +47,7 @@ def run(*words: str, port: str | None = SIM) -> Result:
         (["restore", ""], "an empty text is not a path"),
         (["profiles", "new", ""], "an empty text is not a path"),
         (["profiles", "check", ""], "an empty text is not a path"),
-        (["raw", "01 03 21 03 00 01 7E 36"], "it is added: drivebus raw 01 03 21 03 00 01"),
+        (["raw", "01 03 21 03 00 01 7E 36"], "it is added; give 01 03 21 03 00 01"),
         (["statsu"], "Did you mean 'status'?"),
     ],
 )

@@ -14,11 +14,11 @@ __all__ = ["GROUPS", "Commands"]
 
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
-    "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write")},
+    "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write"), "trying": ("try",)},
     "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",)},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
-    "Tools": {"frames": ("raw", "decode"), "simulation": ("sim",), "tools": ("completion", "demo")},
+    "Tools": {"raw": ("raw",), "frames": ("decode",), "simulation": ("sim",), "tools": ("completion", "demo")},
 }
 """The names of each file's `COMMANDS`, in the order of the help. A test compares the two."""
 

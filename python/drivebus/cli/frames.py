@@ -1,4 +1,4 @@
-"""Frames: by hand, as with the serial assistants of the manuals, and those that other commands send and hear."""
+"""Frames as they are shown: those that are taken apart, and those that other commands send and hear."""
 
 from __future__ import annotations
 
@@ -11,18 +11,12 @@ import click
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.output import remark
-from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.output import Output, remark
+from drivebus.cli.session import Session, pass_session
 from drivebus.line.trace import LOGGER as TRACE_LOGGER
 from drivebus.line.trace import meaning
 
-__all__ = ["COMMANDS", "show_frames"]
-
-_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x08, 0x0B, 0x0C, 0x11, 0x14, 0x18})
-"""Function codes that change nothing in a unit, as the core has them; of 08H, most of its sub-functions."""
-
-_DIAGNOSTICS = frozenset({0x00, 0x02, *range(0x0B, 0x13)})
-"""Sub-functions of 08H that only tell something."""
+__all__ = ["COMMANDS", "framed", "show_frame", "show_frames"]
 
 
 class _Shown(logging.Handler):
@@ -53,57 +47,6 @@ def show_frames(context: click.Context) -> None:
 
 
 @click.command()
-@click.argument("data", metavar="HEX...", nargs=-1, required=True)
-@click.option("--force", is_flag=True, help="Also send a command that the family does not define.")
-@yes_option
-@pass_session
-def raw(session: Session, data: tuple[str, ...], force: bool, yes: bool) -> None:
-    """Send any request and show the answer. Give unit and PDU in hexadecimal, without the CRC.
-
-    Example: `drivebus raw 01 03 21 00 00 01`. A word for a command register must be a command of the family (--profile;
-    without it, of any family that has its commands there). --force sends any other.
-    """
-    body = names.parse_hex(data)
-    if not 2 <= len(body) <= 254:
-        raise click.UsageError(
-            f"{len(body)} bytes are not a request; give the unit, then 1 to 253 bytes of PDU, and no CRC"
-        )
-    unit, pdu = body[0], body[1:]
-    if not 1 <= unit <= 247:
-        raise click.UsageError(f"no unit {unit:02X} answers; the first byte is the unit, 01 to F7")
-    if not force and len(body) > 4 and _framed(body[:-2]) == body:
-        asked = body[:-2].hex(" ").upper()
-        raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added: drivebus raw {asked}")
-    diagnoses = pdu[0] != 0x08 or int.from_bytes(pdu[1:3], "big") in _DIAGNOSTICS
-    if pdu[0] not in _READS or not diagnoses:
-        session.will_write()
-    with session.bus() as bus:
-        if session.profile is not None:
-            # From now on the bus knows what the unit is, and refuses what would be no command of its family.
-            bus.drive(unit, session.profile)
-        elif not force:
-            _check_commands(unit, body)
-        if pdu[0] not in _READS:
-            session.ask(f"Function {pdu[0]:02X}H writes, which can move the motor", yes, unit)
-        try:
-            answer = bus.transact(unit, pdu, force=force)
-        except drivebus.NotAllowed:
-            raise
-        except drivebus.DrivebusError as error:
-            _show_frame(session, "sent", _framed(body), True)
-            if not isinstance(error, drivebus.Refused):
-                raise
-            _show_frame(session, "answer", error.raw, False, _framed(body))
-            if session.profile is not None:
-                name, told = drivebus.Profile.find(session.profile).exception(error.code)
-                session.out.say(f"{'':<7}{session.profile} means by it: {name}, {told}")
-            raise
-        sent = _framed(body)
-        _show_frame(session, "sent", sent, True)
-        _show_frame(session, "answer", _framed(bytes([unit]) + answer), False, sent)
-
-
-@click.command()
 @click.argument("data", metavar="FILE|HEX...", nargs=-1, required=True)
 @pass_session
 def decode(session: Session, data: tuple[str, ...]) -> None:
@@ -117,7 +60,8 @@ def decode(session: Session, data: tuple[str, ...]) -> None:
         return
     frame = names.parse_hex(data)
     kind = drivebus.rtu.decode(frame).kind
-    _show_frame(session, "frame", frame, kind in _REQUESTS)
+    profile = None if session.profile is None else drivebus.Profile.find(session.profile)
+    show_frame(session.out, "frame", frame, kind in _REQUESTS, profile=profile)
     if kind in _ALIKE:
         session.out.say(f"{'':<7}or the answer to it, which is the same")
 
@@ -152,27 +96,8 @@ def _decode_file(session: Session, file: str) -> None:
         raise broken
 
 
-def _check_commands(unit: int, body: bytes) -> None:
-    """Raises `NotAllowed` where *body* writes to a command register a code that no family with that register defines.
-
-    What the unit is, nobody has said; what it cannot mean is known all the same.
-    """
-    write = drivebus.rtu.written(body[1:])
-    if write is None:
-        return
-    first, words = write
-    families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
-    for address, word in enumerate(words, first):
-        there = [family for family in families if family.command_address == address]
-        if there and not any(word in family.command_codes() for family in there):
-            raise drivebus.NotAllowed(
-                f"{word} at {address:04X}H is not a command of any family that has its command register there "
-                f"({', '.join(family.name for family in there)}); nothing was sent to unit {unit}. With --profile the "
-                "family is known; with --force it is sent all the same"
-            )
-
-
-def _framed(body: bytes) -> bytes:
+def framed(body: bytes) -> bytes:
+    """*body*, which is a unit and a PDU, with its CRC."""
     return body + drivebus.crc16(body).to_bytes(2, "little")
 
 
@@ -182,16 +107,31 @@ _ALIKE = ("write", "echo")
 _REQUESTS = ("read", "write_many", *_ALIKE)
 
 
-def _show_frame(session: Session, what: str, frame: bytes, sent: bool, asked: bytes | None = None) -> None:
-    """*frame* and what it means; *asked* is the request that it answers, if it was *sent* by a unit."""
-    if session.out.as_json:
+def show_frame(
+    out: Output,
+    what: str,
+    frame: bytes,
+    sent: bool,
+    asked: bytes | None = None,
+    profile: drivebus.Profile | None = None,
+) -> None:
+    """Shows *frame* and what it means.
+
+    Args:
+        out: Where it is shown.
+        what: What it is, in a word of up to six letters.
+        frame: All of it, the CRC included.
+        sent: Whether a master sent it.
+        asked: The request that it answers, if a unit sent it.
+        profile: The family of the unit, for names.
+    """
+    if out.as_json:
         decoded = drivebus.rtu.decode(frame)
         fields = {name: value for name, value in vars(decoded).items() if value is not None}
-        session.out.record({"what": what, "hex": frame, **fields})
+        out.record({"what": what, "hex": frame, **fields})
     else:
-        session.out.say(f"{what:<7}{frame.hex(' ').upper()}")
-        profile = None if session.profile is None else drivebus.Profile.find(session.profile)
-        session.out.say(f"{'':<7}{meaning(frame, sent, asked, profile)}", hanging=7)
+        out.say(f"{what:<7}{frame.hex(' ').upper()}")
+        out.say(f"{'':<7}{meaning(frame, sent, asked, profile)}", hanging=7)
 
 
-COMMANDS = [raw, decode]
+COMMANDS = [decode]

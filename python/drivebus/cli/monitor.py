@@ -6,7 +6,6 @@ import csv
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, nullcontext
-from datetime import datetime, timezone
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any
@@ -16,6 +15,7 @@ from rich.live import Live
 
 import drivebus
 from drivebus.cli import names
+from drivebus.cli.csv_rows import moment, titled
 from drivebus.cli.lines import opened_lines
 from drivebus.cli.output import Output, printable, remark
 from drivebus.cli.screen import Screen, Watched
@@ -172,7 +172,7 @@ class _Seen:
         self._csv = csv.writer(sys.stdout, lineterminator="\n")
         self._named = len(drives) > 1
         self._columns = {
-            name: _titled(row, drive.doubtful.get(name, "")) for drive in drives for name, row in drive.rows.items()
+            name: titled(row, drive.doubtful.get(name, "")) for drive in drives for name, row in drive.rows.items()
         }
 
     def show(self, drive: Watched, sample: drivebus.Sample) -> None:
@@ -186,11 +186,11 @@ class _Seen:
         if self.live is not None:
             self.live.refresh()
             return
-        moment = datetime.fromtimestamp(sample.time, timezone.utc).isoformat(timespec="microseconds")
+        time = moment(sample.time)
         if self._out.as_json:
-            self._out.record({"time": moment, **self._record(drive, sample)})
+            self._out.record({"time": time, **self._record(drive, sample)})
         else:
-            self._write_row(moment, drive, sample)
+            self._write_row(time, drive, sample)
 
     def end(self) -> None:
         """Leaves on the terminal what was on its screen last."""
@@ -216,7 +216,7 @@ class _Seen:
         units = {name: row.unit for name, row in drive.rows.items() if row.unit}
         return {**whose, **values, "units": units, **({"evidence": drive.doubtful} if drive.doubtful else {})}
 
-    def _write_row(self, moment: str, drive: Watched, sample: drivebus.Sample) -> None:
+    def _write_row(self, time: str, drive: Watched, sample: drivebus.Sample) -> None:
         """A line of CSV, behind one with the names of its columns if it is the first."""
         whose = [drive.name] if self._named else []
         if self.count == 1:
@@ -226,14 +226,8 @@ class _Seen:
         shown = sample.missing is None
         values = [drive.rows[name].text(sample[name]) if shown and name in drive.rows else "" for name in self._columns]
         why = "" if sample.missing is None else str(sample.missing)
-        self._csv.writerow([moment, *map(printable, (*whose, *values, why))])
+        self._csv.writerow([time, *map(printable, (*whose, *values, why))])
         sys.stdout.flush()
-
-
-def _titled(row: drivebus.Description, doubt: str) -> str:
-    """The name of a column: with the unit of its values, and with what makes them not sure."""
-    known = ", ".join(text for text in (row.unit, doubt) if text)
-    return f"{row.name} [{known}]" if known else row.name
 
 
 COMMANDS = [monitor]

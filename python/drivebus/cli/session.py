@@ -201,7 +201,10 @@ class Session:
         """Refuses a command that writes where only looking was asked for, before anything is opened."""
         if not self.read_only:
             return
-        name = click.get_current_context().info_name
+        context = click.get_current_context()
+        name, group = context.info_name, context.parent
+        if group is not None and group.parent is not None:
+            name = f"{group.info_name} {name}"
         halt = " If it must stop now, use the emergency stop." if name in ("stop", "coast") else ""
         raise drivebus.NotAllowed(
             f"`{name}` writes to the drive, and --read-only says that nothing may; nothing was sent. Say it without "

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import click
 
-__all__ = ["Hertz", "Place", "Seconds", "Size", "Whole", "with_a_point"]
+__all__ = ["Amperes", "Hertz", "Place", "Seconds", "Size", "Whole", "with_a_point"]
 
 
 class Number(click.FloatRange):
@@ -40,6 +40,16 @@ class Hertz(Number):
     """A frequency in Hz."""
 
     what = "Hz"
+
+
+class Amperes(Number):
+    """A current in A; `off` is infinite: no bound."""
+
+    what = "amperes"
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as a float in the range, or infinity."""
+        return math.inf if value == "off" else super().convert(value, parameter, context)
 
 
 class Whole(click.IntRange):

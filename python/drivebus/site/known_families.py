@@ -11,8 +11,9 @@ anything, so nothing large is loaded for that: `os.path` is there already, and `
 from __future__ import annotations
 
 import os
-import sys
 from contextlib import suppress
+
+from drivebus.site.state_folder import state_file
 
 __all__ = ["forget", "known_family", "remember"]
 
@@ -56,21 +57,10 @@ def _key(port: str, unit: int) -> str | None:
     return f"{name} unit {unit}" if name.isprintable() else None
 
 
-def _file() -> str:
-    home = os.path.expanduser("~")
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or os.path.join(home, "AppData", "Local")
-    elif sys.platform == "darwin":
-        base = os.path.join(home, "Library", "Application Support")
-    else:
-        base = os.environ.get("XDG_STATE_HOME") or os.path.join(home, ".local", "state")
-    return os.path.join(base, "drivebus", "families")
-
-
 def _read() -> dict[str, str]:
     """What is kept; nothing where the file is not there, or is anything else."""
     try:
-        with open(_file(), encoding="utf-8") as file:
+        with open(state_file("families"), encoding="utf-8") as file:
             parts = [
                 line.rstrip("\n").partition("\t") for line in file.read(_MOST * _LONGEST).splitlines(keepends=True)
             ]
@@ -82,7 +72,7 @@ def _read() -> dict[str, str]:
 def _write(known: dict[str, str]) -> None:
     # A user without a home, a full disk, a folder that may not be written to: nothing is remembered then.
     with suppress(OSError):
-        place = _file()
+        place = state_file("families")
         os.makedirs(os.path.dirname(place), mode=0o700, exist_ok=True)
         new = f"{place}.{os.getpid()}"
         try:

@@ -1,0 +1,97 @@
+"""One request as it goes out: a unit and a PDU, what they may be, and whether they change anything in the unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import click
+
+import drivebus
+from drivebus.cli import names
+from drivebus.cli.frames import framed
+from drivebus.line.trace import meaning
+
+__all__ = ["Request", "check_commands", "request_of"]
+
+_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x08, 0x0B, 0x0C, 0x11, 0x14, 0x18})
+"""Function codes that change nothing in a unit, as the core has them; of 08H, most of its sub-functions."""
+
+_DIAGNOSTICS = frozenset({0x00, 0x02, *range(0x0B, 0x13)})
+"""Sub-functions of 08H that only tell something."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of one unit.
+
+    Attributes:
+        unit: Its address, 1..247.
+        pdu: Function code and data, 1..253 bytes.
+    """
+
+    unit: int
+    pdu: bytes
+
+    @property
+    def body(self) -> bytes:
+        """Unit and PDU: the frame without its CRC."""
+        return bytes([self.unit]) + self.pdu
+
+    @property
+    def writes(self) -> bool:
+        """Whether it can change a word of the unit, and so move its motor."""
+        return self.pdu[0] not in _READS
+
+    @property
+    def only_looks(self) -> bool:
+        """Whether it changes nothing at all, the state of the unit's own port included."""
+        told = self.pdu[0] != 0x08 or int.from_bytes(self.pdu[1:3], "big") in _DIAGNOSTICS
+        return not self.writes and told
+
+    def text(self) -> str:
+        """Its bytes, as people type them."""
+        return self.body.hex(" ").upper()
+
+    def meaning(self, profile: drivebus.Profile | None) -> str:
+        """What it asks for, in words; with the names of *profile*, if the family is known."""
+        return meaning(framed(self.body), True, None, profile).partition(": ")[2]
+
+
+def request_of(parts: tuple[str, ...], force: bool) -> Request:
+    """The request in hexadecimal *parts*. With *force*, the last two bytes may look like its CRC.
+
+    Raises:
+        click.UsageError: It is no request.
+    """
+    body = names.parse_hex(parts)
+    if not 2 <= len(body) <= 254:
+        raise click.UsageError(
+            f"{len(body)} {'byte is' if len(body) == 1 else 'bytes are'} not a request; give the unit, then 1 to 253 "
+            "bytes of PDU, and no CRC"
+        )
+    if not 1 <= body[0] <= 247:
+        raise click.UsageError(f"no unit {body[0]:02X} answers; the first byte is the unit, 01 to F7")
+    if not force and len(body) > 4 and framed(body[:-2]) == body:
+        asked = body[:-2].hex(" ").upper()
+        raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added; give {asked}")
+    return Request(body[0], body[1:])
+
+
+def check_commands(request: Request) -> None:
+    """Raises `NotAllowed` where *request* writes to a command register a code that no family with that register has.
+
+    What the unit is, nobody has said; what the code cannot mean is known all the same.
+    """
+    write = drivebus.rtu.written(request.pdu)
+    if write is None:
+        return
+    first, words = write
+    families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
+    for address, word in enumerate(words, first):
+        there = [family for family in families if family.command_address == address]
+        if there and not any(word in family.command_codes() for family in there):
+            raise drivebus.NotAllowed(
+                f"{word} at {address:04X}H is not a command of any family that has its command register there "
+                f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
+                "--profile the family is known; with --force it is sent all the same"
+            )
