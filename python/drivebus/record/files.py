@@ -16,6 +16,9 @@ __all__ = ["FORMATS", "Sink", "format_of", "sink_for"]
 FORMATS = {".csv": "csv_file", ".jsonl": "json_lines", ".parquet": "parquet", ".sqlite": "sqlite", ".db": "sqlite"}
 """The file of this room that has the format, by the end of the name."""
 
+_EXTRAS = {"parquet"}
+"""Those that need something to be installed, which an extra of that name has."""
+
 
 class Sink(Protocol):
     """One file that grows.
@@ -70,16 +73,17 @@ def sink_for(path: Path, table: Table, replace: bool) -> Sink:
         NotAllowed: It is there already and must not be replaced, cannot be written, or what its format needs is not
             installed. Nothing was changed.
     """
-    module = import_module(f"drivebus.record.{format_of(path)}")
-    make: Callable[[Path, Table], Sink] = module.open_new
+    known = format_of(path)
     if path.exists() and not replace:
         raise NotAllowed(f"{path} is there already; give another name, or replace=True")
     try:
+        make: Callable[[Path, Table], Sink] = import_module(f"drivebus.record.{known}").open_new
         if replace:
             path.unlink(missing_ok=True)
         return make(path, table)
-    except ImportError:
-        extra = module.EXTRA
-        raise NotAllowed(f"{path.suffix} files need {extra}: pip install 'drivebus[{extra}]'") from None
+    except ImportError as error:
+        if known not in _EXTRAS:
+            raise
+        raise NotAllowed(f"{path.suffix} files need {error.name}: pip install 'drivebus[{known}]'") from None
     except OSError as error:
         raise NotAllowed(f"{path} cannot be written: {error.strerror or error}; nothing was recorded") from None

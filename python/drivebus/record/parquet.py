@@ -16,10 +16,7 @@ import pyarrow.parquet
 
 from drivebus.record.table import FIXED, Row, Table
 
-__all__ = ["EXTRA", "open_new"]
-
-EXTRA = "parquet"
-"""What has to be installed for it."""
+__all__ = ["open_new"]
 
 _PART = 10_000
 """Rows after which a next part begins."""
