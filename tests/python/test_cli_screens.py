@@ -58,6 +58,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "monitor of two": (["--drive", "all", "--unverified", "monitor", "--count", "3", "--interval", "0"], 0),
     "record": (["--port", ONE, "record", "kept.csv", "--count", "3"], 0),
     "record what is there": (["--port", ONE, "record", "requests.csv"], 2),
+    "plot": (["plot", "run.jsonl", "-o", "kept.svg"], 0),
+    "plot what is none": (["plot", "requests.csv"], 2),
     "drives": (["drives"], 0),
     "run": (["--port", ONE, "run", "10", "--yes"], 2),
     "run without leave": (["--port", ONE, "run", "10"], 2),
@@ -134,6 +136,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         seen = on_a_terminal(["--port", ONE, "backup", "older.toml"], SIZES[0], cwd=place)
+        assert seen.code == 0, seen.text
+        words = ["--port", ONE, "record", "run.jsonl", "--count", "3", "bus_voltage"]
+        seen = on_a_terminal(words, SIZES[0], cwd=place)
         assert seen.code == 0, seen.text
         seen = on_a_terminal(["--port", ONE, "--capture", "line.pcapng", "status"], SIZES[0], cwd=place)
         assert seen.code == 0, seen.text

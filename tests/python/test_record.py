@@ -70,7 +70,7 @@ def by_polars(path: Path) -> int:
 def by_duckdb(path: Path) -> int:
     import duckdb
 
-    [(count,)] = duckdb.sql(f"SELECT count(*) FROM '{path}'").fetchall()
+    [(count,)] = duckdb.connect().execute(f"SELECT count(*) FROM '{path}'").fetchall()
     return int(count)
 
 

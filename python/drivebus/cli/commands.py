@@ -15,7 +15,7 @@ __all__ = ["GROUPS", "Commands"]
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write"), "trying": ("try",)},
-    "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",)},
+    "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",), "plot": ("plot",)},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
     "Tools": {"raw": ("raw",), "frames": ("decode",), "simulation": ("sim",), "tools": ("completion", "demo")},

@@ -71,6 +71,9 @@ def _trial(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--csv", "file", type=Place(dir_okay=False), metavar="FILE", help="Keep all samples in this file."
         ),
+        click.option(
+            "--picture", type=Place(dir_okay=False), metavar="FILE", help="Draw all samples: .png, .svg or .html."
+        ),
         click.option("--reverse", is_flag=True, help="Turn the other way."),
         force_option,
         yes_option,
@@ -132,12 +135,15 @@ def _do(
     margin: float | None,
     also: tuple[str, ...],
     file: str | None,
+    picture: str | None,
     reverse: bool,
     yes: bool,
     **how: Any,
 ) -> None:
     """Asks, carries out what moves along *course* as *what* says, and shows what came of it."""
     session.will_write()
+    if picture is not None:
+        _check(picture)
     limit = None if math.isinf(max_current) else max_current
     margin = Bounds.usual_margin(course) if margin is None else margin
     with session.drive() as drive, ExitStack() as opened:
@@ -169,9 +175,22 @@ def _do(
                     error.add_note(text)
             raise
         _show(session, drive, trial)
+    if picture is not None:
+        from drivebus.plot import draw, of_samples
+
+        draw(of_samples(trial.samples, f"{session.called}: {trial.kind}, {what}"), picture)
     if trial.aborted is not None:
         remark(f"Error: the trial was aborted: {trial.aborted}")
         raise click.exceptions.Exit(1)
+
+
+def _check(picture: str) -> None:
+    """Whether *picture* can be drawn, before the motor moves."""
+    from drivebus.plot.draw import check
+
+    check(picture)
+    if Path(picture).exists():
+        raise click.UsageError(f"{picture} is there already; give another name. The motor was not started")
 
 
 class _Kept:

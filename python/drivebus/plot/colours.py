@@ -1,0 +1,23 @@
+"""The colours of states and events, the same in every kind of picture."""
+
+from __future__ import annotations
+
+__all__ = ["CURVES", "EVENTS", "GAP", "STATES"]
+
+STATES = {
+    "forward": "#2e9e4f",
+    "reverse": "#1f77b4",
+    "stopped": "#b8b8b8",
+    "fault": "#d62728",
+    "power off": "#555555",
+    "pre exciting": "#e0a800",
+}
+"""Green and blue turn, grey rests, red is a fault: as on the terminal."""
+
+EVENTS = {"fault": "#d62728", "fault cleared": "#2e9e4f", "lost": "#9467bd"}
+
+GAP = "#f3d9b1"
+"""Where nothing was heard."""
+
+CURVES = ["#1f77b4", "#d95f02", "#1b9e77", "#7570b3", "#e7298a", "#66a61e", "#a6761d", "#444444"]
+"""For one curve after the other; told apart by most who see colours otherwise, too."""
