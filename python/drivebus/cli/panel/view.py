@@ -1,0 +1,178 @@
+"""The screens one looks at: the overview of several drives, and the view of one."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import ClassVar
+
+from rich.console import RenderableType
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.screen import Screen
+from textual.widgets import Static
+
+from drivebus.cli.panel import paint
+from drivebus.cli.panel.fleet import Member
+from drivebus.cli.panel.journal import Journal
+from drivebus.cli.panel.overview import Overview, summary
+
+__all__ = ["KEYS", "DriveView", "Fleet", "Piece", "View"]
+
+KEYS = [
+    ("Space", "STOP"),
+    ("r", "run"),
+    ("s", "stop"),
+    ("j", "jog"),
+    ("f", "setpoint"),
+    ("x", "reset"),
+    ("p", "params"),
+    ("?", "help"),
+    ("q", "quit"),
+]
+"""The keys that the last line names."""
+
+_TILE = 19
+"""Columns of a big value: six figures and a point."""
+_MOST_TILES = 6
+_MESSAGES = 2
+
+
+class Piece(Static):
+    """A part of a screen that is drawn when what it shows has changed, and only then."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(id=name)
+        self._shown: Hashable = None
+
+    def put(self, content: RenderableType, key: Hashable = None) -> None:
+        """Shows *content*; *key* tells whether it has changed, where the content itself cannot.
+
+        What has a key always takes the same room.
+        """
+        told = key if key is not None else str(content) + repr(getattr(content, "spans", ""))
+        if told != self._shown:
+            self._shown = told
+            self.update(content, layout=key is None)
+
+
+class View(Screen[None]):
+    """What every view has: the latest messages, and the keys.
+
+    Args:
+        journal: Where the messages come from.
+    """
+
+    def __init__(self, journal: Journal) -> None:
+        super().__init__()
+        self._journal = journal
+
+    def foot(self) -> ComposeResult:
+        """The last lines of the screen."""
+        yield Piece("messages")
+        yield Piece("keys")
+
+    def show(self) -> None:
+        """Shows what is known now."""
+        told = Text()
+        width = max(self.size.width - 1, 1)
+        for line in self._journal.lines()[-_MESSAGES:]:
+            text = Text(f"{line.when:%H:%M:%S} ", "dim").append(line.text, line.style)
+            text.truncate(width * (3 - _MESSAGES), overflow="ellipsis")
+            told.append_text(text).append("\n")
+        self.query_one("#messages", Piece).put(told)
+        keys = Text()
+        for key, meaning in KEYS:
+            keys.append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}  ")
+        self.query_one("#keys", Piece).put(keys)
+
+    def on_resize(self) -> None:
+        """Lays it out anew."""
+        self.call_after_refresh(self.show)
+
+
+class Fleet(View):
+    """The overview.
+
+    Args:
+        members: The drives.
+        journal: Where the messages come from.
+    """
+
+    def __init__(self, members: Sequence[Member], journal: Journal) -> None:
+        super().__init__(journal)
+        self._members = members
+
+    def compose(self) -> ComposeResult:
+        """How many they are, a line each, and the foot."""
+        yield Piece("head")
+        yield Overview(self._members)
+        yield from self.foot()
+
+    def show(self) -> None:
+        """Shows what is known now."""
+        self.query_one("#head", Piece).put(summary(self._members))
+        self.query_one(Overview).show()
+        super().show()
+
+
+class DriveView(View):
+    """One drive: big values, the others, lamps, fault, line.
+
+    Args:
+        member: The drive.
+        members: All drives: the arrow keys go to the next.
+        journal: Where the messages come from.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "app.leave_view", "back"),
+        Binding("left,up", "app.next(-1)", "previous drive"),
+        Binding("right,down", "app.next(1)", "next drive"),
+    ]
+
+    def __init__(self, member: Member, members: Sequence[Member], journal: Journal) -> None:
+        super().__init__(journal)
+        self.member = member
+        self._members = members
+
+    def compose(self) -> ComposeResult:
+        """All parts, from the top."""
+        yield Piece("head")
+        yield Piece("doing")
+        with Horizontal(id="tiles"):
+            for place in range(_MOST_TILES):
+                yield Piece(f"tile{place}")
+        yield Piece("values")
+        for name in ("lamps", "fault", "line"):
+            yield Piece(name)
+        yield from self.foot()
+
+    def show(self) -> None:
+        """Shows what is known now."""
+        member = self.member
+        head = paint.head(member)
+        if len(self._members) > 1:
+            head.append(f"  {self._members.index(member) + 1} of {len(self._members)}", "dim")
+        self.query_one("#head", Piece).put(head)
+        self.query_one("#doing", Piece).put(paint.doing(member))
+        names = paint.tiles(member, min(max(self.size.width // (_TILE + 1), 1), _MOST_TILES))
+        self._show_tiles(names)
+        values = self.query_one("#values", Piece)
+        values.put(paint.values(member, names, values.size.width, values.size.height))
+        self.query_one("#lamps", Piece).put(Text("\n").join(paint.lamps(member)))
+        self.query_one("#fault", Piece).put(paint.fault(member))
+        self.query_one("#line", Piece).put(paint.line(member))
+        super().show()
+
+    def _show_tiles(self, names: Sequence[str]) -> None:
+        for place in range(_MOST_TILES):
+            tile = self.query_one(f"#tile{place}", Piece)
+            tile.display = place < len(names)
+            if place >= len(names):
+                continue
+            name, width = names[place], max(tile.size.width - 1, 1)
+            drawn = paint.trend(self.member, name, width).plain
+            key = (name, paint.value(self.member, name), drawn, self.member.highest)
+            tile.put(paint.big(self.member, name, width), key)
