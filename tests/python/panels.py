@@ -29,19 +29,22 @@ _LIMIT = 20.0
 
 LOGGED = """
 import logging, sys
+exec(sys.argv.pop(1))
 logging.basicConfig(filename=sys.argv.pop(1), format="%(name)s %(message)s")
 for name in ("drivebus.panel", "drivebus.wire"):
     logging.getLogger(name).setLevel(logging.DEBUG)
 from drivebus.cli import main
 main()
 """
-"""The command line, with a record of keys and frames in the file that stands first."""
+"""The command line, after what stands first, with a record of keys and frames in the file that stands next."""
 
 
 class Terminal:
     """A window, and the program in it."""
 
-    def __init__(self, words: Sequence[str], size: tuple[int, int], environment: Mapping[str, str], log: Path) -> None:
+    def __init__(
+        self, words: Sequence[str], size: tuple[int, int], environment: Mapping[str, str], log: Path, before: str
+    ) -> None:
         columns, rows = size
         self.raw = b""
         self.log = log
@@ -51,7 +54,7 @@ class Terminal:
         fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
         self.child = subprocess.Popen(
-            [sys.executable, "-c", LOGGED, str(log), *words],
+            [sys.executable, "-c", LOGGED, before, str(log), *words],
             stdin=follower,
             stdout=follower,
             stderr=follower,
@@ -89,6 +92,11 @@ class Terminal:
             while not wanted(self.words):
                 if not self._read() or time.monotonic() > limit:
                     raise AssertionError((each, self.text))
+
+    def still(self) -> None:
+        """Waits until the program has written nothing for as long as several of its beats last."""
+        while select.select([self._leader], [], [], 1.0)[0]:
+            self._read()
 
     def without(self, *gone: str) -> None:
         """Waits until the screen shows none of *gone*."""
@@ -136,10 +144,10 @@ class Terminal:
 
 @contextlib.contextmanager
 def on_a_terminal(
-    words: Sequence[str], log: Path, size: tuple[int, int] = (80, 24), **environment: str
+    words: Sequence[str], log: Path, size: tuple[int, int] = (80, 24), before: str = "", **environment: str
 ) -> Iterator[Terminal]:
-    """`drivebus` with *words* in a window of *size*."""
-    terminal = Terminal(words, size, environment, log)
+    """`drivebus` with *words* in a window of *size*; what stands in *before* is done first."""
+    terminal = Terminal(words, size, environment, log, before)
     try:
         yield terminal
     finally:

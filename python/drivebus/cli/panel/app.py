@@ -49,7 +49,8 @@ class Panel(App[None]):
 
     CSS = """
     Screen { background: ansi_default; }
-    #head, #doing, #keys { height: 1; }
+    #head, #keys { height: 1; }
+    #doing { height: auto; max-height: 2; }
     #messages { height: 2; }
     #keys { margin-top: 0; }
     #tiles { height: 6; margin-top: 1; margin-bottom: 1; }
@@ -58,10 +59,11 @@ class Panel(App[None]):
     #lamps, #fault, #line { height: auto; }
     #fault { max-height: 5; }
     #line { max-height: 3; }
+    #chosen { height: auto; max-height: 5; margin-top: 1; }
     Overview { height: 1fr; scrollbar-size-vertical: 0; }
     ModalScreen { align: center bottom; background: transparent; }
     Show { align: center middle; }
-    .dialog { width: 76; height: auto; border: solid ansi_yellow; padding: 0 2; margin-bottom: 1; }
+    .dialog { width: 100%; max-width: 100; height: auto; border: solid ansi_yellow; padding: 0 2; margin-bottom: 1; }
     .dialog LineField { margin: 1 0; }
     .keys { margin: 1 0; }
     .page { width: 78; max-width: 100%; height: 90%; border: solid ansi_blue; padding: 0 1; }
@@ -118,8 +120,10 @@ class Panel(App[None]):
 
     def on_mount(self) -> None:
         """Shows the overview, or the only drive."""
-        several = len(self.members) > 1
-        self.push_screen(Fleet(self.members, self.journal) if several else self._view(self.members[0]))
+        first: View = self._view(self.current)
+        if len(self.members) > 1:
+            first = Fleet(self.members, lambda: self.current, self.journal)
+        self.push_screen(first)
         self.set_interval(_BEAT, self._beat)
 
     def _view(self, member: Member) -> DriveView:
@@ -238,6 +242,7 @@ class Panel(App[None]):
     def on_overview_moved(self, event: Overview.Moved) -> None:
         """The keys are for another drive."""
         self.current = event.member
+        self._beat()
 
     def on_overview_chosen(self, event: Overview.Chosen) -> None:
         """Looks at one drive."""

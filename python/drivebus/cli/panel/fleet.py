@@ -14,6 +14,7 @@ from typing import Any
 
 import drivebus
 from drivebus.cli import watching
+from drivebus.cli.advice import in_commands
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.motors import Motor
 from drivebus.cli.screen import Watched
@@ -80,7 +81,12 @@ class Member:
         """Why nothing is known of it now; empty if something is."""
         if self.watched is not None:
             return self.watched.missing
-        return "" if self.problem is None else str(self.problem)
+        return "" if self.problem is None else in_commands(str(self.problem))
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether it does not answer now. One that answers, and does not say what it is, is not silent."""
+        return bool(self.why) and not isinstance(self.problem, drivebus.NotAllowed)
 
     def role(self, role: str) -> str | None:
         """The register with *role*, if it is watched."""

@@ -147,7 +147,7 @@ def summary(members: Sequence[Member]) -> Text:
     """How many drives there are, and how many of them do what."""
     turning = sum(paint.turns(member) for member in members)
     started = sum(member.motor.started for member in members)
-    silent = sum(bool(member.why) for member in members)
+    silent = sum(member.is_silent for member in members)
     tripped = sum(paint.tripped(member) for member in members)
     told = Text(f"{len(members)} drives", "bold")
     for count, what, style in (

@@ -59,7 +59,7 @@ def head(member: Member) -> Text:
 
 def doing(member: Member) -> Text:
     """What it does now: state, frequency and setpoint, and what its status words say beside that."""
-    told = Text("no answer" if member.why else "waiting", "yellow")
+    told = Text(_nothing(member), "yellow")
     if member.watched is not None:
         told = member.watched.doing()
     if member.watched is not None and member.watched.now is not None:
@@ -75,7 +75,14 @@ def state(member: Member) -> Text:
     if member.watched is not None and not member.why:
         return member.watched.doing()
     why = f": {member.why}" if member.why else ""
-    return Text(printable(f"{'no answer' if member.why else 'waiting'}{why}"), "yellow")
+    return Text(printable(f"{_nothing(member)}{why}"), "yellow")
+
+
+def _nothing(member: Member) -> str:
+    """Why there is nothing to show, in two words."""
+    if member.is_silent:
+        return "no answer"
+    return "not known" if member.why else "waiting"
 
 
 def turns(member: Member) -> bool:
@@ -227,8 +234,7 @@ def fault(member: Member) -> Text:
     """The present fault with cause and remedy, or why nothing is known of the drive; empty if all is well."""
     watched = member.watched
     if member.why:
-        why = f"no answer, trying again: {member.why}" if member.problem is None else f"trying again: {member.why}"
-        return Text(printable(why), "yellow")
+        return Text(printable(f"{_nothing(member)}, trying again: {member.why}"), "yellow")
     if watched is None or watched.now is None or watched.fault is None or watched.fault not in watched.now:
         return Text("")
     code = int(watched.now[watched.fault])
@@ -256,5 +262,7 @@ def line(member: Member) -> Text:
     if own.answers:
         told.append(f"; {own.round_trip.min * 1e3:.0f} to {own.round_trip.max * 1e3:.0f} ms")
     for hint in stats.hints:
-        told.append(f"\n{printable(hint)}", "yellow")
+        # What is said of another unit is said there.
+        if not hint.startswith("unit ") or hint.startswith(f"unit {unit}:"):
+            told.append(f"\n{printable(hint)}", "yellow")
     return told

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import ClassVar
 
 from rich.console import RenderableType
@@ -97,23 +97,30 @@ class Fleet(View):
 
     Args:
         members: The drives.
+        current: Tells which of them the cursor is on.
         journal: Where the messages come from.
     """
 
-    def __init__(self, members: Sequence[Member], journal: Journal) -> None:
+    def __init__(self, members: Sequence[Member], current: Callable[[], Member], journal: Journal) -> None:
         super().__init__(journal)
         self._members = members
+        self._current = current
 
     def compose(self) -> ComposeResult:
-        """How many they are, a line each, and the foot."""
+        """How many they are, a line each, what there is to say of the one under the cursor, and the foot."""
         yield Piece("head")
         yield Overview(self._members)
+        yield Piece("chosen")
         yield from self.foot()
 
     def show(self) -> None:
         """Shows what is known now."""
         self.query_one("#head", Piece).put(summary(self._members))
         self.query_one(Overview).show()
+        member = self._current()
+        told = paint.head(member).append("  ").append_text(paint.doing(member))
+        more = paint.fault(member)
+        self.query_one("#chosen", Piece).put(told.append("\n").append_text(more) if more else told)
         super().show()
 
 
