@@ -43,7 +43,7 @@ class Terminal:
     """A window, and the program in it."""
 
     def __init__(
-        self, words: Sequence[str], size: tuple[int, int], environment: Mapping[str, str], log: Path, before: str
+        self, program: Sequence[str], size: tuple[int, int], environment: Mapping[str, str], log: Path
     ) -> None:
         columns, rows = size
         self.raw = b""
@@ -54,7 +54,7 @@ class Terminal:
         fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         kept = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
         self.child = subprocess.Popen(
-            [sys.executable, "-c", LOGGED, before, str(log), *words],
+            [sys.executable, *program],
             stdin=follower,
             stdout=follower,
             stderr=follower,
@@ -92,6 +92,11 @@ class Terminal:
             while not wanted(self.words):
                 if not self._read() or time.monotonic() > limit:
                     raise AssertionError((each, self.text))
+
+    def take(self, seconds: float) -> None:
+        """Takes what the program writes within *seconds*, if it writes anything."""
+        if select.select([self._leader], [], [], seconds)[0]:
+            self._read()
 
     def still(self) -> None:
         """Waits until the program has written nothing for as long as several of its beats last."""
@@ -144,10 +149,19 @@ class Terminal:
 
 @contextlib.contextmanager
 def on_a_terminal(
-    words: Sequence[str], log: Path, size: tuple[int, int] = (80, 24), before: str = "", **environment: str
+    words: Sequence[str],
+    log: Path,
+    size: tuple[int, int] = (80, 24),
+    before: str = "",
+    quiet: bool = False,
+    environment: Mapping[str, str] | None = None,
 ) -> Iterator[Terminal]:
-    """`drivebus` with *words* in a window of *size*; what stands in *before* is done first."""
-    terminal = Terminal(words, size, environment, log, before)
+    """`drivebus` with *words* in a window of *size*.
+
+    What stands in *before* is done first. *quiet* keeps no record, which the program would pay for.
+    """
+    program = ["-m", "drivebus", *words] if quiet else ["-c", LOGGED, before, str(log), *words]
+    terminal = Terminal(program, size, environment or {}, log)
     try:
         yield terminal
     finally:

@@ -51,7 +51,7 @@ class Panel(App[None]):
     Screen { background: ansi_default; }
     #head, #keys { height: 1; }
     #doing { height: auto; max-height: 2; }
-    #messages { height: 2; }
+    #messages { height: 3; }
     #keys { margin-top: 0; }
     #tiles { height: 6; margin-top: 1; margin-bottom: 1; }
     #tiles Piece { width: 1fr; height: 6; }
@@ -63,7 +63,7 @@ class Panel(App[None]):
     Overview { height: 1fr; scrollbar-size-vertical: 0; }
     ModalScreen { align: center bottom; background: transparent; }
     Show { align: center middle; }
-    .dialog { width: 100%; max-width: 100; height: auto; border: solid ansi_yellow; padding: 0 2; margin-bottom: 1; }
+    .dialog { width: 100%; height: auto; border: solid ansi_yellow; padding: 0 2; margin-bottom: 1; }
     .dialog LineField { margin: 1 0; }
     .keys { margin: 1 0; }
     .page { width: 78; max-width: 100%; height: 90%; border: solid ansi_blue; padding: 0 1; }
@@ -141,7 +141,8 @@ class Panel(App[None]):
                 self.exit()
         for screen in reversed(self.screen_stack):
             if isinstance(screen, View):
-                screen.show()
+                if screen.is_ready:
+                    screen.show()
                 break
 
     # --- what a key does ---------------------------------------------------------------------------------------
@@ -236,8 +237,7 @@ class Panel(App[None]):
         if len(self.members) > 1 and isinstance(self.screen, DriveView):
             at = (self.members.index(self.screen.member) + by) % len(self.members)
             self.current = self.members[at]
-            self.switch_screen(self._view(self.current))
-            self.call_after_refresh(self._beat)
+            self.screen.turn_to(self.current)
 
     def on_overview_moved(self, event: Overview.Moved) -> None:
         """The keys are for another drive."""
@@ -248,7 +248,6 @@ class Panel(App[None]):
         """Looks at one drive."""
         self.current = event.member
         self.push_screen(self._view(event.member))
-        self.call_after_refresh(self._beat)
 
     def action_messages(self) -> None:
         """Shows all messages."""

@@ -27,8 +27,8 @@ KEPT = 240
 
 _INTERVAL = 0.25
 """Seconds from one sample to the next, where the line can carry that. A screen shows no more."""
-_AGAIN = 3.0
-"""Seconds after which a drive that did not answer is looked for again."""
+_AGAIN = 1.0
+"""Seconds after which a drive that did not answer is looked for again, for each such drive."""
 _GLANCE = 0.1
 """Seconds that such a drive is given: it must not keep the others waiting."""
 
@@ -198,7 +198,7 @@ class Line:
                     self._more.set()
                     member.ask_limit()
             again = True
-            self._over.wait(_AGAIN)
+            self._over.wait(_AGAIN * len(unknown))
 
     def _watch(self) -> None:
         """Polls all that are known; once more are, those too."""

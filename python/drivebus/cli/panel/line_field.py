@@ -51,12 +51,9 @@ class LineField(Static, can_focus=True):
         """Shows it."""
         self._draw()
 
-    def on_focus(self) -> None:
-        """Shows the cursor."""
-        self._draw()
-
-    def on_blur(self) -> None:
-        """Hides the cursor."""
+    def watch_has_focus(self, has_focus: bool) -> None:
+        """Shows the cursor, or hides it."""
+        super().watch_has_focus(has_focus)
         self._draw()
 
     def on_key(self, event: Key) -> None:

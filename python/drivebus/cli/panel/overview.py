@@ -20,7 +20,7 @@ __all__ = ["Overview", "summary"]
 
 _COLUMNS = [("output_current", "A"), ("bus_voltage", "bus V"), ("output_torque", "torque"), ("output_voltage", "out V")]
 """What is shown beside frequency and setpoint where there is room, and under which title."""
-_NUMBER, _TREND, _STATE = 8, 20, 24
+_NUMBER, _TREND, _STATE = 8, 20, 40
 """Columns of a number, of a trend, and of the state at least."""
 
 

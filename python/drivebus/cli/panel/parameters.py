@@ -39,6 +39,7 @@ class Parameters(Screen[None]):
         journal: Who is told what came of it.
     """
 
+    AUTO_FOCUS = "DataTable"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "back"),
         Binding("slash", "search", "search"),
@@ -75,7 +76,6 @@ class Parameters(Screen[None]):
             table.add_column(title, key=title)
         self.query_one("#keys", Piece).put(_keys())
         self._show_group()
-        table.focus()
 
     def _table(self) -> DataTable[Text]:
         table: DataTable[Text] = self.query_one(DataTable)

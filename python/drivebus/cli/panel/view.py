@@ -36,7 +36,9 @@ KEYS = [
 _TILE = 19
 """Columns of a big value: six figures and a point."""
 _MOST_TILES = 6
-_MESSAGES = 2
+_MESSAGES = 3
+"""Lines of messages."""
+_MORE = " … m: all"
 
 
 class Piece(Static):
@@ -62,11 +64,20 @@ class View(Screen[None]):
 
     Args:
         journal: Where the messages come from.
+
+    Attributes:
+        is_ready: Whether its parts are there: before that nothing can be shown.
     """
 
     def __init__(self, journal: Journal) -> None:
         super().__init__()
         self._journal = journal
+        self.is_ready = False
+
+    def on_mount(self) -> None:
+        """Its parts are there."""
+        self.is_ready = True
+        self.call_after_refresh(self.show)
 
     def foot(self) -> ComposeResult:
         """The last lines of the screen."""
@@ -75,21 +86,33 @@ class View(Screen[None]):
 
     def show(self) -> None:
         """Shows what is known now."""
-        told = Text()
-        width = max(self.size.width - 1, 1)
-        for line in self._journal.lines()[-_MESSAGES:]:
-            text = Text(f"{line.when:%H:%M:%S} ", "dim").append(line.text, line.style)
-            text.truncate(width * (3 - _MESSAGES), overflow="ellipsis")
-            told.append_text(text).append("\n")
-        self.query_one("#messages", Piece).put(told)
+        self.query_one("#messages", Piece).put(self._messages())
         keys = Text()
         for key, meaning in KEYS:
             keys.append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}  ")
         self.query_one("#keys", Piece).put(keys)
 
+    def _messages(self) -> Text:
+        """The newest message in full, as far as there is room, and those before it."""
+        width = max(self.size.width, 1)
+        shown: list[Text] = []
+        for line in reversed(self._journal.lines()[-_MESSAGES:]):
+            text = Text(f"{line.when:%H:%M:%S} ", "dim").append(line.text, line.style)
+            lines = list(text.wrap(self.app.console, width))
+            room = _MESSAGES - len(shown)
+            if len(lines) > room and shown:
+                break
+            if len(lines) > room:
+                lines = lines[:room]
+                lines[-1].truncate(width - len(_MORE))
+                lines[-1].append(_MORE, "dim")
+            shown = [*lines, *shown]
+        return Text("\n").join(shown)
+
     def on_resize(self) -> None:
         """Lays it out anew."""
-        self.call_after_refresh(self.show)
+        if self.is_ready:
+            self.call_after_refresh(self.show)
 
 
 class Fleet(View):
@@ -143,6 +166,11 @@ class DriveView(View):
         super().__init__(journal)
         self.member = member
         self._members = members
+
+    def turn_to(self, member: Member) -> None:
+        """Shows another drive."""
+        self.member = member
+        self.show()
 
     def compose(self) -> ComposeResult:
         """All parts, from the top."""
