@@ -53,6 +53,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "read what is none": (["--port", ONE, "read", "output_curent"], 2),
     "monitor": (["--port", ONE, "monitor", "--count", "3", "--interval", "0"], 0),
     "monitor of two": (["--drive", "all", "--unverified", "monitor", "--count", "3", "--interval", "0"], 0),
+    "panel": (["--port", ONE, "panel"], 0),
+    "panel of two": (["--drive", "all", "--unverified", "panel"], 0),
     "drives": (["drives"], 0),
     "run": (["--port", ONE, "run", "10", "--yes"], 2),
     "run without leave": (["--port", ONE, "run", "10"], 2),
@@ -92,17 +94,19 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
 WHILE: dict[str, Callable[[list[str]], bool]] = {
     "sim": lambda lines: any("Ctrl-C" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
+    "panel": lambda lines: any("stopped, 0.00" in line for line in lines),
+    "panel of two": lambda lines: any("2 drives" in line for line in lines),
 }
 """When a command is ended that does not end by itself."""
 
-LIVE = {"monitor", "monitor of two"}
+LIVE = {"monitor", "monitor of two", "panel", "panel of two"}
 """What shows as much as there is room for."""
 
 AS_GIVEN = {"completion"}
 """What prints a file for another program, whatever the width."""
 
-COLOUR = re.compile(r"\b(3|4|9|10)[0-9]\b")
-"""In a sequence that styles text; bold and faint are none."""
+COLOUR = re.compile(r"\b(3|4|9|10)[0-8]\b")
+"""In a sequence that styles text; bold and faint are none, and 39 and 49 are the terminal's own."""
 
 ESCAPES = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
 
