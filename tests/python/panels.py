@@ -98,11 +98,6 @@ class Terminal:
         if select.select([self._leader], [], [], seconds)[0]:
             self._read()
 
-    def still(self) -> None:
-        """Waits until the program has written nothing for as long as several of its beats last."""
-        while select.select([self._leader], [], [], 1.0)[0]:
-            self._read()
-
     def without(self, *gone: str) -> None:
         """Waits until the screen shows none of *gone*."""
         self.until(*(lambda text, words=words: words not in text for words in gone))

@@ -150,6 +150,24 @@ def test_space_stops_all_that_the_panel_started_and_s_only_one(simulator: Simula
         assert (told(simulator, 1).count(FORWARD), told(simulator, 2).count(FORWARD)) == (1, 2)
 
 
+def test_a_stop_takes_back_a_start_that_was_just_allowed(simulator: Simulator, tmp_path: Path) -> None:
+    """The thread that reads keys sees the stop before the screen has done what the key before it says."""
+    with on_a_terminal(["--port", simulator.port, "panel"], tmp_path / "record") as terminal:
+        terminal.until("stopped")
+        for _ in range(3):
+            terminal.press("r")
+            terminal.until("how many Hz")
+            terminal.press("10\r")
+            terminal.until("run forward to 10 Hz")
+            known = len(terminal.record())
+            terminal.press("y ")
+            wait_until(partial(says, terminal, known, STOPPED))
+            terminal.without("Is the machine clear?")
+        assert set(told(simulator)) == {STOP}
+        terminal.press("q")
+        assert terminal.ends() == 0
+
+
 BREAKS = """
 import os, sys
 mark = sys.argv[1] + ".broken"
@@ -207,9 +225,9 @@ def test_what_it_started_ends_with_it(tmp_path: Path) -> None:
                 assert ("RuntimeError" in terminal.text) == (name == "an exception")
 
 
-HANGS = BREAKS.replace('raise RuntimeError("a mistake in the panel")', "threading.Event().wait()").replace(
-    "import os, sys", "import os, sys, threading"
-)
+HANGS = BREAKS.replace(
+    'raise RuntimeError("a mistake in the panel")', "open(mark + '.so', 'w'); threading.Event().wait()"
+).replace("import os, sys", "import os, sys, threading")
 """Has the screen hang once a file is there."""
 
 
@@ -218,7 +236,7 @@ def test_space_stops_and_a_signal_ends_what_hangs(simulator: Simulator, tmp_path
         terminal.until("stopped")
         start(terminal)
         Path(f"{terminal.log}.broken").touch()
-        terminal.still()
+        wait_until(Path(f"{terminal.log}.broken.so").exists)
         terminal.press(" ")
         wait_until(partial(says, terminal, 0, STOPPED))
         assert told(simulator) == [FORWARD, STOP]

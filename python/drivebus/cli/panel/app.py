@@ -171,7 +171,7 @@ class Panel(App[None]):
         way = "in reverse" if reverse else "forward"
 
         def ask(hz: float) -> None:
-            self._ask(member, f"run {way} to {hz:g} Hz", lambda: member.motor.run(drive, hz, reverse))
+            self._ask(member, f"run {way} to {hz:g} Hz", lambda since: member.motor.run(drive, hz, reverse, since))
 
         self._ask_number(member, f"run {way}, to how many Hz?", "Hz", self._setpoint(member), ask)
 
@@ -186,7 +186,7 @@ class Panel(App[None]):
 
         def ask(seconds: float) -> None:
             what = f"jog {way} for {seconds:g} s"
-            self._ask(member, what, lambda: member.motor.jog(drive, seconds, reverse))
+            self._ask(member, what, lambda since: member.motor.jog(drive, seconds, reverse, since))
 
         question = f"jog {way} at the drive's jog frequency, for how many seconds?"
         self._ask_number(member, question, "seconds", "1", ask, _LONGEST_JOG)
@@ -205,7 +205,7 @@ class Panel(App[None]):
             def give() -> None:
                 drive.setpoint = hz
 
-            self._ask(member, what, lambda: member.motor.later(what, give))
+            self._ask(member, what, lambda since: member.motor.later(what, give, since))
 
         self._ask_number(member, "change the setpoint, to how many Hz?", "Hz", self._setpoint(member), ask)
 
@@ -218,7 +218,7 @@ class Panel(App[None]):
             return
         what = "reset the fault"
         more = "A drive that is still told to run may start."
-        self._ask(member, what, lambda: member.motor.later(what, drive.reset_fault), more)
+        self._ask(member, what, lambda since: member.motor.later(what, drive.reset_fault, since), more)
 
     def action_parameters(self) -> None:
         """Shows the parameters of the drive that the keys are for."""
@@ -277,11 +277,12 @@ class Panel(App[None]):
 
     # --- what is asked -----------------------------------------------------------------------------------------
 
-    def _ask(self, member: Member, what: str, do: Callable[[], None], more: str = "") -> None:
-        """Says which motor will do *what*, and does it only on yes."""
+    def _ask(self, member: Member, what: str, do: Callable[[int], None], more: str = "") -> None:
+        """Says which motor will do *what*, and does it only on yes. A stop meanwhile takes the yes back."""
+        since = member.motor.stops
         now = f"It turns now: {paint.doing(member).plain}. " if paint.turns(member) else ""
         text = f"{member.what}: {what}. {more + ' ' if more else ''}{now}{_CLEAR}"
-        self.push_screen(Ask(text, {"y": "yes, go ahead"}), lambda key: do() if key == "y" else None)
+        self.push_screen(Ask(text, {"y": "yes, go ahead"}), lambda key: do(since) if key == "y" else None)
 
     def _ask_number(
         self, member: Member, text: str, what: str, value: str, ask: Callable[[float], None], most: float | None = None

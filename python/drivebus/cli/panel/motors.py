@@ -21,6 +21,9 @@ _PAUSE = 0.02
 """Seconds between two stops that could not be sent."""
 
 
+_STOPPED = "it was told to stop meanwhile; nothing was sent"
+
+
 class _Block:
     """A motor that this panel started and has not stopped yet.
 
@@ -51,6 +54,7 @@ class Motor:
         watchdog: After how many seconds of silence the drive stops by itself while this panel runs it; None: never.
 
     Attributes:
+        stops: How often it was told to stop. Who asks before a start keeps it: a stop meanwhile takes the answer back.
         failure: Why a motor that this panel started could not be stopped when it was stopped last; None if it could.
     """
 
@@ -66,6 +70,7 @@ class Motor:
         self._block: _Block | None = None
         self._proving = False
         self._thread: threading.Thread | None = None
+        self.stops = 0
         self.failure: drivebus.DrivebusError | None = None
 
     @property
@@ -73,36 +78,40 @@ class Motor:
         """Whether this panel started it, and has not stopped it yet."""
         return self._block is not None
 
-    def run(self, drive: drivebus.Drive, hz: float | None, reverse: bool) -> None:
-        """Starts it, or gives a motor that this panel started another speed or direction."""
+    def run(self, drive: drivebus.Drive, hz: float | None, reverse: bool, since: int) -> None:
+        """Starts it, or changes speed or direction of one that this panel started; not if it was stopped *since*."""
         way = "in reverse" if reverse else "forward"
         what = f"run {way}" if hz is None else f"run {way} at {hz:g} Hz"
         with self._lock:
             block = self._block
-            if block is None:
+            if self.stops != since:
+                self._journal.say(f"{self.called}: {what}: {_STOPPED}", "yellow")
+            elif block is None:
                 self._begin(_Block(False), what, drive, lambda: drive.running(hz, reverse), None)
             elif block.over.is_set() or block.jogs:
                 self._journal.say(f"{self.called}: it is still being stopped; give the order again", "yellow")
             else:
-                block.orders.put(lambda: self.do(what, lambda: drive.run(hz, reverse)))
+                block.orders.put(lambda: self._do(what, lambda: drive.run(hz, reverse), since))
 
-    def jog(self, drive: drivebus.Drive, seconds: float, reverse: bool) -> None:
-        """Jogs it for *seconds*, or until it is stopped."""
+    def jog(self, drive: drivebus.Drive, seconds: float, reverse: bool, since: int) -> None:
+        """Jogs it for *seconds*, or until it is stopped; not if it was stopped *since*."""
         what = f"jog {'in reverse' if reverse else 'forward'} for {seconds:g} s"
         with self._lock:
-            if self._block is None:
+            if self.stops != since:
+                self._journal.say(f"{self.called}: {what}: {_STOPPED}", "yellow")
+            elif self._block is None:
                 self._begin(_Block(True), what, drive, lambda: drive.jogging(reverse), seconds)
             else:
                 self._journal.say(f"{self.called}: it turns already; stop it before a jog", "yellow")
 
-    def later(self, what: str, order: Callable[[], None]) -> None:
-        """Does *order* in a thread of its own; what came of it is told."""
-        threading.Thread(target=self.do, args=(what, order), name=f"panel {self.called}", daemon=True).start()
+    def later(self, what: str, order: Callable[[], None], since: int) -> None:
+        """Does *order* in a thread of its own, if it was not stopped *since*; what came of it is told."""
+        threading.Thread(target=self._do, args=(what, order, since), name=f"panel {self.called}", daemon=True).start()
 
-    def do(self, what: str, order: Callable[[], None]) -> None:
+    def _do(self, what: str, order: Callable[[], None], since: int) -> None:
         """Does *order*, which may move the motor: a stop meanwhile is sent until it is over."""
         try:
-            with self._moving():
+            with self._moving(since):
                 order()
         except drivebus.DrivebusError as error:
             self._journal.fail(f"{self.called}: {what}", error)
@@ -113,6 +122,7 @@ class Motor:
         """Stops it, on the spot, whoever started it. Returns before the stop is confirmed, which is told later."""
         self._journal.say(f"{self.called}: stop", "bold")
         with self._lock:
+            self.stops += 1
             block, busy = self._block, self._under_way > 0
             its_own = block is not None and not block.over.is_set()
             if block is not None:
@@ -212,10 +222,10 @@ class Motor:
             return self._under_way > 0
 
     @contextmanager
-    def _moving(self) -> Iterator[None]:
+    def _moving(self, since: int) -> Iterator[None]:
         with self._lock:
-            if self._block is not None and self._block.over.is_set():
-                raise drivebus.NotAllowed("the motor is being stopped; nothing was sent")
+            if self.stops != since:
+                raise drivebus.NotAllowed(_STOPPED)
             self._under_way += 1
         try:
             yield

@@ -209,9 +209,11 @@ class Parameters(Screen[None]):
         text = f"{self._member.what}: {what}. A motor that turns may change its speed. Is the machine clear?"
         answers = {"y": "yes, to RAM: lost with power", "e": "yes, to EEPROM: kept"}
 
+        since = self._member.motor.stops
+
         def answered(key: str | None) -> None:
             if key:
-                self._member.motor.later(what, lambda: self._write(row, value, key == "e"))
+                self._member.motor.later(what, lambda: self._write(row, value, key == "e"), since)
 
         self.app.push_screen(Ask(text, answers), answered)
 

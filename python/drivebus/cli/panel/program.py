@@ -25,7 +25,7 @@ from drivebus.cli.session import Session
 
 __all__ = ["Ended", "run"]
 
-_PATIENCE = 2.0
+_PATIENCE = 1.0
 """Seconds that the screen is given to end after a signal, once the motors stand."""
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
