@@ -108,6 +108,9 @@ PROGRAMS: dict[str, set[str]] = {
     "__main__": {"cli"},
 }
 
+# What Python itself calls with an underscore, and means for everybody.
+PYTHONS_OWN = {"sys._getframe", "os._exit"}
+
 # Through so many classes of ours a class may inherit, errors aside.
 MOST_ANCESTORS = 2
 
@@ -288,7 +291,7 @@ def borrowed(path: Path) -> Iterator[tuple[int, str]]:
     tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
     own = own_names(tree)
     for node in ast.walk(tree):
-        is_python = isinstance(node, ast.Attribute) and ast.unparse(node) == "sys._getframe"
+        is_python = isinstance(node, ast.Attribute) and ast.unparse(node) in PYTHONS_OWN
         if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own and not is_python:
             yield node.lineno, node.attr
         elif isinstance(node, ast.ImportFrom):

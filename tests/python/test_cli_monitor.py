@@ -167,7 +167,8 @@ class TestOnATerminal:
     def test_drives_stand_beside_each_other(self) -> None:
         units = ("--port", "sim://1=gd350,2=gd350", "-u", "1-2")
         words = ("monitor", "--interval", "0.1", "output_current", "running_frequency")
-        shown = self.watch((80, 24), *units, *words, times=2)
+        # The last row of the screen, with both its values: what is above stands there by then.
+        shown = self.watch((80, 24), *units, *words, until="0.00", times=2)
         assert any(re.fullmatch(r"register +unit 1 +unit 2 +unit", line) for line in shown)
         assert any(re.fullmatch(r"running_frequency +0\.00 +0\.00 +Hz", line) for line in shown)
 

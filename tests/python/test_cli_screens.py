@@ -60,6 +60,8 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "record what is there": (["--port", ONE, "record", "requests.csv"], 2),
     "plot": (["plot", "run.jsonl", "-o", "kept.svg"], 0),
     "plot what is none": (["plot", "requests.csv"], 2),
+    "panel": (["--port", ONE, "panel"], 0),
+    "panel of two": (["--drive", "all", "--unverified", "panel"], 0),
     "drives": (["drives"], 0),
     "run": (["--port", ONE, "run", "10", "--yes"], 2),
     "run without leave": (["--port", ONE, "run", "10"], 2),
@@ -109,17 +111,19 @@ WHILE: dict[str, Callable[[list[str]], bool]] = {
     "replay": lambda lines: any("Ctrl-C" in line for line in lines),
     "try without leave": lambda lines: any("Go ahead?" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
+    "panel": lambda lines: any("stopped, 0.00" in line for line in lines),
+    "panel of two": lambda lines: any("2 drives" in line for line in lines),
 }
 """When a command is ended that does not end by itself."""
 
-LIVE = {"monitor", "monitor of two"}
+LIVE = {"monitor", "monitor of two", "panel", "panel of two"}
 """What shows as much as there is room for."""
 
 AS_GIVEN = {"completion"}
 """What prints a file for another program, whatever the width."""
 
-COLOUR = re.compile(r"\b(3|4|9|10)[0-9]\b")
-"""In a sequence that styles text; bold and faint are none."""
+COLOUR = re.compile(r"\b(3|4|9|10)[0-8]\b")
+"""In a sequence that styles text; bold and faint are none, and 39 and 49 are the terminal's own."""
 
 ESCAPES = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
 

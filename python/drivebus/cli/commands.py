@@ -13,7 +13,12 @@ import click
 __all__ = ["GROUPS", "Commands"]
 
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
-    "Look": {"reading": ("ports", "scan", "info", "status", "read"), "monitor": ("monitor",), "drives": ("drives",)},
+    "Look": {
+        "reading": ("ports", "scan", "info", "status", "read"),
+        "monitor": ("monitor",),
+        "panel": ("panel",),
+        "drives": ("drives",),
+    },
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write"), "trying": ("try",)},
     "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",), "plot": ("plot",)},
     "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},

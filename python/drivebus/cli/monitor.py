@@ -14,7 +14,7 @@ import click
 from rich.live import Live
 
 import drivebus
-from drivebus.cli import names
+from drivebus.cli import names, watching
 from drivebus.cli.csv_rows import moment, titled
 from drivebus.cli.lines import opened_lines
 from drivebus.cli.output import Output, printable, remark
@@ -57,7 +57,7 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
         seen = _Seen(out, [watched for watched, _ in drives])
         polls = [
             open_lines.enter_context(
-                bus.poll({drive: _asked(watched) for watched, drive in line}, interval or None, size=_KEPT)
+                bus.poll({drive: watching.asked(watched) for watched, drive in line}, interval or None, size=_KEPT)
             )
             for bus, line in lines
         ]
@@ -87,46 +87,10 @@ _Drives = list[tuple[Watched, drivebus.Drive]]
 
 def _watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str]) -> Watched:
     """What is shown of *drive*."""
-    profile = drive.profile
-    # What the drive is does not change while one looks.
-    usual = [name for name in drive.readable() if not name.startswith("identification")]
-    known = [names.named(profile, text) for text in wanted] or usual
-    if not known:
-        raise drivebus.NotAllowed(
-            f"no register of {profile.title} may be watched without --unverified; name the registers you want to see"
-        )
-    rows = {name: drive.describe(name) for name in known}
-    hint = ""
-    if not wanted and profile.role("frequency") not in rows:
-        hint = "No proved register of this family has the frequency; --unverified shows more."
-    if hint and not session.out.live:
-        remark(hint)
-    where = f"{session.name}: " if session.name else ""
-    told = {role: _readable(drive, role) if session.out.live else None for role in ("state", "fault")}
-    return Watched(
-        session.called,
-        f"{where}{profile.title} on {session.port}, unit {session.unit}",
-        profile,
-        rows,
-        told["state"],
-        told["fault"],
-        {name: doubt for name, row in rows.items() if (doubt := names.evidence(profile, row)) != "verified"},
-        hint,
-    )
-
-
-def _readable(drive: drivebus.Drive, role: str) -> str | None:
-    """The register that has *role*, if it may be read."""
-    name = drive.profile.role(role)
-    try:
-        return name and drive.readable(name)[0]
-    except drivebus.NotAllowed:
-        return None
-
-
-def _asked(watched: Watched) -> list[str]:
-    told = [name for name in (watched.state, watched.fault) if name is not None]
-    return list(dict.fromkeys([*watched.rows, *told]))
+    watched = watching.watched(session, drive, wanted, session.out.live)
+    if watched.hint and not session.out.live:
+        remark(watched.hint)
+    return watched
 
 
 def _samples(polls: Sequence[drivebus.Poll[Any]]) -> Iterator[drivebus.Sample]:

@@ -18,14 +18,14 @@ from rich.text import Text
 import drivebus
 from drivebus.cli.output import printable
 
-__all__ = ["Screen", "Watched"]
+__all__ = ["MARKS", "Screen", "Watched"]
 
 _BETWEEN = 3
 """Blanks between two blocks of rows."""
 _RATED = 20
 """Samples over which the rate is told."""
 
-_MARKS = {"unverified": "?", "assumed": "!"}
+MARKS = {"unverified": "?", "assumed": "!"}
 """What stands behind a value that is not proved, by its evidence."""
 
 _STYLES = {"fault": "bold red", "forward": "green", "reverse": "green"}
@@ -142,7 +142,7 @@ class Screen:
         notes += [Text(text, "dim") for text in dict.fromkeys(drive.hint for drive in self._drives) if text]
         there = {doubt for drive in self._drives for doubt in drive.doubtful.values()}
         if there:
-            meant = ", ".join(f"{mark} {doubt}" for doubt, mark in _MARKS.items() if doubt in there)
+            meant = ", ".join(f"{mark} {doubt}" for doubt, mark in MARKS.items() if doubt in there)
             notes.append(Text(f"{meant}: `drivebus describe NAME` says why", "dim"))
         return notes
 
@@ -208,7 +208,7 @@ class Screen:
 
 def _mark(drive: Watched, name: str) -> str:
     """What stands behind a value that is not proved."""
-    return _MARKS.get(drive.doubtful.get(name, ""), "")
+    return MARKS.get(drive.doubtful.get(name, ""), "")
 
 
 def _text(drive: Watched, values: Mapping[Any, Any] | None, name: str) -> str:

@@ -1,0 +1,59 @@
+"""What the panel has to say: what was ordered, what came of it, and why not. Any thread may tell it.
+
+Each line also goes to the logger `drivebus.panel`, for whoever keeps a record of who did what.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from datetime import datetime
+from typing import NamedTuple
+
+import drivebus
+from drivebus.cli.advice import in_commands
+from drivebus.cli.output import printable
+
+__all__ = ["LOGGER", "Journal", "Line"]
+
+LOGGER = "drivebus.panel"
+"""The logger that has a record of level INFO for each line."""
+
+_KEPT = 500
+
+
+class Line(NamedTuple):
+    """One line: when, what, and in which style."""
+
+    when: datetime
+    text: str
+    style: str
+
+
+class Journal:
+    """The latest lines, the newest last.
+
+    Attributes:
+        count: How many there were so far: who looks sees by it whether there are more.
+    """
+
+    def __init__(self) -> None:
+        self._lines: deque[Line] = deque(maxlen=_KEPT)
+        self._logger = logging.getLogger(LOGGER)
+        self.count = 0
+
+    def say(self, text: str, style: str = "") -> None:
+        """Tells *text*."""
+        shown = printable(text)
+        self._logger.info("%s", shown)
+        self._lines.append(Line(datetime.now(), shown, style))
+        self.count += 1
+
+    def fail(self, what: str, error: drivebus.DrivebusError) -> None:
+        """Tells that *what* failed."""
+        notes = getattr(error, "__notes__", ())
+        self.say(f"{what}: {'; '.join(in_commands(str(part)) for part in (error, *notes))}", "bold red")
+
+    def lines(self) -> list[Line]:
+        """All that are kept."""
+        return list(self._lines)

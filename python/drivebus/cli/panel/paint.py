@@ -1,0 +1,268 @@
+"""How the panel shows what is known of a drive: big values, trends, lamps, faults and the line, as text with styles.
+
+Nothing here knows a widget or keeps anything. Values, states and faults read as they do in `monitor` and `status`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+from textual.renderables.digits import Digits
+
+from drivebus.cli.output import printable
+from drivebus.cli.panel.fleet import Member
+from drivebus.cli.screen import MARKS
+
+__all__ = [
+    "big",
+    "doing",
+    "fault",
+    "head",
+    "lamps",
+    "line",
+    "named",
+    "plain_value",
+    "state",
+    "tiles",
+    "trend",
+    "tripped",
+    "turns",
+    "value",
+    "values",
+]
+
+_LEVELS = "▁▂▃▄▅▆▇█"
+_ON, _OFF = "●", "○"
+
+_ROLES = ("frequency", "setpoint")
+_BESIDE = ("output_current", "bus_voltage", "output_torque", "output_voltage", "rotation_speed", "output_power")
+"""What is shown big beside the roles, as far as the family has it, the first the most wanted."""
+
+
+def tiles(member: Member, count: int) -> list[str]:
+    """The registers of *member* that are shown big, *count* at most."""
+    if member.watched is None:
+        return []
+    roles = [name for role in _ROLES if (name := member.role(role)) is not None]
+    return [*roles, *(name for name in _BESIDE if name in member.watched.rows)][:count]
+
+
+def head(member: Member) -> Text:
+    """Which drive it is, and where."""
+    title = Text(printable(member.watched.what if member.watched is not None else member.what), "bold")
+    if member.motor.started:
+        title.append("  started by this panel", "bold green")
+    return title
+
+
+def doing(member: Member) -> Text:
+    """What it does now: state, frequency and setpoint, and what its status words say beside that."""
+    told = Text(_nothing(member), "yellow")
+    if member.watched is not None:
+        told = member.watched.doing()
+    if member.watched is not None and member.watched.now is not None:
+        frequencies = [value(member, name) for role in _ROLES if (name := member.role(role)) is not None]
+        if frequencies:
+            told.append(f"{', ' if told else ''}{' of '.join(frequencies)} Hz")
+        told.append_text(_beside(member))
+    return told
+
+
+def state(member: Member) -> Text:
+    """State and fault alone, or why there is none."""
+    if member.watched is not None and not member.why:
+        return member.watched.doing()
+    why = f": {member.why}" if member.why else ""
+    return Text(printable(f"{_nothing(member)}{why}"), "yellow")
+
+
+def _nothing(member: Member) -> str:
+    """Why there is nothing to show, in two words."""
+    if member.is_silent:
+        return "no answer"
+    return "not known" if member.why else "waiting"
+
+
+def turns(member: Member) -> bool:
+    """Whether its motor turns, as far as it tells."""
+    watched = member.watched
+    if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
+        return False
+    return watched.profile.state(int(watched.now[watched.state])) in ("forward", "reverse")
+
+
+def tripped(member: Member) -> bool:
+    """Whether it is in fault, as far as it tells."""
+    watched = member.watched
+    return watched is not None and watched.now is not None and bool(watched.now.get(watched.fault or ""))
+
+
+def _beside(member: Member) -> Text:
+    """What the status words say beside the state, as `status` has it."""
+    ready, source = member.told.get("ready"), member.told.get("control_channel")
+    told = Text()
+    if ready is not None:
+        told.append(f", {ready.replace('_', ' ')}")
+    if source is not None:
+        told.append(f", commands from {source}", "" if source == "communication" else "yellow")
+    if member.told.get("overload_alarm", "none") != "none":
+        told.append(", overload pre-alarm", "bold yellow")
+    return told
+
+
+def value(member: Member, name: str) -> str:
+    """The newest value of *name* as people read it, with the mark of what is not proved; empty where there is none."""
+    watched = member.watched
+    if watched is None or watched.now is None or name not in watched.now:
+        return ""
+    mark = MARKS.get(watched.doubtful.get(name, ""), "")
+    return f"{watched.rows[name].text(watched.now[name])}{mark}"
+
+
+def plain_value(member: Member, name: str) -> str:
+    """The newest value of *name* without a mark."""
+    return value(member, name).rstrip("".join(MARKS.values()))
+
+
+def named(name: str) -> str:
+    """A register as a label."""
+    return name.replace("_", " ")
+
+
+def limits(member: Member, name: str) -> str:
+    """Between which values *name* lies: up to the drive's own highest frequency, where it tells that."""
+    assert member.watched is not None
+    row = member.watched.rows[name]
+    highest = member.highest if name in (member.role("frequency"), member.role("setpoint")) else None
+    if highest is not None:
+        return f"{row.unit}, up to {row.text(highest)}"
+    if row.low is None or row.high is None:
+        return row.unit
+    return f"{row.unit}, {row.text(row.low)} to {row.text(row.high)}".removeprefix(", ")
+
+
+def big(member: Member, name: str, width: int) -> RenderableType:
+    """One value in big figures, with its name, its unit, its limits and its trend, in six lines."""
+    shown = plain_value(member, name)
+    return Group(
+        Text(_fitting(named(name), width), "bold"),
+        Digits(shown, "bold") if shown else Text("\n\n"),
+        Text(_fitting(limits(member, name), width), "dim"),
+        trend(member, name, width),
+    )
+
+
+def _fitting(text: str, width: int) -> str:
+    """*text*, or as many of its words as a line of *width* holds."""
+    while len(text) > width and " " in text:
+        text = text.rpartition(" ")[0].rstrip(",")
+    return text[:width]
+
+
+def trend(member: Member, name: str, width: int) -> Text:
+    """The latest values of *name*, the newest to the right: from 0 to the limit, or from the least to the greatest."""
+    seen: Sequence[float] = list(member.trends.get(name, ()))[-width:]
+    if not seen:
+        return Text("")
+    low, high = min(seen), max(seen)
+    if member.highest and name in (member.role("frequency"), member.role("setpoint")):
+        low, high = min(0.0, low), max(member.highest, high)
+    span = (high - low) or 1.0
+    steps = len(_LEVELS) - 1
+    return Text("".join(_LEVELS[round((each - low) / span * steps)] for each in seen), "cyan")
+
+
+def values(member: Member, shown_big: Sequence[str], width: int, height: int) -> Text:
+    """The other values, in as many columns as *width* takes; what does not fit is counted."""
+    watched = member.watched
+    if watched is None or height < 1:
+        return Text("")
+    names = [name for name, row in watched.rows.items() if name not in shown_big and not row.bits]
+    cells = []
+    trends = width >= 2 * (_CELL + _TREND)
+    for name in names:
+        text = Text(f"{named(name):<21.21} {value(member, name):>8} {watched.rows[name].unit:<5.5}")
+        cells.append(text.append_text(_filled(trend(member, name, _TREND), _TREND)) if trends else text)
+    across = max(1, width // (_CELL + _TREND if trends else _CELL))
+    room = height * across
+    lacking = len(cells) - room
+    if lacking > 0:
+        cells = [*cells[: room - 1], Text(f"{lacking + 1} more: make the window larger", "dim")]
+    lines = Text()
+    down = -(-len(cells) // across)
+    for row in range(down):
+        for cell in cells[row::down]:
+            lines.append_text(cell).append(_BETWEEN)
+        lines.append("\n")
+    return lines
+
+
+_BETWEEN = "  "
+_CELL = 21 + 1 + 8 + 1 + 5 + len(_BETWEEN)
+"""Columns of one value: name, value, unit, and what lies between them."""
+_TREND = 16
+"""Columns of its trend, where there is room."""
+
+
+def _filled(text: Text, width: int) -> Text:
+    text.pad_right(max(width - text.cell_len, 0))
+    return text
+
+
+def lamps(member: Member) -> list[Text]:
+    """The terminals, as lamps: a line for each word that has bits."""
+    watched = member.watched
+    if watched is None or watched.now is None:
+        return []
+    lines = []
+    for name, row in watched.rows.items():
+        if not row.bits or name not in watched.now:
+            continue
+        shown = Text(f"{row.label:<16} ")
+        for bit, told in watched.profile.fields(name, int(watched.now[name])).items():
+            on = told == "on"
+            shown.append(f"{_ON if on else _OFF} ", "bold green" if on else "dim").append(
+                f"{bit}  ", "" if on else "dim"
+            )
+        lines.append(shown)
+    return lines
+
+
+def fault(member: Member) -> Text:
+    """The present fault with cause and remedy, or why nothing is known of the drive; empty if all is well."""
+    watched = member.watched
+    if member.why:
+        return Text(printable(f"{_nothing(member)}, trying again: {member.why}"), "yellow")
+    if watched is None or watched.now is None or watched.fault is None or watched.fault not in watched.now:
+        return Text("")
+    code = int(watched.now[watched.fault])
+    if not code:
+        return Text("")
+    present = watched.profile.fault(code)
+    told = Text(printable(str(present)), "bold red")
+    for what, text in (("cause", present.cause), ("remedy", present.remedy)):
+        if text:
+            told.append(f"\n{what}: ", "bold").append(printable(text))
+    return told
+
+
+def line(member: Member) -> Text:
+    """How the line does, and what the bus makes of that."""
+    stats = member.line.stats
+    if stats is None:
+        return Text("line: nothing was asked yet", "dim")
+    unit = member.session.unit
+    own = stats.units.get(unit, stats)
+    silent, damaged = own.timeouts, own.crc_errors + own.bad_answers
+    told = Text("line: ", "bold")
+    told.append(str(member.line.links.get(unit, "")))
+    told.append(f"; {silent} silent, {damaged} damaged", "yellow" if silent or damaged else "")
+    if own.answers:
+        told.append(f"; {own.round_trip.min * 1e3:.0f} to {own.round_trip.max * 1e3:.0f} ms")
+    for hint in stats.hints:
+        # What is said of another unit is said there.
+        if not hint.startswith("unit ") or hint.startswith(f"unit {unit}:"):
+            told.append(f"\n{printable(hint)}", "yellow")
+    return told

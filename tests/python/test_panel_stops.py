@@ -1,0 +1,244 @@
+"""Space stops, whatever the panel shows, and what the panel started does not outlive it: from the line's own record."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("textual")
+if sys.platform == "win32":
+    pytest.skip("needs a pseudo-terminal", allow_module_level=True)
+
+import drivebus
+from drivebus import Simulator
+
+from .panels import Terminal, on_a_terminal
+
+CONTROL, FORWARD, STOP = 0x2000, 1, 5
+RAMP = 2.0
+STOPPED = "drivebus.panel unit 1: stopped"
+BETWEEN = 2
+"""Requests that may lie between the key and the stop: one that was under way, and one that had its turn."""
+
+
+def prepared(simulator: Simulator) -> None:
+    """Drives that obey the bus, and are quick."""
+    with drivebus.Bus(simulator) as bus:
+        for unit in (1, 2):
+            drive = bus.drive(unit)
+            drive.prepare_control()
+            drive.write({"P00.11": RAMP, "P00.12": RAMP})
+
+
+@pytest.fixture
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350", 2: "gd350"}, transport="pty") as simulator:
+        prepared(simulator)
+        simulator.drive(1).writes()
+        yield simulator
+
+
+def told(simulator: Simulator, unit: int = 1) -> list[int]:
+    """What the drive was told."""
+    return [value for _, address, value in simulator.drive(unit).writes() if address == CONTROL]
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    """The limit is the test's own."""
+    while not holds():
+        threading.Event().wait(0.005)
+
+
+def has_tripped(simulator: Simulator) -> bool:
+    return simulator.drive(1).fault != 0
+
+
+def says(terminal: Terminal, since: int, line: str) -> bool:
+    """Whether the panel's record has *line* behind the first *since*."""
+    return line in terminal.record()[since:]
+
+
+def start(terminal: Terminal, hz: str = "10") -> None:
+    """Has the panel start the motor that it shows."""
+    terminal.press("r")
+    terminal.until("how many Hz")
+    terminal.press(f"{hz}\r")
+    terminal.until(f"run forward to {hz} Hz", "Is the machine clear?")
+    terminal.press("y")
+    terminal.until("started by this panel", "forward")
+
+
+HOME, ONE, PARAMETERS = "2 drives", "1 of 2", "group P00"
+
+# The keys that lead there from the overview, each with what it brings, and what each Escape behind the stop brings.
+VIEWS: dict[str, tuple[list[tuple[str, str]], list[str]]] = {
+    "overview": ([], []),
+    "one drive": ([("\r", ONE)], [HOME]),
+    "help": ([("?", "STOP, in every view")], [HOME]),
+    "messages": ([("m", "Messages, the newest first")], [HOME]),
+    "a speed is asked for": ([("r", "how many Hz")], []),
+    "half a number": ([("\r", ONE), ("f", "how many Hz"), ("12", "> 12")], [HOME]),
+    "before a start": ([("r", "how many Hz"), ("5\r", "run forward to 5 Hz")], []),
+    "before a reset": ([("x", "reset the fault")], []),
+    "parameters": ([("p", PARAMETERS)], [HOME]),
+    "search": ([("p", PARAMETERS), ("/", "> "), ("ramp", "> ramp")], ["ramp", HOME]),
+    "a value is asked for": ([("p", PARAMETERS), ("\r", "write P00.01")], [HOME]),
+    "before a write": ([("p", PARAMETERS), ("\r", "write P00.01"), ("2\r", "to EEPROM")], [HOME]),
+    "a backup is asked for": ([("p", PARAMETERS), ("d", "compare with which backup")], [HOME]),
+}
+
+
+def test_space_stops_in_every_view_and_dialog(simulator: Simulator, tmp_path: Path) -> None:
+    log = tmp_path / "record"
+    with (
+        on_a_terminal(["--port", simulator.port, "--unit", "1,2", "panel"], log) as terminal,
+        drivebus.Bus(simulator.port) as bus,
+    ):
+        drive = bus.drive(1)
+        terminal.until("2 drives", "stopped")
+        for name, (there, back) in VIEWS.items():
+            # Somebody else started it, of whom the panel knows nothing.
+            drive.run(hz=5.0)
+            for key, shown in there:
+                terminal.press(key)
+                terminal.until(shown)
+            known = len(terminal.record())
+            terminal.press(" ")
+            wait_until(lambda: told(simulator)[-1] == STOP)
+            wait_until(partial(says, terminal, known, STOPPED))
+            assert between(terminal.record()[known:]) <= BETWEEN, name
+            for shown in back:
+                terminal.press("\x1b")
+                terminal.until(shown)
+            terminal.until(HOME)
+        terminal.press("q")
+        assert terminal.ends() == 0
+    assert told(simulator, 2) == [], "the other drive was let alone"
+
+
+def between(record: list[str]) -> int:
+    """How many requests were sent after the key was seen, before the stop."""
+    key = next(place for place, line in enumerate(record) if line == "drivebus.panel unit 1: stop")
+    sent = [line for line in record[key:] if line.startswith("drivebus.wire") and " -> " in line]
+    return next(place for place, line in enumerate(sent) if "01 06 20 00 00 05" in line)
+
+
+def test_space_stops_all_that_the_panel_started_and_s_only_one(simulator: Simulator, tmp_path: Path) -> None:
+    with on_a_terminal(["--port", simulator.port, "--unit", "1,2", "panel"], tmp_path / "record") as terminal:
+        terminal.until(HOME, "stopped")
+        start(terminal)
+        terminal.press("\x1b[B")
+        terminal.until("Goodrive350 on", "unit 2 stopped")
+        start(terminal)
+        terminal.until("2 running", "2 started by this panel")
+        terminal.press("s")
+        terminal.until("1 started by this panel")
+        assert (told(simulator, 1), told(simulator, 2)) == ([FORWARD], [FORWARD, STOP])
+        start(terminal)
+        terminal.until("2 started by this panel")
+        terminal.press("\x1b[A", " ")
+        wait_until(lambda: told(simulator, 1)[-1] == told(simulator, 2)[-1] == STOP)
+        terminal.without("started by this panel")
+        # What turns is not sent twice, and what is stopped is not started again.
+        assert (told(simulator, 1).count(FORWARD), told(simulator, 2).count(FORWARD)) == (1, 2)
+
+
+def test_a_stop_takes_back_a_start_that_was_just_allowed(simulator: Simulator, tmp_path: Path) -> None:
+    """The thread that reads keys sees the stop before the screen has done what the key before it says."""
+    with on_a_terminal(["--port", simulator.port, "panel"], tmp_path / "record") as terminal:
+        terminal.until("stopped")
+        for _ in range(3):
+            terminal.press("r")
+            terminal.until("how many Hz")
+            terminal.press("10\r")
+            terminal.until("run forward to 10 Hz")
+            known = len(terminal.record())
+            terminal.press("y ")
+            wait_until(partial(says, terminal, known, STOPPED))
+            terminal.without("Is the machine clear?")
+        assert set(told(simulator)) == {STOP}
+        terminal.press("q")
+        assert terminal.ends() == 0
+
+
+BREAKS = """
+import os, sys
+mark = sys.argv[1] + ".broken"
+def broken(self):
+    if os.path.exists(mark):
+        raise RuntimeError("a mistake in the panel")
+    return shown(self)
+import drivebus.cli.panel.view as view
+shown, view.DriveView.show = view.DriveView.show, broken
+"""
+"""Has the panel fail once a file is there, as a mistake in it would."""
+
+
+def leave(terminal: Terminal) -> None:
+    terminal.press("q")
+    terminal.until("Leave it?")
+    terminal.press("y")
+
+
+ENDINGS: dict[str, tuple[Callable[[Terminal], None], int]] = {
+    "q": (leave, 0),
+    "Ctrl-C": (lambda terminal: terminal.press("\x03"), 0),
+    "SIGINT": (lambda terminal: terminal.send(signal.SIGINT), 130),
+    "SIGTERM": (lambda terminal: terminal.send(signal.SIGTERM), 143),
+    "the window is closed": (Terminal.hang_up, 129),
+    "an exception": (lambda terminal: Path(f"{terminal.log}.broken").touch(), 1),
+    "kill -9": (lambda terminal: terminal.send(signal.SIGKILL), -9),
+}
+
+
+def test_what_it_started_ends_with_it(tmp_path: Path) -> None:
+    """Each ending has a line and a panel of its own; they run side by side, because a panel takes its time to open."""
+    with contextlib.ExitStack() as stack:
+        running = []
+        for place, (name, (end, code)) in enumerate(ENDINGS.items()):
+            simulator = stack.enter_context(Simulator({1: "gd350", 2: "gd350"}, transport="pty"))
+            prepared(simulator)
+            words = ["--port", simulator.port, "panel"]
+            if name == "kill -9":
+                words = ["--unverified", *words, "--watchdog", "1"]
+            terminal = stack.enter_context(on_a_terminal(words, tmp_path / str(place), before=BREAKS))
+            running.append((name, end, code, simulator, terminal))
+        for *_, terminal in running:
+            terminal.until("stopped")
+            start(terminal)
+        for name, end, *_, simulator, terminal in running:
+            assert told(simulator) == [FORWARD], name
+            end(terminal)
+        for name, _, code, simulator, terminal in running:
+            assert terminal.ends() == code, name
+            if name == "kill -9":
+                wait_until(partial(has_tripped, simulator))
+            else:
+                assert set(told(simulator)[1:]) == {STOP}, name
+                assert ("RuntimeError" in terminal.text) == (name == "an exception")
+
+
+HANGS = BREAKS.replace(
+    'raise RuntimeError("a mistake in the panel")', "open(mark + '.so', 'w'); threading.Event().wait()"
+).replace("import os, sys", "import os, sys, threading")
+"""Has the screen hang once a file is there."""
+
+
+def test_space_stops_and_a_signal_ends_what_hangs(simulator: Simulator, tmp_path: Path) -> None:
+    with on_a_terminal(["--port", simulator.port, "panel"], tmp_path / "record", before=HANGS) as terminal:
+        terminal.until("stopped")
+        start(terminal)
+        Path(f"{terminal.log}.broken").touch()
+        wait_until(Path(f"{terminal.log}.broken.so").exists)
+        terminal.press(" ")
+        wait_until(partial(says, terminal, 0, STOPPED))
+        assert told(simulator) == [FORWARD, STOP]
+        terminal.send(signal.SIGTERM)
+        assert terminal.ends() == 143
