@@ -24,7 +24,8 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke
+        machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke \
+        pictures
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -37,6 +38,7 @@ help: ## what can be made
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
+	@echo "make pictures   the pictures of the README, from what the commands show"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -125,6 +127,9 @@ examples: $(VENV)/.wheel
 
 wheel-smoke: dist/.wheel
 	$(BIN)/python tools/wheel_smoke.py
+
+pictures: $(VENV)/.dev $(VENV)/.wheel ## draws the pictures of the README anew
+	$(BIN)/python -m tools.draw_pictures
 
 # --- the rest ------------------------------------------------------------------------------------------------
 

@@ -69,6 +69,12 @@ class Terminal:
         """The screen now, without blanks at the ends of its lines."""
         return [line.rstrip() for line in self._screen.display]
 
+    def styled(self) -> Iterator[list[tuple[str, str]]]:
+        """The screen as lines of letters, each with its style in rich's words."""
+        for row in range(self._screen.lines):
+            line = self._screen.buffer[row]
+            yield [(line[at].data, _style(line[at])) for at in range(self._screen.columns)]
+
     @property
     def text(self) -> str:
         """The screen as one text."""
@@ -140,6 +146,17 @@ class Terminal:
         self.raw += piece
         self._stream.feed(piece)
         return bool(piece)
+
+
+def _style(letter: pyte.screens.Char) -> str:
+    """How *letter* looks."""
+
+    def colour(name: str) -> str:
+        name = {"brown": "yellow"}.get(name.removeprefix("bright"), name.removeprefix("bright"))
+        return "default" if name == "default" else f"#{name}" if re.fullmatch("[0-9a-f]{6}", name) else name
+
+    front, back = (letter.bg, letter.fg) if letter.reverse else (letter.fg, letter.bg)
+    return f"{'bold ' if letter.bold else ''}{colour(front)} on {colour(back)}"
 
 
 @contextlib.contextmanager
