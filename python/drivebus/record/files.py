@@ -75,7 +75,7 @@ def sink_for(path: Path, table: Table, replace: bool) -> Sink:
     """
     known = format_of(path)
     if path.exists() and not replace:
-        raise NotAllowed(f"{path} is there already; give another name, or replace=True")
+        raise NotAllowed(f"{path} is there already; give another name, or replace=True (`--force`)")
     try:
         make: Callable[[Path, Table], Sink] = import_module(f"drivebus.record.{known}").open_new
         if replace:

@@ -129,7 +129,8 @@ class Motor:
                 block.end()
             if its_own and not busy:
                 return  # the thread that runs it sends the stop now
-            prove = block is None and not self._proving
+            # A start that is under way proves nothing when it ends: it may have been sent, and refused by us.
+            prove = (block is None or busy) and not self._proving
             self._proving |= prove
         threading.Thread(target=self._stop, args=(prove,), name=f"stop {self.called}", daemon=True).start()
 
