@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -59,8 +59,8 @@ def alone(drives: dict[drivebus.Drive, list[str]], bus: drivebus.Bus, seconds: f
         return count / (bus.now() - began)
 
 
-def long(seconds: float) -> None:
-    """Records for *seconds*, and prints what it cost."""
+def long(seconds: float, formats: Sequence[str]) -> None:
+    """Records for *seconds* in each of *formats* in turn, and prints what it cost."""
     with tempfile.TemporaryDirectory() as name, simulated(Path(name)) as port, drivebus.Bus(port) as bus:
         drives = {bus.drive(unit, "gd350"): None for unit in UNITS}
         asked = {
@@ -68,11 +68,11 @@ def long(seconds: float) -> None:
             for drive in drives
         }
         before = alone(asked, bus, 30.0)
-        for ending in FORMATS:
+        for ending in formats:
             path = Path(name) / f"run.{ending}"
             began, sizes = bus.now(), []
             with drivebus.Recorder(path, drives) as recorder:
-                while bus.now() - began < seconds / len(FORMATS):
+                while bus.now() - began < seconds / len(formats):
                     recorder.wait(5.0)
                     sizes.append(resident())
                 took, rows = bus.now() - began, recorder.rows
@@ -118,13 +118,15 @@ def main() -> None:
     """Measures what is asked for."""
     parser = argparse.ArgumentParser(description="what recording costs, and what a kill costs it")
     kinds = parser.add_subparsers(dest="kind", required=True)
-    kinds.add_parser("long").add_argument("--seconds", type=float, default=600.0)
+    lasting = kinds.add_parser("long")
+    lasting.add_argument("--seconds", type=float, default=600.0, help="in all")
+    lasting.add_argument("--formats", default=",".join(FORMATS))
     killed = kinds.add_parser("kills")
     killed.add_argument("--times", type=int, default=20)
     killed.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     if given.kind == "long":
-        long(given.seconds)
+        long(given.seconds, given.formats.split(","))
     else:
         kills(given.times, given.seed)
 
