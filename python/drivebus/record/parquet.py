@@ -31,17 +31,18 @@ class _Parquet:
         fields = [(title, pyarrow.string() if title in in_words else pyarrow.float64()) for title in table.titles[1:]]
         self._schema = pyarrow.schema([("time", pyarrow.timestamp("us", tz="UTC")), *fields])
         self._parts = [path]
-        self._batches: list[pyarrow.RecordBatch] = []
+        self._rows = self._schema.empty_table()
         self._done = 0
-        self._put(path, [])
+        self._put(path, self._rows)
 
     def write(self, rows: Sequence[Row]) -> None:
-        batches = [*self._batches, self._batch(rows)]
-        self._put(self._parts[-1], batches)
-        self._batches = batches
-        if sum(batch.num_rows for batch in batches) >= _PART:
+        # In one piece: a table of thousands of pieces of a few rows takes several times the memory of its values.
+        whole = pyarrow.concat_tables([self._rows, self._table(rows)]).combine_chunks()
+        self._put(self._parts[-1], whole)
+        self._rows = whole
+        if whole.num_rows >= _PART:
             self._done += self._parts[-1].stat().st_size
-            self._batches = []
+            self._rows = self._schema.empty_table()
             self._parts.append(self._beside(f"part-{len(self._parts) + 1}"))
 
     def size(self) -> int:
@@ -66,24 +67,24 @@ class _Parquet:
     def _beside(self, name: str) -> Path:
         return self.path.with_name(f"{self.path.stem}.{name}{self.path.suffix}")
 
-    def _put(self, path: Path, batches: Sequence[pyarrow.RecordBatch]) -> None:
-        """Writes *batches* to *path*, in the place of what was there."""
+    def _put(self, path: Path, rows: pyarrow.Table) -> None:
+        """Writes *rows* to *path*, in the place of what was there."""
         whole = self._beside("new")
         try:
-            pyarrow.parquet.write_table(pyarrow.Table.from_batches(batches, self._schema), whole)
+            pyarrow.parquet.write_table(rows, whole)
             whole.replace(path)
         except OSError:
             whole.unlink(missing_ok=True)
             raise
 
-    def _batch(self, rows: Sequence[Row]) -> pyarrow.RecordBatch:
+    def _table(self, rows: Sequence[Row]) -> pyarrow.Table:
         width = len(self._schema) - len(FIXED)
         times = [datetime.fromtimestamp(row.time, timezone.utc) for row in rows]
         texts = [[row[place] or None for row in rows] for place in range(1, len(FIXED))]
         values = [[row.values[place] if row.values else None for row in rows] for place in range(width)]
         columns = [times, *texts, *values]
         arrays = [pyarrow.array(column, field.type) for column, field in zip(columns, self._schema, strict=True)]
-        return pyarrow.RecordBatch.from_arrays(arrays, schema=self._schema)
+        return pyarrow.Table.from_arrays(arrays, schema=self._schema)
 
 
 def open_new(path: Path, table: Table) -> _Parquet:

@@ -31,7 +31,14 @@ impl Asked {
     pub(super) fn new(frame: &[u8], ended: Instant) -> Self {
         // Nobody answers what all are told.
         let is_open = frame[0] != 0;
-        Self { adu: Adu::copy_of(&Frame::found(frame)), ended, is_open, doubted: None, has_spoken: false, is_repeat: false }
+        Self {
+            adu: Adu::copy_of(&Frame::found(frame)),
+            ended,
+            is_open,
+            doubted: None,
+            has_spoken: false,
+            is_repeat: false,
+        }
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
