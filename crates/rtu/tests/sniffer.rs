@@ -473,6 +473,15 @@ fn an_answer_that_comes_late_answers_nothing_else() {
 }
 
 #[test]
+fn a_unit_answers_once() {
+    use Role::{Doubtful, Noise, Request};
+    // A damaged answer, and then what answers an older request of the same length.
+    let damaged = [1, 3, 2, 0, 3, 0xF8, 0x44];
+    let heard = roles(&[(0, &READ), (5, &damaged), (25, &WORDS), (40, &sealed(1, &[6, 0x20, 0, 0, 1]))]);
+    assert!(matches!(heard[..], [Request, Noise(_), Doubtful, Request]), "{heard:?}");
+}
+
+#[test]
 fn what_all_are_told_is_not_answered() {
     let broadcast = sealed(0, &[6, 0x20, 0, 0, 5]);
     assert_eq!(roles(&[(0, &broadcast), (10, &broadcast)]), [Role::Request, Role::Request]);

@@ -11,6 +11,16 @@ use super::lengths::{self, Length};
 /// Most bits of one 01H or 02H read.
 const MAX_BITS: u16 = 2_000;
 
+/// What a unit has said to a request so far that was not its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Spoken {
+    Nothing,
+    /// What was not understood: no late answer will come.
+    Something,
+    /// What looks like the answer, damaged: no other will come.
+    Badly,
+}
+
 /// A request that was heard.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
@@ -21,8 +31,8 @@ pub(super) struct Asked {
     pub(super) is_open: bool,
     /// When something came that may have been its answer, or the same request once more.
     pub(super) doubted: Option<Instant>,
-    /// Whether the unit has spoken since and was not understood: no late answer will come.
-    pub(super) has_spoken: bool,
+    /// What its unit has said since.
+    pub(super) spoken: Spoken,
     /// Whether the same was asked before and not surely answered, so that more than one answer may still come.
     pub(super) is_repeat: bool,
 }
@@ -36,13 +46,18 @@ impl Asked {
             ended,
             is_open,
             doubted: None,
-            has_spoken: false,
+            spoken: Spoken::Nothing,
             is_repeat: false,
         }
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
         self.adu.as_bytes()
+    }
+
+    /// Whether the unit has spoken since.
+    pub(super) fn has_spoken(&self) -> bool {
+        self.spoken > Spoken::Nothing
     }
 
     /// Whether `frame` can be the answer.

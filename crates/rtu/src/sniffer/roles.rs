@@ -17,7 +17,7 @@ use core::time::Duration;
 use crate::Instant;
 use crate::frame::FrameError;
 
-use super::asked::{Asked, can_ask, may_be_answer};
+use super::asked::{Asked, Spoken, can_ask, may_be_answer};
 use super::lengths::Length;
 use super::stories::{Behind, Held, Told};
 
@@ -106,11 +106,13 @@ impl Talk {
             }
             Some(asked) if frame == asked.bytes() => match () {
                 () if held.waited <= held.soon && !is_before => Ok(Role::Answer),
-                () if is_before && asked.has_spoken => Ok(Role::Doubtful),
-                () if held.waited > held.soon && asked.has_spoken => Ok(Role::Request),
+                () if is_before && asked.has_spoken() => Ok(Role::Doubtful),
+                () if held.waited > held.soon && asked.has_spoken() => Ok(Role::Request),
                 () => held.repeats(asked, behind),
             },
             Some(asked) if is_before => held.answers_one_of_two(asked, behind),
+            // A unit answers once.
+            Some(asked) if asked.spoken == Spoken::Badly => Ok(Role::Doubtful),
             Some(_) => Ok(Role::Answer),
             None if is_before && can_ask(frame) => held.answers_or_asks_again(open, behind),
             None if is_before => Ok(Role::Late),
@@ -139,7 +141,7 @@ impl Talk {
                 if let Some(asked) = left {
                     self.gives_up = began.saturating_duration_since(asked.ended);
                 }
-                self.before = left.filter(|asked| !asked.has_spoken).or(self.before);
+                self.before = left.filter(|asked| !asked.has_spoken()).or(self.before);
             }
             Role::Answer => {
                 let asked = self.last.as_mut()?;
@@ -159,7 +161,11 @@ impl Talk {
                     Role::Stray => bytes[0] == asked.bytes()[0],
                     _ => asked.is_answered_badly_by(bytes),
                 };
-                asked.has_spoken |= is_its && began.saturating_duration_since(asked.ended) <= soon;
+                let is_its = is_its && began.saturating_duration_since(asked.ended) <= soon;
+                if is_its {
+                    asked.spoken =
+                        asked.spoken.max(if role == Role::Stray { Spoken::Something } else { Spoken::Badly });
+                }
             }
         }
         None

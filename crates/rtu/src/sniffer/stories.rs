@@ -135,7 +135,7 @@ impl Held<'_> {
 
     /// An answer to the open request `asked`, or to one before it that stayed open.
     pub(super) fn answers_one_of_two(&self, asked: &Asked, behind: &Behind<'_>) -> Told {
-        if !self.is_soon() || self.waited < self.too_soon || asked.has_spoken {
+        if !self.is_soon() || self.waited < self.too_soon || asked.has_spoken() {
             return Ok(Role::Doubtful);
         }
         let [next, second, third] = behind.next;
