@@ -287,6 +287,11 @@ class Description:
         return self.access != "ro"
 
     @property
+    def bounded(self) -> bool:
+        """Whether it is known how far its values go, so that a wrong one is noticed here."""
+        return self.high is not None or self.high_from is not None or self.variant is not None
+
+    @property
     def group(self) -> str:
         """The group of a parameter, as its code says it; empty for a register."""
         return group_of(self.code or "")

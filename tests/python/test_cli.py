@@ -321,7 +321,7 @@ class TestMoving:
             assert isinstance(row, dict)
             return row
 
-        command("write", "P00.01=2", "P00.02=0", "P00.06=8", "P00.11=1", "P00.12=1")
+        command("write", "--unverified", "P00.01=2", "P00.02=0", "P00.06=8", "P00.11=1", "P00.12=1")
         assert command("run", "5", "--yes", "--wait", "10")["state"] == "forward"
         assert pty.drive(1).frequency == pytest.approx(5.0, abs=0.1)
         assert command("stop", "--wait", "10")["state"] == "stopped"

@@ -315,8 +315,8 @@ class TestRules:
         refuses(lambda: drive.write({"speed_reference": 10.0, "bus_speed_unit": 2}), together)
         hertz = bus.drive(VFD500, "vfd500", variants={"speed_unit": "Hz"})
         refuses(lambda: hertz.write("P30.14", 2), "P30.14 = 2 would change the speed_unit of unit 4.*said to be Hz")
-        hertz.write("P30.14", 1)
-        drive.write("P30.14", 2)
+        hertz.write("P30.14", 1, unverified=True)
+        drive.write("P30.14", 2, unverified=True)
         simulator.drive(VFD500).take_writes()
         drive.write("speed_reference", 10)
         assert [word[1:] for word in simulator.drive(VFD500).writes()] == [(0x7001, 10)]
@@ -391,3 +391,24 @@ def test_both_faces_hold_the_same_rule(simulator: Simulator) -> None:
                 await bus.write(VFD500, 0x2000, 5)
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    ("unit", "code", "word"),
+    [(GD350, "P00.02", 1), (GD350, "P07.00", 1), (GD350, "P00.06", 6), (GD600, "P01.20", 10), (VFD500, "P30.14", 1)],
+)
+def test_what_has_no_printed_range_is_written_only_on_request(
+    simulator: Simulator, bus: Bus, unit: int, code: str, word: int
+) -> None:
+    row = bus.drive(unit, UNITS[unit]).describe(code)
+    assert (row.verified, row.bounded) == (True, False)
+    with pytest.raises(NotAllowed, match=rf"writing {word} to {code} .*: its range is not printed. .*{HOW}"):
+        bus.drive(unit, UNITS[unit]).write(code, word / row.scale, store=True)
+    assert simulator.drive(unit).writes() == []
+
+
+def test_a_choice_that_is_printed_needs_no_range(simulator: Simulator, bus: Bus) -> None:
+    drive = bus.drive(GD350, "gd350")
+    assert drive.describe("P00.06").choices[8] == "Modbus"
+    drive.write("P00.06", 8, store=True)
+    assert [write[1:] for write in simulator.drive(GD350).writes()] == [(0x0006, 8)]

@@ -12,7 +12,7 @@ import pytest
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Identification, NotAllowed, Simulator
-from drivebus.identify import identify
+from drivebus.identify import codes, identify
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
@@ -67,11 +67,20 @@ def test_how_sure_it_is(
     assert simulator.drive(unit).writes() == []
 
 
-def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus) -> None:
+def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {**codes.listed()[0x0107][0], "verified": False, "source": "a program"}
+    monkeypatch.setattr(codes, "listed", lambda: {0x0107: [row]})
     bus.read(1, CODE)  # first contact is over
     answer(simulator, 1, 0x0107)
     found = bus.identify(1)
     assert (found.certainty, found.family, found.candidates) == ("unverified", "gd200a", ("gd200a",))
+
+
+def test_a_family_without_a_profile(simulator: Simulator, bus: Bus) -> None:
+    bus.read(1, CODE)  # first contact is over
+    answer(simulator, 1, 0x0107)
+    found = bus.identify(1)
+    assert (found.certainty, found.family, found.candidates) == ("certain", "gd200a", ("gd200a",))
     answer(simulator, 1, 0x0107)
     with pytest.raises(NotAllowed, match=r"a gd200a, a family without a profile yet; it reports 0107H"):
         bus.drive(1, unverified=True)
@@ -276,7 +285,7 @@ class TestAfterThePortWasOpenedAgain:
         self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         drive = bus.drive(4, "gd600")
-        drive.write("P01.20", 5.0, store=True)
+        drive.write("P01.20", 5.0, store=True, unverified=True)
         self.reopen(simulator, bus)
         read = bus.read
 
@@ -287,7 +296,7 @@ class TestAfterThePortWasOpenedAgain:
 
         monkeypatch.setattr(bus, "read", other)
         with pytest.raises(NotAllowed, match="another drive answers as unit 4"):
-            drive.write("P01.20", 6.0, store=True)
+            drive.write("P01.20", 6.0, store=True, unverified=True)
 
     @pytest.mark.parametrize(("row", "turning"), [("", 5_000), (SPEED_ROW, 5_000), (SPEED_ROW, 0x01A0)])
     def test_what_a_drive_of_ones_own_has_where_others_have_a_code_may_change(
@@ -299,10 +308,10 @@ class TestAfterThePortWasOpenedAgain:
         read = bus.read
         monkeypatch.setattr(bus, "read", lambda *what, **how: frequency if what[1] == CODE else read(*what, **how))
         drive = bus.drive(4, tmp_path)
-        drive.write("setting", 1)
+        drive.write("setting", 1, unverified=True)
         self.reopen(simulator, bus)
         frequency[0] = turning
-        drive.write("setting", 2)
+        drive.write("setting", 2, unverified=True)
         assert [value for _, _, value in simulator.drive(4).writes()] == [1, 2]
 
 
@@ -337,6 +346,6 @@ source = "a manual"
 
 def test_one_that_a_password_locks_says_what_to_do(bus: Bus) -> None:
     """Exception 09H: GD350 manual, chapter 9.4.7."""
-    bus.drive(1).write("P07.00", 12, store=True)
+    bus.drive(1).write("P07.00", 12, store=True, unverified=True)
     with pytest.raises(NotAllowed, match=r"refuses 2103H \(exception 09H.*user password.*at the keypad"):
         bus.drive(1)

@@ -290,7 +290,7 @@ def test_the_awaitable_face_has_the_same(simulator: Simulator) -> None:
 
 def test_no_start_at_a_speed_that_comes_from_elsewhere(drive: Drive, simulator: Simulator) -> None:
     """P00.06 = 0: the keypad's 50 Hz, whatever the bus says. GD350 manual, chapter 9.4.5."""
-    drive.write("P00.06", 0)
+    drive.write("P00.06", 0, unverified=True)
     simulator.drive(1).take_writes()
     with pytest.raises(NotAllowed, match=r"would not take its speed from the bus:\nP00\.06 .*: 0, needs 8"):
         drive.run(5.0)

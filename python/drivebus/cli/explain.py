@@ -50,6 +50,9 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
         values["bits"] = ", ".join(known.bits or {})
         values["unverified_bits"] = ", ".join(known.unverified_bits)
         del values["verified"]  # `evidence` says more
+        if known.writable and known.verified and not known.bounded:
+            printed = " but for its choices" if known.choices else ""
+            values["write"] = f"unverified{printed}: its range is not printed"
     session.out.facts(values)
 
 

@@ -149,6 +149,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
             unit=unit.address,
         )
     raw = unit.profile.encode(name, value)
+    unit.evidence.writes_word(name, raw)
     address = unit.profile.address(name, store=store)
     if known.kind == "parameter" and (address != known.address or not store):
         memory = unit.profile.memory()

@@ -19,6 +19,7 @@ __all__ = ["Evidence", "not_verified"]
 _T = TypeVar("_T")
 
 _WHY_UNKNOWN = "no document of this family says so"
+_NO_RANGE = "its range is not printed"
 
 
 def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
@@ -106,6 +107,12 @@ class Evidence:
             raise self._without_address(name)
         if known.evidence != "verified" and not self.unverified:
             raise not_verified(f"writing {self._named(name)}", known.reason, self.unit)
+
+    def writes_word(self, name: str, word: int) -> None:
+        """Raises `NotAllowed` if nothing that is printed tells whether *name* takes *word*."""
+        known = self.profile.describe(name)
+        if not (known.bounded or word in known.choices or self.unverified):
+            raise not_verified(f"writing {word} to {self._named(name)}", _NO_RANGE, self.unit)
 
     def commands(self, name: str) -> None:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""

@@ -29,10 +29,7 @@ pub(crate) fn gd35() -> Family {
 }
 
 /// The GD300 and GD35 manuals let 200AH go up to 1FFH only.
-///
-/// Assumption: 2008H ends at 200.0 %, as in their lists of words for a fieldbus (GD300 p. 124, GD35 p. 122).
-const NARROWER: &[Register] =
-    &[Register::set(0x2008, Range::Words(0, 2_000)), Register::set(0x200A, Range::Words(0, 0x1FF))];
+const NARROWER: &[Register] = &[Register::set(0x200A, Range::Words(0, 0x1FF))];
 
 /// Bits 8 to 11 of state word 2 are not printed for GD300 and GD35.
 const GD300_STATE: &[Register] = &[Register::read(
