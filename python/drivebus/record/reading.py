@@ -66,6 +66,12 @@ class Recording:
         """The unit of each title of *drive*; empty of what has none."""
         return {title: title.rpartition(" [")[2][:-1] if title.endswith("]") else "" for title in self.values[drive]}
 
+    def bits(self, drive: str, name: str) -> Mapping[str, Mapping[str, Any]]:
+        """The fields of the register *name* of *drive*, each with its `mask` and its `labels`; empty for a number."""
+        drives = [each for each in self.about.get("drives", ()) if each.get("name") == drive]
+        found: Mapping[str, Any] = drives[0].get("registers", {}).get(name, {}).get("bits", {}) if drives else {}
+        return found
+
     def take(self, titles: Iterable[str], rows: Iterable[Cells], name: str) -> None:
         """Takes the *rows* of the file called *name*, which has columns of these *titles*.
 
