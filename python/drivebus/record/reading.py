@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivebus import checks
 from drivebus.errors import NotAllowed
 from drivebus.record.files import format_of
 from drivebus.record.table import FIXED, seconds_of
@@ -179,6 +180,8 @@ def _parquet_rows(path: Path, name: str) -> _Rows:
 
     try:
         table = pyarrow.parquet.read_table(path)
+    except FileNotFoundError as error:
+        raise _unread(name, error) from None
     except (OSError, pyarrow.ArrowException) as error:
         raise NotAllowed(f"{name} is not a recording: {str(error).splitlines()[0]}") from None
     return table.column_names, iter(table.to_pylist())
@@ -189,7 +192,7 @@ _READERS = {"csv_file": _csv_rows, "json_lines": _json_rows, "sqlite": _sqlite_r
 
 def _unread(name: str, error: Exception) -> NotAllowed:
     if isinstance(error, OSError):
-        return NotAllowed(f"{name} cannot be read: {error.strerror or error}")
+        return checks.unread(name, error)
     return NotAllowed(f"{name} is not a recording: {error}")
 
 
