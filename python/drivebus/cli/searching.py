@@ -68,8 +68,8 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
 
 _MEANINGS = {
     "shared": "several families report this code.",
-    "by answers": "it has no code, but answers and refuses the same registers as this family. --profile says that it is one.",
-    "unverified": "no document prints this code for this family, or its state does not fit. --profile says that it is one.",
+    "by answers": "it has no code, but answers and refuses the same registers as this family. --profile names it.",
+    "unverified": "no document prints this code for this family, or its state does not fit. --profile names it.",
 }
 """What the column `certainty` says, but for `certain` and `unknown`, which say it themselves."""
 
