@@ -202,6 +202,7 @@ def test_a_summary_tells_what_was_asked_for_and_what_came(tmp_path: Path) -> Non
     asked, missing, too_late = map(int, re.findall(r"(\d+) (?:samples asked|without|came)", told))
     assert asked == rows + missing + too_late
     seldom = ["--json", *words, "--force", "--interval", "2", "--for", "5"]
+    assert "no gap" not in done.stdout
     assert json.loads(CliRunner().invoke(cli, seldom, prog_name="drivebus").stdout)["late"] == 0
 
 
@@ -352,3 +353,15 @@ def test_two_drives_of_one_name_are_refused(bus: drivebus.Bus, tmp_path: Path) -
     with pytest.raises(NotAllowed, match="called"):
         Recorder(tmp_path / "run.csv", {first: None, second: None}, labels={first: "a", second: "a"})
     assert not [*tmp_path.iterdir()]
+
+
+def test_no_gap_is_said_only_if_no_sample_was_too_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["--port", "sim://gd350?clock=virtual", "record", "output_current", "--interval", "0.1", "--for", "2"]
+    path = str(tmp_path / "whole.csv")
+    done = CliRunner().invoke(cli, [*words[:3], path, *words[3:]], prog_name="drivebus")
+    assert (done.exit_code, ", no gap." in done.stdout) == (0, True), done.output
+    monkeypatch.setattr(Recorder, "late", 3)
+    path = str(tmp_path / "late.csv")
+    done = CliRunner().invoke(cli, [*words[:3], path, *words[3:]], prog_name="drivebus")
+    assert (done.exit_code, "no gap" in done.stdout) == (0, False), done.output
+    assert "3 came too late" in " ".join(done.stderr.split())

@@ -181,7 +181,8 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
     else:
         gaps = f", {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'} ({recorder.missing} samples missing)"
         into = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
-        session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else ', no gap'}.")
+        whole = "" if recorder.late else ", no gap"
+        session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else whole}.")
         if recorder.late:
             _tell_late(recorder)
     if problem:
