@@ -549,8 +549,8 @@ class Batch:
     """Samples that were taken out of a `Poller`."""
 
     def __len__(self) -> int: ...
-    def samples(self) -> list[tuple[int, float, float, list[int | float] | None, Exception | None]]:
-        """Each sample: its target by number, Unix times of request and answer, values or None, error or None."""
+    def samples(self) -> list[tuple[int, float, float, int, list[int | float] | None, Exception | None]]:
+        """Each sample: its target by number, Unix times of request and answer, beats missed, values, error; or None."""
     def rows(self, target: int, /) -> bytearray:
         """Those of one target as doubles in native order: the two times and the values, NaN for what is missing."""
 

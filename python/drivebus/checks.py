@@ -13,7 +13,20 @@ from typing import SupportsIndex
 
 from drivebus.errors import NotAllowed
 
-__all__ = ["address", "closest", "digits", "flag", "number", "one_of", "path", "payload", "shown", "unit", "whole"]
+__all__ = [
+    "address",
+    "closest",
+    "digits",
+    "flag",
+    "number",
+    "one_of",
+    "path",
+    "payload",
+    "shown",
+    "unit",
+    "unread",
+    "whole",
+]
 
 _MOST_DIGITS = 20
 """Digits of the largest number that anything here can be: 2 ** 64 - 1."""
@@ -125,3 +138,9 @@ def closest(name: str, known: Iterable[str]) -> str:
     by_lower = {candidate.lower(): candidate for candidate in known}
     matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
     return f'; did you mean "{by_lower[matches[0]]}"?' if matches else ""
+
+
+def unread(name: object, error: OSError) -> NotAllowed:
+    """What says that the file *name* cannot be read, and why."""
+    reason = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror or error
+    return NotAllowed(f"{name} cannot be read: {reason}")

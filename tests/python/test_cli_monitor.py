@@ -45,10 +45,10 @@ def lose(monkeypatch: pytest.MonkeyPatch, *lost: int) -> None:
     made = drivebus.Sample.__init__
     numbers = iter(range(1000))
 
-    def make(sample: Any, target: Any, time: float, answered: float, values: Any, missing: Any) -> None:
+    def make(sample: Any, target: Any, time: float, answered: float, late: int, values: Any, missing: Any) -> None:
         if next(numbers) in lost:
             values, missing = None, drivebus.NoAnswer("unit 1, read 3004H: no answer within 500 ms")
-        made(sample, target, time, answered, values, missing)
+        made(sample, target, time, answered, late, values, missing)
 
     monkeypatch.setattr(drivebus.Sample, "__init__", make)
 

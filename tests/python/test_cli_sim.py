@@ -49,6 +49,18 @@ def test_sim_fails_as_it_is_told_to_and_says_by_what_seed(tmp_path: Path, end: s
     assert not link.is_symlink()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+def test_the_help_shows_how_the_line_is_set_and_that_works() -> None:
+    told = " ".join(CliRunner().invoke(cli, ["sim", "--help"], prog_name="drivebus").stdout.split())
+    example = told.partition("--baud and --format: `drivebus ")[2].partition("`")[0].split()
+    with subprocess.Popen([sys.executable, "-m", "drivebus", *example], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        said = [child.stdout.readline().strip() for _ in range(3)]
+        assert said[1:] == ["Unit 1: vfd500", "Settings: 9600 8N1"]
+        child.send_signal(signal.SIGINT)
+        child.communicate(timeout=100)
+
+
 @pytest.mark.parametrize(
     "words", [["--fault", "late"], ["--fault", "latest=0.1"], ["--faults", "2"], ["--units", "1=gd350,1=gd350"]]
 )

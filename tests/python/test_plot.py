@@ -16,6 +16,7 @@ import drivebus
 from drivebus import NotAllowed, Recorder, Simulator
 from drivebus.cli import cli
 from drivebus.plot import Picture, draw, of_recording, of_samples
+from drivebus.plot.picture import Curve, from_zero
 from drivebus.plot.thin import thinned
 from drivebus.record import Recording, read
 from drivebus.trial.samples import Samples
@@ -70,7 +71,7 @@ def test_no_peak_and_no_gap_is_left_out(values: list[float | None], most: int) -
 
 def test_a_picture_has_what_was_recorded(recording: Recording) -> None:
     picture = of_recording(recording, "run")
-    assert list(picture.panels) == ["Hz", "A", ""]
+    assert list(picture.panels) == ["Hz", "A"], "words of bits are no curves"
     assert picture.left_out == ["fan output_current [A]"]
     frequency = picture.panels["Hz"][0]
     assert frequency.label == f"{LABEL} running_frequency"
@@ -90,6 +91,58 @@ def test_bands_tell_the_state_of_each_sample_and_nothing_of_gaps(recording: Reco
             assert [band.state for band in bands if band.begin <= at < band.end] == [state]
         for name, begin, end in picture.gaps:
             assert name != drive or not [band for band in bands if band.begin < end and band.end > begin]
+
+
+def test_a_band_begins_at_the_sample_that_shows_the_state_however_few_there_are(tmp_path: Path) -> None:
+    """A busy line leaves out samples around the start: the curve rises before the band, which cannot know."""
+    path = tmp_path / "busy.csv"
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        drive = bus.drive(1)
+        drive.prepare_control()
+        with Recorder(path, {drive: ["running_frequency", "output_state"]}, interval=0.1) as recorder:
+            recorder.wait(1.0)
+            drive.run(20.0)
+            busy = bus.now() + 0.6
+            while bus.now() < busy:
+                drive.read("output_current")
+            recorder.wait(2.0)
+    found = read(path)
+    picture = of_recording(found, "busy")
+    times, states = found.times["unit 1"], found.states["unit 1"]
+    place = states.index("forward")
+    assert found.values["unit 1"]["running_frequency [Hz]"][place] > 0.0
+    assert times[place] - times[place - 1] > 0.6
+    forward = times[place] - picture.began
+    assert [(band.state, band.begin) for band in picture.bands if band.drive == "unit 1"][1:] == [("forward", forward)]
+    assert picture.late == 1
+    code, told = plot(str(path), "-o", str(tmp_path / "busy.png"))
+    assert code == 0
+    assert "The line was busy 1 time, so samples are missing there" in " ".join(told.split())
+
+
+def test_bits_of_a_word_are_lamps_with_their_names(recording: Recording, tmp_path: Path) -> None:
+    picture = of_recording(recording, "run")
+    words = recording.values[LABEL]["output_state"]
+    times = [time - picture.began for time in recording.times[LABEL]]
+    lamps = [band for band in picture.bands if band.lamp]
+    assert {band.drive for band in lamps} == {f"{LABEL} output_state RO1"}, "a bit that was never on has none"
+    assert {band.state for band in lamps} == {"on"}
+    for time, word in list(zip(times, words, strict=True))[:-1]:
+        assert any(band.begin <= time < band.end for band in lamps) == bool(int(word) & 0b100)
+    alone = of_recording(recording, "run", ["output_state"])
+    assert not alone.panels
+    for ending in ("png", "html"):
+        draw(alone, tmp_path / f"alone.{ending}")
+
+
+def test_an_axis_begins_at_zero_unless_the_values_are_far_from_it() -> None:
+    def curve(*values: float | None) -> Curve:
+        return Curve("x", [0.0] * len(values), values)
+
+    assert from_zero([curve(4.4, None, 5.5)])
+    assert from_zero([curve(9.0), curve(0.0, None)])
+    for kept in ([curve(536.0, 537.0)], [curve(-0.1, 5.0)], [curve(0.0)], [curve(None)], []):
+        assert not from_zero(kept)
 
 
 def test_curves_break_at_gaps(recording: Recording) -> None:
@@ -153,7 +206,7 @@ def test_the_command(file: Path, tmp_path: Path) -> None:
     target = tmp_path / "run.svg"
     code, told = plot(str(file), "-o", str(target))
     assert (code, target.exists()) == (0, True)
-    assert "3 curves in" in told.replace("\n", " ")
+    assert "2 curves and 1 bit in" in told.replace("\n", " ")
     assert "fan output_current [A]. --only" in told.replace("\n", " ")
     assert plot(str(file), "-o", str(target))[0] == 2, "it is there already"
     assert plot(str(file), "-o", str(target), "--force", "--only", "output_current")[0] == 0

@@ -80,6 +80,14 @@ def test_the_prompt_takes_bytes_and_names_asks_before_a_write_and_outlives_mista
 
 
 @no_pty
+def test_the_help_warns_that_the_unit_is_hex_and_each_echo_says_it_in_decimal() -> None:
+    """Who means unit 11 and writes 11 asks unit 17."""
+    assert "unit 11 is 0B" in " ".join(run("raw", "--help").stdout.split())
+    done = run("raw", typed="11 03 2100 0001\n0B 03 2100 0001\n", port="sim://11=gd350,17=gd350?clock=virtual")
+    asked = [line.strip() for line in done.stdout.splitlines() if line.endswith(": read 2100H")]
+    assert asked == ["unit 17: read 2100H", "unit 11: read 2100H"]
+
+
 def test_the_prompt_completes_names_and_keeps_its_history() -> None:
     with Conversation("--port", VIRTUAL, "--profile", "gd350", "raw", "--yes") as talk:
         talk.until("raw> ")

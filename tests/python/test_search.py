@@ -275,8 +275,20 @@ class TestTheCommand:
         lines = done.stdout.splitlines()
         assert lines[0].split() == ["unit", "settings", "family", "certainty", "problem"]
         assert lines[2].split() == ["12", "9600", "8N1", "vfd500", "by", "answers"]
-        assert lines[-1].startswith("4 units. Talk to the first: `drivebus --port /dev/line --baud 9600 --format 8N1")
+        told = " ".join(" ".join(lines[5:]).split())
+        start = "`drivebus --port /dev/line --baud 9600 --format 8N1"
+        assert told.startswith("by answers: it has no code, but answers and refuses the same registers as this family.")
+        assert "unverified:" not in told
+        assert "shared:" not in told
+        assert f"4 units. Talk to the first: {start} --unit 3 info`" in told
+        assert told.endswith(f"Unit 12 has to be named: {start} --unit 12 --profile vfd500 info`")
         assert done.stderr.startswith("Not tried: 30 other settings")
+
+    def test_the_first_is_named_too_if_only_its_answers_tell(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        done = self.scan(monkeypatch, Wire({12: ("vfd500", SLOW)}))
+        told = " ".join(done.stdout.split())
+        assert "--format 8N1 --unit 12 --profile vfd500 info`" in told
+        assert "has to be named" not in told
 
     def test_json_has_an_object_for_each(self, monkeypatch: pytest.MonkeyPatch) -> None:
         done = self.scan(monkeypatch, Wire(FOUR), before=("--json",))

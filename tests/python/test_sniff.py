@@ -294,8 +294,8 @@ def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> Non
         (["sniff", "sim://gd350", "--function", "GG", "--for", "0"], 2, '"GG" is not a function'),
         (["--profile", "3=", "sniff", "sim://gd350", "--for", "0"], 2, "is not a unit and its family"),
         (["sniff", "sim://gd350", "-w", "/nowhere/x.pcapng", "--for", "0"], 2, "/nowhere/x.pcapng cannot be written"),
-        (["decode", "/nowhere/x.pcapng"], 2, "cannot be read"),
-        (["replay", "/nowhere/x.pcapng"], 2, "cannot be read"),
+        (["decode", "/nowhere/x.pcapng"], 2, "cannot be read: there is no such file"),
+        (["replay", "/nowhere/x.pcapng"], 2, "cannot be read: there is no such file"),
     ],
 )
 def test_a_wrong_word_is_told_in_one_line(words: list[str], code: int, why: str) -> None:

@@ -256,6 +256,39 @@ class TestCommand:
             assert "above the 1 A that it was given" in aborted.stderr
             assert simulator.drive(1).state == "stopped"
 
+    def test_it_says_that_the_motor_still_turns_and_titles_its_picture(self, tmp_path: Path) -> None:
+        page = tmp_path / "step.html"
+        with drivebus.Simulator({1: "gd350"}, transport="pty") as simulator:
+            with drivebus.Bus(simulator) as bus:
+                drive = bus.drive(1)
+                drive.prepare_control()
+                drive.write({"P00.11": 1.0, "P00.12": 60.0})
+            words = ["try", "step", "--from", "5", "--to", "8", "--max-current", "40", "--for", "0.3", "--yes"]
+            done = self.run(simulator, *words, "--picture", str(page))
+            assert done.exit_code == 0, done.stderr
+            said = done.stdout.splitlines()[-1]
+            turning = r"unit 1: the stop is confirmed; the motor is still slowing down, [1-9]\.\d\d Hz"
+            assert re.fullmatch(turning, said), said
+            assert simulator.drive(1).writes()[-1][1:] == (0x2000, 5)
+        assert "unit 1, step 5 \\u2192 8 Hz" in page.read_text(encoding="utf-8")
+
+    @pytest.mark.parametrize(
+        ("words", "missing"),
+        [
+            (["step"], "--from, --to, --max-current and --for"),
+            (["ramp", "--from", "10", "--to", "5"], "--max-current and --for"),
+            (["sine", "--max-current", "5"], "--between, --period and --for"),
+        ],
+    )
+    def test_all_that_is_missing_is_named_at_once(self, words: list[str], missing: str) -> None:
+        done = CliRunner().invoke(cli, ["try", *words], prog_name="drivebus")
+        told = " ".join(done.stderr.split())
+        assert done.exit_code == 2
+        assert f"Missing options {missing}. An example: `drivebus try {words[0]} --" in told
+        example = told.partition("An example: `")[2].partition("`")[0]
+        shown = CliRunner().invoke(cli, ["try", words[0], "--help"], prog_name="drivebus")
+        assert f"Example: `{example}`" in " ".join(shown.stdout.split())
+
     def test_ctrl_c_stops_the_motor_and_says_what_it_does(self) -> None:
         from .conversation import Conversation
 

@@ -158,7 +158,7 @@ impl Batch {
                     (None, Some(error.into_value(py)))
                 }
             };
-            (sample.target, sent, ended, values, missing).into_pyobject(py)
+            (sample.target, sent, ended, sample.late, values, missing).into_pyobject(py)
         });
         PyList::new(py, samples.collect::<PyResult<Vec<Bound<'py, PyTuple>>>>()?)
     }

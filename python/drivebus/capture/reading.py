@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from drivebus import checks
 from drivebus.capture import links, pcapng, text
 from drivebus.capture.frame import Captured
 from drivebus.errors import NotAllowed
@@ -38,7 +39,7 @@ def read(path: str | os.PathLike[str]) -> Iterator[Captured]:
                 )
             data = stream.read(_MOST_TEXT + 1)
     except OSError as error:
-        raise NotAllowed(f"{name} cannot be read: {error.strerror or error}") from None
+        raise checks.unread(name, error) from None
     yield from _text(data, name)
 
 

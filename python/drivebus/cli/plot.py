@@ -59,7 +59,15 @@ def plot(
             }
         )
         return
-    session.out.say(f"{sum(map(len, picture.panels.values()))} curves in {picture_file}.")
+    bits = len({band.drive for band in picture.bands if band.lamp})
+    lamps = f" and {bits} bit{'' if bits == 1 else 's'}" if bits else ""
+    session.out.say(f"{sum(map(len, picture.panels.values()))} curves{lamps} in {picture_file}.")
+    if picture.late:
+        times = "1 time" if picture.late == 1 else f"{picture.late} times"
+        remark(
+            f"The line was busy {times}, so samples are missing there: a curve goes straight to the next "
+            "sample, and a band begins with it."
+        )
     if picture.left_out:
         remark(f"Left out, because they were 0 all the time: {', '.join(picture.left_out)}. --only NAME draws them.")
     if not recording.complete:

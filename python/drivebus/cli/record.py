@@ -117,9 +117,10 @@ class _Shown:
     def __rich__(self) -> Text:
         recorder, took = self._recorder, self._now() - self._began
         rate = recorder.rows / took if took else 0.0
+        late = f"{recorder.late} too late  " if recorder.late else ""
         text = Text(
             f"{printable(recorder.files[-1].name)}  {took:.0f} s  {recorder.rows} rows  {rate:.1f}/s  "
-            f"{_bytes(recorder.size)}  {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'}  Ctrl-C ends it"
+            f"{_bytes(recorder.size)}  {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'}  {late}Ctrl-C ends it"
         )
         return text if not recorder.problem else text.append(f"\nnot written now: {recorder.problem}", "yellow")
 
@@ -172,6 +173,7 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
         "rows": recorder.rows,
         "gaps": recorder.gaps,
         "missing": recorder.missing,
+        "late": recorder.late,
         "lost": recorder.lost,
     }
     if session.out.as_json:
@@ -179,13 +181,26 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
     else:
         gaps = f", {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'} ({recorder.missing} samples missing)"
         into = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
-        session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else ', no gap'}.")
+        whole = "" if recorder.late else ", no gap"
+        session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else whole}.")
+        if recorder.late:
+            _tell_late(recorder)
     if problem:
         remark(f"Error: {problem}")
         raise click.exceptions.Exit(1)
     if not recorder.rows and recorder.missing:
         remark(f"Error: no drive answered. `{session.doctor()}` looks at adapter and line.")
         raise click.exceptions.Exit(3)
+
+
+def _tell_late(recorder: drivebus.Recorder) -> None:
+    """Says that the line was too busy for what was asked, and what helps."""
+    taken, missing = recorder.rows + recorder.lost, recorder.missing
+    unanswered = f", {missing} without an answer" if missing else ""
+    remark(
+        f"{taken + missing + recorder.late} samples asked for, {taken} taken{unanswered}: {recorder.late} came too "
+        "late, the line was busy. A longer --interval, fewer registers or fewer programs on the line help."
+    )
 
 
 COMMANDS = [record]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -48,7 +49,12 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
             # Also what was found before Ctrl-C, or before the port was lost.
             if found and not out.as_json:
                 out.rows(["unit", "settings", "family", "certainty", "problem"], [_row(each) for each in found])
-                out.say(f"{len(found)} unit{'' if len(found) == 1 else 's'}. {_how(found[0], port)}")
+                for line in _meanings(found):
+                    out.say(line)
+                out.say(f"{len(found)} unit{'' if len(found) == 1 else 's'}. Talk to the first: {_how(found[0], port)}")
+                for located in found[1:]:
+                    if _named(located) is not None:
+                        out.say(f"Unit {located.unit} has to be named: {_how(located, port)}")
         left_out = "; ".join(searching.untried)
     if found:
         remark(f"Not tried: {left_out}.")
@@ -58,6 +64,14 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
         f"on a board, wired to a bare transceiver, needs --rs485. `{session.doctor()}` looks at adapter and line."
     )
     raise click.exceptions.Exit(3)
+
+
+_MEANINGS = {
+    "shared": "several families report this code.",
+    "by answers": "it has no code, but answers and refuses the same registers as this family. --profile names it.",
+    "unverified": "no document prints this code for this family, or its state does not fit. --profile names it.",
+}
+"""What the column `certainty` says, but for `certain` and `unknown`, which say it themselves."""
 
 
 class _Countdown(Bar):
@@ -111,6 +125,20 @@ def _record(located: drivebus.Located) -> dict[str, Any]:
     }
 
 
+def _meanings(found: Sequence[drivebus.Located]) -> Iterator[str]:
+    """A line for each certainty that says less than it seems to."""
+    for certainty, meaning in _MEANINGS.items():
+        if any(located.certainty == certainty for located in found):
+            yield f"{certainty}: {meaning}"
+
+
+def _named(located: drivebus.Located) -> str | None:
+    """The family that --profile has to name before the drive is used; None where it is known, or not to be told."""
+    known = located.identification
+    in_doubt = located.certainty in ("by answers", "unverified") and known is not None and len(known.candidates) == 1
+    return located.profile if in_doubt else None
+
+
 def _how(located: drivebus.Located, port: str) -> str:
     """What to type to talk to *located*."""
     words = ["--port", shlex.quote(port)]
@@ -120,4 +148,7 @@ def _how(located: drivebus.Located, port: str) -> str:
         words += ["--format", located.settings.format]
     if located.unit != 1:
         words += ["--unit", str(located.unit)]
-    return f"Talk to the first: `drivebus {' '.join(words)} info`"
+    family = _named(located)
+    if family is not None:
+        words += ["--profile", family]
+    return f"`drivebus {' '.join(words)} info`"

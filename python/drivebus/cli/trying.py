@@ -17,6 +17,7 @@ from rich.text import Text
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.csv_rows import CsvRows
+from drivebus.cli.missing import NamesAllMissing
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
 from drivebus.cli.types import Amperes, Hertz, Place, Seconds
@@ -88,32 +89,41 @@ _FROM = click.option("--from", "start", type=Hertz(0), required=True, metavar="H
 _TO = click.option("--to", type=Hertz(0), required=True, metavar="HZ", help="Then set this.")
 
 
-@trying.command()
+@trying.command(cls=NamesAllMissing)
 @_FROM
 @_TO
 @_trial
 def step(session: Session, start: float, to: float, **how: Any) -> None:
-    """Set another speed at once: rise time, overshoot, settling time, steady-state error, peak current."""
+    """Set another speed at once: rise time, overshoot, settling time, steady-state error, peak current.
+
+    Example: `drivebus try step --from 10 --to 30 --max-current 8 --for 10`.
+    """
     carry_out = functools.partial(drivebus.trial.step, start=start, to=to)
     _do(session, Change(start, to), _change(start, to), carry_out, **how)
 
 
-@trying.command()
+@trying.command(cls=NamesAllMissing)
 @_FROM
 @_TO
 @_trial
 def ramp(session: Session, start: float, to: float, **how: Any) -> None:
-    """Set another speed at once, and compare how fast the motor gets there with the ramp that the drive is set to."""
+    """Set another speed at once, and compare how fast the motor gets there with the ramp that the drive is set to.
+
+    Example: `drivebus try ramp --from 30 --to 10 --max-current 8 --for 10 --csv ramp.csv`.
+    """
     carry_out = functools.partial(drivebus.trial.ramp, start=start, to=to)
     _do(session, Change(start, to), _change(start, to), carry_out, **how)
 
 
-@trying.command()
+@trying.command(cls=NamesAllMissing)
 @click.option("--between", type=(Hertz(0), Hertz(0)), required=True, metavar="LOW HIGH", help="The bounds, in Hz.")
 @click.option("--period", type=Seconds(0.1, 3600), required=True, metavar="SECONDS", help="Once up and down.")
 @_trial
 def sine(session: Session, between: tuple[float, float], period: float, **how: Any) -> None:
-    """Move the speed up and down as a sine: gain and phase lag. The first period counts for nothing."""
+    """Move the speed up and down as a sine: gain and phase lag. The first period counts for nothing.
+
+    Example: `drivebus try sine --between 10 20 --period 4 --max-current 8 --for 20`.
+    """
     low, high = between
     what = f"moves it between {low:g} and {high:g} Hz, once up and down in {period:g} s"
     carry_out = functools.partial(drivebus.trial.sine, low=low, high=high, period=period)
@@ -122,6 +132,13 @@ def sine(session: Session, between: tuple[float, float], period: float, **how: A
 
 def _change(start: float, to: float) -> str:
     return f"lets it settle at {start:g} Hz, then sets {to:g} Hz"
+
+
+def _path(course: Change | Wave) -> str:
+    """The course in the title of a picture."""
+    if isinstance(course, Wave):
+        return f"{course.low:g} ↔ {course.high:g} Hz in {course.period:g} s"
+    return f"{course.start:g} → {course.to:g} Hz"
 
 
 def _do(
@@ -171,14 +188,14 @@ def _do(
                 )
         except KeyboardInterrupt as error:
             if hasattr(error, "add_note"):
-                for text in _now(session, drive):
+                for text in _now(session, drive, "stopping"):
                     error.add_note(text)
             raise
         _show(session, drive, trial)
     if picture is not None:
         from drivebus.plot import draw, of_samples
 
-        draw(of_samples(trial.samples, f"{session.called}: {trial.kind}, {what}"), picture)
+        draw(of_samples(trial.samples, f"{session.called}, {trial.kind} {_path(course)}"), picture)
     if trial.aborted is not None:
         remark(f"Error: the trial was aborted: {trial.aborted}")
         raise click.exceptions.Exit(1)
@@ -268,16 +285,16 @@ def _show(session: Session, drive: drivebus.Drive, trial: Trial) -> None:
     interval = trial.samples.interval
     told["samples"] = f"{len(trial.samples)}{'' if interval is None else f', one each {interval * 1000:.0f} ms'}"
     session.out.facts(told)
-    for text in _now(session, drive):
+    for text in _now(session, drive, "the stop is confirmed; the motor is still slowing down"):
         session.out.say(text)
 
 
-def _now(session: Session, drive: drivebus.Drive) -> Iterator[str]:
-    """What the motor does now, if the drive tells."""
+def _now(session: Session, drive: drivebus.Drive, turning: str) -> Iterator[str]:
+    """What the motor does now, if the drive tells; in the words *turning*, if it still turns."""
     with suppress(drivebus.DrivebusError):
         status = drive.status()
         where = "" if status.frequency is None else f", {status.frequency:.2f} Hz"
-        yield f"{session.called}: {f'stopping{where}' if status.state.running else status}"
+        yield f"{session.called}: {f'{turning}{where}' if status.state.running else status}"
 
 
 def _figures(trial: Trial) -> Iterator[tuple[str, str]]:

@@ -104,18 +104,27 @@ class Sample(Mapping[str | int, Value]):
         time: Unix time in seconds at which the first request left; of a missing sample, at which it was given up if it
             was not sent.
         answered: Unix time in seconds at which the last answer was complete, or was given up.
+        late: How many samples were due between the one before and this one, and were not taken, because the line was
+            busy. Each sample of a cycle has the same number.
         missing: The error that there was instead of an answer, or None. It is not raised.
     """
 
-    __slots__ = ("_values", "answered", "drive", "missing", "time", "unit")
+    __slots__ = ("_values", "answered", "drive", "late", "missing", "time", "unit")
 
     def __init__(
-        self, target: Target, time: float, answered: float, values: list[Value] | None, missing: DrivebusError | None
+        self,
+        target: Target,
+        time: float,
+        answered: float,
+        late: int,
+        values: list[Value] | None,
+        missing: DrivebusError | None,
     ) -> None:
         self.unit = target.unit
         self.drive: Any = target.drive
         self.time = time
         self.answered = answered
+        self.late = late
         self.missing = missing
         self._values = {} if values is None else dict(zip(target.names, values, strict=True))
 
@@ -209,7 +218,13 @@ class Batch(Sequence[Sample], Generic[Key]):
         return self._samples
 
     def _sample(
-        self, index: int, time: float, answered: float, values: list[Value] | None, missing: Exception | None
+        self,
+        index: int,
+        time: float,
+        answered: float,
+        late: int,
+        values: list[Value] | None,
+        missing: Exception | None,
     ) -> Sample:
         target = self._targets[index]
         if values is not None and target.plan is not None:
@@ -217,7 +232,7 @@ class Batch(Sequence[Sample], Generic[Key]):
         error = missing if isinstance(missing, DrivebusError) else None
         if isinstance(error, Refused) and target.profile is not None:
             error.name, error.meaning = target.profile.exception(error.code)
-        return Sample(target, time, answered, values, error)
+        return Sample(target, time, answered, late, values, error)
 
 
 class Polling(Generic[Key]):

@@ -8,8 +8,8 @@ from pathlib import Path
 import plotly.graph_objects
 import plotly.subplots
 
-from drivebus.plot.colours import CURVES, EVENTS, GAP, STATES
-from drivebus.plot.picture import Picture
+from drivebus.plot.colours import CURVES, EVENTS, GAP, band_colour
+from drivebus.plot.picture import Picture, from_zero
 
 __all__ = ["write"]
 
@@ -35,7 +35,8 @@ def write(picture: Picture, path: Path, _kind: str) -> None:
             )
             figure.add_trace(line, row=row, col=1)
             number += 1
-        figure.update_yaxes(title_text=escape(unit or "number"), row=row, col=1)
+        floor = "tozero" if from_zero(curves) else "normal"
+        figure.update_yaxes(title_text=escape(unit or "number"), rangemode=floor, row=row, col=1)
     _states(figure, picture, drives, rows)
     for _, begin, end in picture.gaps:
         figure.add_vrect(x0=begin, x1=end, fillcolor=GAP, opacity=0.6, line_width=0, layer="below")
@@ -68,7 +69,7 @@ def _states(figure: plotly.graph_objects.Figure, picture: Picture, drives: list[
             name=escape(band.state),
             legendgroup=band.state,
             showlegend=band.state not in named,
-            marker={"color": STATES.get(band.state, "#cccccc")},
+            marker={"color": band_colour(band.state, band.lamp)},
             hovertext=escape(f"{band.drive}: {band.state}"),
             hoverinfo="text",
         )

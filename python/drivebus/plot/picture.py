@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 from drivebus.errors import NotAllowed
 from drivebus.plot.thin import thinned
 from drivebus.record.reading import Event, Recording
 from drivebus.record.table import moment
 
-__all__ = ["Band", "Curve", "Mark", "Picture", "of_recording", "of_samples"]
+__all__ = ["Band", "Curve", "Mark", "Picture", "from_zero", "of_recording", "of_samples"]
 
 _FIRST = ["Hz", "rpm", "A", "V", "%"]
 """The units that stand above the others."""
+
+_NEAR_ZERO = 0.9
+"""A curve whose least value is below this share of its greatest is drawn from 0 on."""
 
 
 class Sampled(Protocol):
@@ -44,12 +47,21 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A state of a drive, from one moment to another, in seconds since the picture's beginning."""
+    """A state of a drive, or a bit that is on, from one moment to another, in seconds since the picture's beginning.
+
+    Attributes:
+        drive: What stands in front of it: the drive, or the bit.
+        state: What it is called.
+        begin: The moment of the first sample that shows it.
+        end: The moment of the first that does not.
+        lamp: Whether it is a bit.
+    """
 
     drive: str
     state: str
     begin: float
     end: float
+    lamp: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +81,11 @@ class Picture:
         title: Stands above it.
         began: Unix time in seconds of the moment 0.
         panels: Curves by their unit, in the order in which they are drawn under each other.
-        bands: States.
+        bands: States of drives, then bits of words.
         gaps: Where a drive was not heard: its name, and from when to when.
         marks: Faults and other events.
         left_out: Values that were 0 all the time.
+        late: How often samples were not taken because the line was busy.
     """
 
     title: str
@@ -82,6 +95,7 @@ class Picture:
     gaps: list[tuple[str, float, float]] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    late: int = 0
 
     @property
     def axis(self) -> str:
@@ -131,7 +145,11 @@ def of_recording(
         for event in recording.events
         if event.kind in ("fault", "fault cleared", "lost") and picture.began <= event.time <= until
     ]
-    if not picture.panels:
+    picture.bands.sort(key=lambda band: band.lamp)
+    late = [event for event in recording.events if event.kind == "late" and picture.began <= event.time <= until]
+    # All drives of a line are late at the same time.
+    picture.late = max((sum(event.drive == drive for event in late) for drive in recording.drives), default=0)
+    if not picture.panels and not any(band.lamp for band in picture.bands):
         raise NotAllowed(
             f"{title}: there is nothing to draw between these moments, or no value that was not 0 all the time"
         )
@@ -146,6 +164,12 @@ def of_samples(samples: Sampled, title: str) -> Picture:
         picture.panels.setdefault(samples.units.get(name, ""), []).append(Curve(name, samples.times, values))
     picture.panels = {unit: picture.panels[unit] for unit in sorted(picture.panels, key=_rank)}
     return picture
+
+
+def from_zero(curves: Sequence[Curve]) -> bool:
+    """Whether an axis for *curves* begins at 0: cut off, a small change would look like a large one."""
+    values = [value for curve in curves for value in curve.values if value is not None]
+    return bool(values) and 0 <= min(values) < _NEAR_ZERO * max(values)
 
 
 def _rank(unit: str) -> tuple[int, str]:
@@ -184,9 +208,24 @@ def _take(
             picture.left_out += [] if not shown else [prefix + title]
             continue
         name = title.partition(" [")[0]
+        if bits := recording.bits(drive, name):
+            for bit, meaning in bits.items():
+                lit = [(at, _lit(meaning, int(value))) for at, value in shown]
+                picture.bands += [
+                    replace(band, drive=f"{prefix}{name} {bit}", lamp=True)
+                    for band in _bands(drive, lit, [at - picture.began for at, _ in gaps])
+                ]
+            continue
         points_of = _with_gaps(shown, [at - picture.began for at, _ in gaps])
         curve = Curve(prefix + name, *thinned([at for at, _ in points_of], [value for _, value in points_of], points))
         picture.panels.setdefault(units[title], []).append(curve)
+
+
+def _lit(meaning: Mapping[str, Any], word: int) -> str:
+    """What a field of *word* says, by its mask and labels; empty where it is 0."""
+    mask = meaning["mask"]
+    value = (word & mask) // (mask & -mask) if mask else 0
+    return str(meaning["labels"].get(str(value), value)) if value else ""
 
 
 def _with_gaps(shown: Sequence[tuple[float, float]], gaps: Sequence[float]) -> list[tuple[float, float | None]]:

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from drivebus.plot.colours import CURVES, EVENTS, GAP, STATES
-from drivebus.plot.picture import Picture
+from drivebus.plot.colours import CURVES, EVENTS, GAP, band_colour
+from drivebus.plot.picture import Picture, from_zero
 
 __all__ = ["write"]
 
@@ -31,6 +31,8 @@ def write(picture: Picture, path: Path, kind: str) -> None:
             values = [float("nan") if value is None else value for value in curve.values]
             colour = CURVES[number % len(CURVES)]
             axis.plot(curve.times, values, color=colour, linewidth=1.0, label=_plain(curve.label))
+        if from_zero(curves):
+            axis.set_ylim(bottom=0)
         axis.set_ylabel(_plain(unit or "number"))
         axis.grid(visible=True, alpha=0.3)
         if len(curves) <= _MOST_NAMES:
@@ -63,10 +65,11 @@ def _events(axis: Axes, picture: Picture, named: bool) -> None:
 def _states(axis: Axes, picture: Picture, drives: list[str]) -> None:
     for band in picture.bands:
         row = len(drives) - 1 - drives.index(band.drive)
-        axis.barh(row, band.end - band.begin, left=band.begin, color=STATES.get(band.state, "#cccccc"), height=0.8)
+        colour = band_colour(band.state, band.lamp)
+        axis.barh(row, band.end - band.begin, left=band.begin, color=colour, height=0.8)
     axis.set_yticks(range(len(drives)), [_plain(drive) for drive in reversed(drives)], fontsize=7)
-    shown = list(dict.fromkeys(band.state for band in picture.bands))
-    names = [Patch(color=STATES.get(state, "#cccccc"), label=_plain(state)) for state in shown]
+    shown = dict.fromkeys((band.state, band.lamp) for band in picture.bands)
+    names = [Patch(color=band_colour(*each), label=_plain(each[0])) for each in shown]
     axis.legend(handles=names, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False)
 
 

@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivebus import checks
 from drivebus.errors import NotAllowed
 from drivebus.record.files import format_of
 from drivebus.record.table import FIXED, seconds_of
@@ -30,7 +31,7 @@ class Event:
     Attributes:
         time: Unix time in seconds.
         drive: Whose it is; empty of what is of no drive.
-        kind: `gap`, `back`, `fault`, `fault cleared`, `lost`, `recording` or `end`.
+        kind: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`, `recording` or `end`.
         text: What there is to say of it.
     """
 
@@ -65,6 +66,12 @@ class Recording:
     def units(self, drive: str) -> dict[str, str]:
         """The unit of each title of *drive*; empty of what has none."""
         return {title: title.rpartition(" [")[2][:-1] if title.endswith("]") else "" for title in self.values[drive]}
+
+    def bits(self, drive: str, name: str) -> Mapping[str, Mapping[str, Any]]:
+        """The fields of the register *name* of *drive*, each with its `mask` and its `labels`; empty for a number."""
+        drives = [each for each in self.about.get("drives", ()) if each.get("name") == drive]
+        found: Mapping[str, Any] = drives[0].get("registers", {}).get(name, {}).get("bits", {}) if drives else {}
+        return found
 
     def take(self, titles: Iterable[str], rows: Iterable[Cells], name: str) -> None:
         """Takes the *rows* of the file called *name*, which has columns of these *titles*.
@@ -173,6 +180,8 @@ def _parquet_rows(path: Path, name: str) -> _Rows:
 
     try:
         table = pyarrow.parquet.read_table(path)
+    except FileNotFoundError as error:
+        raise _unread(name, error) from None
     except (OSError, pyarrow.ArrowException) as error:
         raise NotAllowed(f"{name} is not a recording: {str(error).splitlines()[0]}") from None
     return table.column_names, iter(table.to_pylist())
@@ -183,7 +192,7 @@ _READERS = {"csv_file": _csv_rows, "json_lines": _json_rows, "sqlite": _sqlite_r
 
 def _unread(name: str, error: Exception) -> NotAllowed:
     if isinstance(error, OSError):
-        return NotAllowed(f"{name} cannot be read: {error.strerror or error}")
+        return checks.unread(name, error)
     return NotAllowed(f"{name} is not a recording: {error}")
 
 

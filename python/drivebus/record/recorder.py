@@ -48,8 +48,8 @@ class Recorder:
     The end of the name says the format: `.csv`, `.jsonl`, `.sqlite`, `.db` or `.parquet` (`pip install
     'drivebus[parquet]'`). All have the same columns: `time`, `drive`, `event`, `text`, `state`, and one for each
     register, with its unit: `output_current [A]`. A row without an `event` has values. Gaps and faults are rows of
-    their own: `gap`, `back`, `fault`, `fault cleared`, `lost`. The first row is the `recording`, whose text tells the
-    drives, lines, profiles and registers as JSON; the last is the `end`. A file without that was cut off.
+    their own: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`. The first row is the `recording`, whose text
+    tells the drives, lines, profiles and registers as JSON; the last is the `end`. A file without that was cut off.
 
     Nothing older than a second is lost if this program is killed. If the disk is full, a warning says so, rows are kept
     in memory (100 000 at most), and the file goes on when there is room.
@@ -75,6 +75,7 @@ class Recorder:
         rows: Rows with values that are in the files.
         gaps: Times at which a drive began to be missing.
         missing: Samples without values.
+        late: Samples that were due and were not taken, because the line was busy.
         lost: Rows that gave way because the file could not be written.
         problem: Why the file cannot be written now; empty if it can.
     """
@@ -139,6 +140,11 @@ class Recorder:
     def missing(self) -> int:
         """Samples without values so far."""
         return sum(witness.missing for witness in self._witnesses.values())
+
+    @property
+    def late(self) -> int:
+        """Samples that were due so far and were not taken, because the line was busy."""
+        return sum(witness.late for witness in self._witnesses.values())
 
     @property
     def size(self) -> int:
@@ -300,7 +306,8 @@ class Recorder:
         return sink
 
     def _end_row(self, goes_on: str = "") -> Row:
-        return Row(time(), "", "end", f"{self.rows} rows, {self.missing} samples missing{goes_on}")
+        counted = f"{self.rows} rows, {self.missing} samples missing, {self.late} too late"
+        return Row(time(), "", "end", f"{counted}{goes_on}")
 
     def _give_up(self) -> None:
         """No drive is polled: the file that was begun goes."""

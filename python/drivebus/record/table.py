@@ -164,7 +164,13 @@ def _as_text(value: Value | str | None, known: Description | None) -> str:
 
 def _about(drive: Recorded) -> dict[str, Any]:
     registers = {
-        name: {"label": row.label, "unit": row.unit, "address": row.address, "evidence": row.evidence}
+        name: {
+            "label": row.label,
+            "unit": row.unit,
+            "address": row.address,
+            "evidence": row.evidence,
+            **({"bits": _bits(drive.profile, name, row.bits)} if row.bits else {}),
+        }
         for name, row in drive.rows.items()
     }
     return {
@@ -173,4 +179,17 @@ def _about(drive: Recorded) -> dict[str, Any]:
         "line": drive.line,
         "profile": drive.profile.name,
         "registers": registers,
+    }
+
+
+def _bits(profile: Profile, name: str, fields: Mapping[str, Mapping[int, str]]) -> dict[str, dict[str, Any]]:
+    """What the bits of a word mean, so that the file says it without the profile: mask and labels of each field."""
+    dark = profile.fields(name, 0)
+    shown = [profile.fields(name, 1 << bit) for bit in range(16)]
+    return {
+        field: {
+            "mask": sum(1 << bit for bit, lit in enumerate(shown) if lit[field] != dark[field]),
+            "labels": {str(value): label for value, label in labels.items()},
+        }
+        for field, labels in fields.items()
     }

@@ -19,6 +19,8 @@ pub struct PollSample {
     pub sent: Instant,
     /// The last byte of the last answer, or when it was given up.
     pub ended: Instant,
+    /// How many beats were missed since the sample of the same target before it: the line was not free in time.
+    pub late: u64,
     /// Why there are no words.
     pub missing: Option<Box<CallError>>,
 }
@@ -120,7 +122,7 @@ mod tests {
     use super::*;
 
     fn sample(target: usize) -> PollSample {
-        PollSample { target, sent: Instant::ZERO, ended: Instant::ZERO, missing: None }
+        PollSample { target, sent: Instant::ZERO, ended: Instant::ZERO, late: 0, missing: None }
     }
 
     #[test]

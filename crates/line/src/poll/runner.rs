@@ -102,7 +102,8 @@ impl Runner {
     fn ask(&mut self, target: usize, samples: &Samples, give_up: &mut dyn FnMut() -> bool) -> Progress {
         let PollTarget { unit, reads } = &self.targets[target];
         self.words.clear();
-        let mut sample = PollSample { target, sent: Instant::ZERO, ended: Instant::ZERO, missing: None };
+        let late = self.schedule.missed();
+        let mut sample = PollSample { target, sent: Instant::ZERO, ended: Instant::ZERO, late, missing: None };
         let mut heard = true;
         for (index, &(address, count)) in reads.iter().enumerate() {
             let Ok(request) = Request::read(address, count) else {

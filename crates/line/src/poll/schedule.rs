@@ -39,6 +39,8 @@ pub(crate) struct Schedule {
     heard: bool,
     cycles: u64,
     late: u64,
+    /// How many beats were missed right before the cycle under way.
+    missed: u64,
 }
 
 impl Schedule {
@@ -55,6 +57,7 @@ impl Schedule {
             heard: false,
             cycles: 0,
             late: 0,
+            missed: 0,
         }
     }
 
@@ -72,7 +75,9 @@ impl Schedule {
                 return Step::Pause(due);
             }
             let current = now.as_nanos().saturating_sub(start.as_nanos()) / interval;
-            self.late += current.saturating_sub(self.beat);
+            let missed = current.saturating_sub(self.beat);
+            self.late += missed;
+            self.missed += missed;
             self.beat = self.beat.max(current);
         } else if now < self.not_before {
             return Step::Pause(self.not_before);
@@ -94,6 +99,7 @@ impl Schedule {
         self.beat += 1;
         self.cycles += 1;
         self.heard = false;
+        self.missed = 0;
     }
 
     /// Who is asked next, whenever that is.
@@ -104,6 +110,11 @@ impl Schedule {
     /// How many cycles are over.
     pub(crate) fn cycles(&self) -> u64 {
         self.cycles
+    }
+
+    /// How many beats were missed between the cycle under way and the one before it.
+    pub(crate) fn missed(&self) -> u64 {
+        self.missed
     }
 
     /// How many beats were missed.
@@ -172,6 +183,21 @@ mod tests {
             schedule.asked(at(5), heard);
         }
         assert_eq!(schedule.step(at(5)), Step::Ask(0));
+    }
+
+    #[test]
+    fn each_target_of_a_cycle_is_told_what_was_missed_before_it() {
+        let mut schedule = Schedule::new(2, Some(Duration::from_millis(100)));
+        let mut told = Vec::new();
+        // The beats of 100 and 200 are over at 350, that of 300 is not.
+        for now in [0, 350, 400] {
+            for target in 0..2 {
+                assert_eq!((schedule.step(at(now)), schedule.step(at(now))), (Step::Ask(target), Step::Ask(target)));
+                told.push(schedule.missed());
+                schedule.asked(at(now), true);
+            }
+        }
+        assert_eq!(told, [0, 0, 2, 2, 0, 0]);
     }
 
     #[test]

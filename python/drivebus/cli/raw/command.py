@@ -45,7 +45,8 @@ def raw(
 ) -> None:
     """Send any request and show the answer. Give unit and PDU in hexadecimal, without the CRC.
 
-    Example: `drivebus raw 01 03 21 00 00 01`. Without HEX, a prompt asks for one request after the other; `help` there
+    Example: `drivebus raw 01 03 21 00 00 01`. All numbers are hex, as in a frame, the unit too: unit 11 is 0B, and 11
+    is unit 17. Without HEX, a prompt asks for one request after the other; `help` there
     says what it takes. A script, or what is piped in, has the same lines. What writes asks first, in a script once for
     all of it.
 

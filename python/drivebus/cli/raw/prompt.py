@@ -15,12 +15,12 @@ from drivebus.cli.session import Declined, Session, tell
 __all__ = ["prompt"]
 
 _HELP = """\
-01 03 2100 0001         unit and PDU in hex; blanks are optional, the CRC is added
+01 03 2100 0001         unit and PDU in hex; blanks are optional, the CRC is added; unit 11 is 0B
 read output_current     the same by name, code or address; several names are asked in the fewest requests
 write P00.11=2.5        a parameter goes to RAM; what writes asks first
 … x10                   ten times, as fast as the line allows
 … x10 every 0.5         ten times, one each half second; Ctrl-C ends it
-unit 2                  whose names are meant from now on
+unit 2                  whose names are meant from now on; this number is decimal
 wait 0.5                waits half a second
 # …                     is not looked at
 help, ?                 this

@@ -71,6 +71,9 @@ def sim(
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other.
 
+    The line has the settings of the global options --baud and --format: `drivebus sim --units 1=vfd500 --baud 9600
+    --format 8N1`.
+
     While it serves them, `drivebus sim ctl` in another window trips, loads and unplugs them.
     """
     if context.invoked_subcommand is not None:
