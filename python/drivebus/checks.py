@@ -125,3 +125,8 @@ def closest(name: str, known: Iterable[str]) -> str:
     by_lower = {candidate.lower(): candidate for candidate in known}
     matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
     return f'; did you mean "{by_lower[matches[0]]}"?' if matches else ""
+
+
+def counted(count: int, what: str) -> str:
+    """How many there are of *what*, in words: `1 request`, `2 requests`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus import Exchange
@@ -153,6 +153,46 @@ def test_a_family_is_told_or_guessed_or_left_open() -> None:
     assert dict(exchange.values) == {0x4E20: 1, 0x4E21: 2, 0x4E22: 3, 0x4E23: 4}
 
 
+POLLED = ">01 03 30 00 00 06", "<01 03 0C" + " 00 00" * 6
+"""What six families mean the same by."""
+
+
+def test_a_guess_stays_where_the_next_register_does_not_tell_which_family_it_is() -> None:
+    # 2000H is a command of one of them and a setpoint of another; 9999H is refused, so nobody has it.
+    other = ">01 06 20 00 00 07", "<01 06 20 00 00 07", ">01 03 99 99 00 01", "<01 83 02"
+    told = ">01 03 20 01 00 01", "<01 03 02 00 00"
+    families = Families()
+    heard = list(exchanges_in(talk(*POLLED, *other, *POLLED, *told, *other, *POLLED), LINE, families))
+    assert [next(iter(each.values), None) for each in heard] == [
+        "running_frequency", 0x2000, None, "running_frequency", "set_frequency", "control_command", None,
+        "running_frequency",
+    ]  # fmt: skip
+    assert families.withdrawn() == []
+    profile = families.of(1)
+    assert profile is not None
+    assert (profile.name, families.is_guess(1)) == ("gd350", True)
+
+
+def test_a_guess_that_does_not_hold_is_taken_back_and_that_is_said(tmp_path: Path) -> None:
+    foreign = ">01 03 9A 00 00 01", "<01 03 02 00 01"
+    families = Families()
+    heard = list(exchanges_in(talk(*POLLED, *foreign, *POLLED), LINE, families))
+    assert [next(iter(each.values)) for each in heard] == ["running_frequency", 0x9A00, 0x3000]
+    assert families.withdrawn() == [(1, "gd350", 0x9A00)]
+    assert families.withdrawn() == [], "once"
+    path = tmp_path / "polled.pcapng"
+    with path.open("wb") as stream:
+        writer = Writer(stream, "COM3", "19200 8N1")
+        for each in talk(*POLLED, *foreign, *POLLED):
+            writer.write(each)
+    done = CliRunner().invoke(cli, ["decode", str(path)])
+    assert done.stderr.startswith("unit 1 was taken for gd350 by what it was asked. It was asked for 9A00H now, ")
+    assert "`--profile 1=FAMILY` names them." in done.stderr
+    named = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(path)])
+    assert [" running_frequency" in line for line in named.stdout.splitlines()] == [True, False, True]
+    assert named.stderr == ""
+
+
 def test_figures_count_and_say_what_is_wrong() -> None:
     figures = Figures(LINE.t35)
     silent = [">05 03 21 00 00 01"] * 30
@@ -284,6 +324,49 @@ def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> Non
     assert again.exit_code == 2
     assert "is there already; give another name, or --force" in again.stderr
     assert list(read(path)) == kept
+
+
+def sniffed(port: str, *words: str) -> Result:
+    return CliRunner().invoke(cli, ["--format", "8N1", "sniff", port, *words])
+
+
+def test_who_hears_nothing_is_shown_what_looks_at_that_line(simulator: Simulator) -> None:
+    done = sniffed(simulator.port, "--for", "0")
+    assert done.exit_code == 0
+    assert done.stderr.splitlines()[1] == "0 requests to 0 units, 0 answered."
+    assert f"`drivebus doctor {simulator.port} --format 8N1` looks at the line." in done.stderr
+
+
+def test_a_capture_without_a_frame_leaves_no_file(simulator: Simulator, tmp_path: Path) -> None:
+    path = tmp_path / "new.pcapng"
+    for port, code in (("/dev/nowhere", 5), (simulator.port, 0), (simulator.port, 0)):
+        done = sniffed(port, "-w", str(path), "--for", "0")
+        assert (done.exit_code, path.exists()) == (code, False), done.stderr
+    assert f"{path} was not written: there was nothing to write." in done.stderr
+
+
+def test_a_capture_without_a_frame_leaves_an_older_one_as_it_is(simulator: Simulator, capture: Path) -> None:
+    before = capture.read_bytes()
+    for port, code in (("/dev/nowhere", 5), (simulator.port, 0)):
+        assert sniffed(port, "-w", str(capture), "--force", "--for", "0").exit_code == code
+        assert capture.read_bytes() == before
+
+
+def test_a_capture_replaces_an_older_one_and_what_is_empty(simulator: Simulator, capture: Path, tmp_path: Path) -> None:
+    capture.write_bytes(capture.read_bytes() * 9)
+    empty = tmp_path / "empty.pcapng"
+    empty.touch()
+    for words in (["-w", str(capture), "--force"], ["-w", str(empty)]):
+        command = [sys.executable, "-m", "drivebus", "-f", "8N1", "sniff", simulator.port, "-n", "1", *words]
+        with (
+            drivebus.Bus(simulator.port, parity="N") as bus,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
+        ):
+            while process.poll() is None:
+                bus.read(1, 0x2100)
+            assert process.stderr is not None
+            assert "1 request to 1 unit, 1 answered." in process.stderr.read()
+        assert [each.asks for each in read(Path(words[1]))] == [True, False]
 
 
 @pytest.mark.parametrize(

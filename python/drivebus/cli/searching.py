@@ -12,7 +12,7 @@ from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 
 import drivebus
-from drivebus.cli.output import remark
+from drivebus.cli.output import counted, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session
 
 __all__ = ["search"]
@@ -48,7 +48,7 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
             # Also what was found before Ctrl-C, or before the port was lost.
             if found and not out.as_json:
                 out.rows(["unit", "settings", "family", "certainty", "problem"], [_row(each) for each in found])
-                out.say(f"{len(found)} unit{'' if len(found) == 1 else 's'}. {_how(found[0], port)}")
+                out.say(f"{counted(len(found), 'unit')}. {_how(found[0], port)}")
         left_out = "; ".join(searching.untried)
     if found:
         remark(f"Not tried: {left_out}.")
