@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -20,6 +21,7 @@ import drivebus
 from drivebus import Exchange
 from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
+from drivebus.cli.replay import Missing
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
 from drivebus.sniffer.replay import Replay
@@ -260,6 +262,75 @@ def test_a_capture_answers_as_its_units_did(capture: Path, transport: str) -> No
         assert ask("09 03 21 00 00 01") == "", "as in the capture"
         assert ask("01 03 30 00 00 01") == ""
     assert units.unknown == {frame("01 03 30 00 00 01")}
+
+
+def test_a_read_that_is_not_in_the_capture_is_answered_from_what_others_read_there() -> None:
+    exchanges = talk(
+        ">03 03 30 00 00 03", "<03 03 06 00 01 00 02 00 03", ">03 06 30 01 00 07", "<03 06 30 01 00 07",
+        ">03 03 30 00 00 03", "<03 03 06 00 04 00 07 00 06", ">03 03 40 00 00 01", "<03 83 02",
+        ">03 06 20 00 00 01", "<03 06 20 00 00 01", ">03 04 50 00 00 01", "<03 04 02 00 09",
+    )  # fmt: skip
+    told: list[bytes] = []
+    with Replay(exchanges_in(exchanges, LINE), LINE, told=told.append) as units, opened(units.port) as port:
+
+        def ask(body: str) -> str:
+            os.write(port, frame(body))
+            ready, _, _ = select.select([port], [], [], 0.3)
+            return os.read(port, 256)[:-2].hex(" ").upper() if ready else ""
+
+        part = "03 03 30 01 00 02"
+        assert ask(part) == "03 03 04 00 02 00 03", "nothing was asked yet: the first there is"
+        assert ask("03 03 30 00 00 03") == "03 03 06 00 01 00 02 00 03"
+        assert ask(part) == "03 03 04 00 02 00 03"
+        assert ask("03 06 30 01 00 07") == "03 06 30 01 00 07"
+        assert ask(part) == "03 03 04 00 07 00 03", "a write that was taken"
+        assert ask("03 03 30 00 00 03") == "03 03 06 00 04 00 07 00 06"
+        assert ask(part) == "03 03 04 00 07 00 06"
+        missing = [
+            "03 03 30 02 00 02", "01 03 30 00 00 01", "03 04 30 00 00 01", "03 03 20 00 00 01",
+            "03 03 50 00 00 01", "03 06 30 01 00 08", "03 10 30 00 00 01 02 00 01", "03 2B 0E 01 00",
+        ]  # fmt: skip
+        assert [ask(body) for body in missing] == [""] * len(missing)
+    assert told == [frame(body) for body in missing]
+    assert units.unknown == set(told)
+
+
+def test_what_a_replay_lacks_is_told_as_often_as_one_can_read() -> None:
+    said: list[str] = []
+    now = 100.0
+    missing = Missing(said.append, lambda: now)
+    asked = [frame(f"03 03 30 {address:02X} 00 01") for address in range(7)]
+    for request in [asked[0], asked[0], *asked]:
+        missing.take(request)
+    assert said == [f"not in the capture: unit 3, read 1 word at 30{address:02X}H" for address in range(5)]
+    said.clear()
+    now += 1.0
+    for request in [*asked, frame("03 10 20 00 00 02 04 00 01 00 02"), frame("03 2B 0E 01 00")]:
+        missing.take(request)
+    assert said == [
+        "not in the capture: unit 3, read 1 word at 3005H",
+        "not in the capture: unit 3, read 1 word at 3006H",
+        "not in the capture: unit 3, write 2 words at 2000H",
+        "not in the capture: unit 3, function 2BH",
+    ]
+    now += 10.0
+    missing.take(asked[0])
+    assert said[-1].endswith("3000H"), "it is still asked for"
+
+
+def test_the_command_says_what_its_capture_lacks(capture: Path) -> None:
+    command = [sys.executable, "-m", "drivebus", "-f", "8N1", "replay", str(capture)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        port = process.stdout.readline().strip()
+        assert process.stderr.readline().startswith("4 answers of ")
+        with opened(port) as descriptor:
+            os.write(descriptor, frame("01 03 30 04 00 01"))
+        assert process.stderr.readline() == "not in the capture: unit 1, read 1 word at 3004H\n"
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.readline().startswith(f"1 request is not in {capture} and got no answer: 01 03 30 04")
+    assert process.returncode == 0
 
 
 def test_a_program_gets_the_same_answers_from_its_capture(simulator: Simulator, tmp_path: Path) -> None:
