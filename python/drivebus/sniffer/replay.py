@@ -20,6 +20,7 @@ __all__ = ["Replay"]
 
 _LOOK_UP = 0.2
 _CHUNK = 4096
+_ECHO = 0x08
 
 
 class Replay:
@@ -60,6 +61,8 @@ class Replay:
         self._units = {exchange.request[0] for exchange in known if exchange.request and exchange.answer}
         if not self._units:
             raise NotAllowed("no request in the capture has an answer: there is nothing to replay")
+        # Who left an echo without an answer there leaves any.
+        self._silent = {request[0] for request in self._answers if request[1] == _ECHO} - self._units
         self._seen = Seen(known)
         # The number of the exchange that the replay has come to.
         self._now = -1
@@ -163,8 +166,10 @@ class Replay:
             at, answer = answers.popleft() if len(answers) > 1 else answers[0]
             self._now = max(self._now, at)
             return answer
-        if request[1] == 0x08 and request[0] in self._units:
+        if request[1] == _ECHO and request[0] in self._units:
             return request
+        if request[1] == _ECHO and request[0] in self._silent:
+            return None
         answer = self._seen.answer(request, self._now)
         if answer is None:
             self.unknown.add(request)
