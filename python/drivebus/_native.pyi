@@ -569,15 +569,21 @@ class Simulator:
         strict_silence: bool = False,
         link: str | os.PathLike[str] | None = None,
         fifo: int | None = None,
+        ear: bool = False,
+        ear_link: str | os.PathLike[str] | None = None,
     ) -> Simulator:
         """*transport*: `"pty"`, `"tcp"` (RTU over TCP on 127.0.0.1), or `"process"` (only by `Bus(simulator)`).
 
         *realtime* False needs `"process"`: the clock jumps to what happens next. *link* is a symbolic link that is kept
         leading to the pseudo-terminal. *fifo*: after how many characters a port hands them over; 8 if it is not said.
+        *ear*: whether there is a pseudo-terminal that overhears the line; *ear_link* leads to it, and asks for it.
         """
     @property
     def port(self) -> str:
         """A path, `socket://127.0.0.1:N`, or `sim:` and the units. A path changes with each `SimulatedLine.replug`."""
+    @property
+    def ear(self) -> str | None:
+        """The path of the pseudo-terminal that overhears the line."""
     def close(self) -> None: ...
     def now(self) -> float:
         """Seconds since the simulation began."""

@@ -144,3 +144,8 @@ def unread(name: object, error: OSError) -> NotAllowed:
     """What says that the file *name* cannot be read, and why."""
     reason = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror or error
     return NotAllowed(f"{name} cannot be read: {reason}")
+
+
+def counted(count: int, what: str) -> str:
+    """How many there are of *what*, in words: `1 request`, `2 requests`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"

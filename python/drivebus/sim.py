@@ -178,6 +178,9 @@ class Simulator:
             it `"auto"` means `"pty"`.
         fifo: After how many characters of an answer a pseudo-terminal or TCP port hands them over, 1..256, as the FIFO
             of a UART does; the end of an answer comes at once. 1: each character at its moment.
+        ear: True opens a second pseudo-terminal, at which another program overhears all that goes over the line, of
+            masters and of units, and can say nothing: for `drivebus.sniff` beside a master that is not drivebus. A path
+            is a symbolic link that leads there. Needs real time.
 
     Raises:
         NotAllowed: An argument is wrong, or a profile lacks what a simulation needs: the message says what, and where.
@@ -208,6 +211,7 @@ class Simulator:
         echo: bool = False,
         link: str | os.PathLike[str] | None = None,
         fifo: int = 8,
+        ear: bool | str | os.PathLike[str] = False,
     ) -> None:
         checks.one_of("transport", transport, ("auto", "pty", "tcp", "process"))
         checks.one_of("clock", clock, ("real", "virtual"))
@@ -219,6 +223,9 @@ class Simulator:
             link = checks.path("link", link)
             if transport not in ("auto", "pty"):
                 raise NotAllowed(f'link {checks.shown(link)} leads to a pseudo-terminal: it needs transport "pty"')
+        ear_link = None if isinstance(ear, bool) else checks.path("ear", ear)
+        if clock == "virtual" and ear is not False:
+            raise NotAllowed('an ear is for another program, which lives in real time: it needs clock "real"')
         self._profiles = _profiles_of(units)
         families = {unit: native_of(profile) for unit, profile in self._profiles.items()}
         checks.flag("strict_silence", strict_silence)
@@ -238,6 +245,8 @@ class Simulator:
                 strict_silence=strict_silence,
                 link=link,
                 fifo=fifo,
+                ear=ear is True,
+                ear_link=ear_link,
             )
 
         anything = SERVED if link is None else ("pty",)
@@ -249,6 +258,11 @@ class Simulator:
     def port(self) -> str:
         """The port that another program opens: a path or `socket://127.0.0.1:N`; `sim:…` in process."""
         return self._native.port
+
+    @property
+    def ear(self) -> str | None:
+        """The pseudo-terminal at which another program overhears the line; None where none was asked for."""
+        return self._native.ear
 
     @property
     def line(self) -> SimulatedLine:

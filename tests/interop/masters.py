@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ctypes
 
-from pymodbus.client import ModbusSerialClient
+from pymodbus import FramerType
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
 HELD = 0x300
@@ -59,3 +60,15 @@ def ask_by_libmodbus(port: str, count: int, library: str) -> None:
     finally:
         lib.modbus_close(context)
         lib.modbus_free(context)
+
+
+def ask_over_tcp(port: str, count: int, timeout: float = 2.0) -> None:
+    """*count* requests by pymodbus in RTU frames to *port*, which is `socket://HOST:PORT`."""
+    host, _, number = port.removeprefix("socket://").rpartition(":")
+    client = ModbusTcpClient(host, port=int(number), framer=FramerType.RTU, timeout=timeout, retries=0)
+    assert client.connect()  # type: ignore[no-untyped-call]
+    try:
+        for index in range(count):
+            client.read_holding_registers(37 * index % HELD, count=1 + index % 16, device_id=1)
+    finally:
+        client.close()  # type: ignore[no-untyped-call]

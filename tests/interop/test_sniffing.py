@@ -6,13 +6,17 @@ tools/measure_sniffing.py measures.
 
 from __future__ import annotations
 
+import json
 import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
 
 import pytest
-from tests.interop.masters import ask_by_libmodbus, ask_by_pymodbus
+from tests.interop.masters import ask_by_libmodbus, ask_by_pymodbus, ask_over_tcp
 from tests.interop.tap import Tap, tapped
 
 import drivebus
@@ -110,3 +114,47 @@ def test_on_a_hostile_line_no_pair_is_wrong(serve: Callable[..., str]) -> None:
         intact, paired, wrong = tap.score(heard)
     assert wrong == 0
     assert paired >= 0.98 * intact, (intact, paired)
+
+
+@pytest.mark.parametrize("transport", ["pty", "tcp"])
+def test_pymodbus_to_a_simulated_drive_heard_at_its_ear(transport: str) -> None:
+    with Simulator({1: "gd350"}, parity="N", transport=transport, ear=True) as simulator:
+        assert simulator.ear is not None
+        heard: list[Exchange] = []
+        with drivebus.Bus(simulator.ear, parity="N", read_only=True) as bus:
+            thread = threading.Thread(target=lambda: heard.extend(islice(drivebus.sniff(bus), COUNT)), name="ear")
+            thread.start()
+            if transport == "pty":
+                ask_by_pymodbus(simulator.port, COUNT)
+            else:
+                ask_over_tcp(simulator.port, COUNT)
+            thread.join(60)
+            assert not thread.is_alive(), f"only {len(heard)} exchanges were heard"
+        said = [(side, data) for _, side, data in simulator.line.trace()]
+    told = [frame for each in heard for frame in (("master", each.request), ("unit", each.answer))]
+    assert told == said, "every frame, in the order of the wire"
+    assert not any(isinstance(each.error, drivebus.NoAnswer | drivebus.BadAnswer) for each in heard)
+
+
+def test_the_command_hears_pymodbus_at_an_ear(tmp_path: Path) -> None:
+    port, ear = tmp_path / "line", tmp_path / "ear"
+    command = [sys.executable, "-m", "drivebus", "-f", "8N1"]
+    with subprocess.Popen(
+        [*command, "sim", "--link", port, "--ear", ear], stdout=subprocess.PIPE, text=True
+    ) as simulation:
+        assert simulation.stdout is not None
+        said = [simulation.stdout.readline().strip() for _ in range(3)]
+        assert said == [str(port), f"Leads to: {port.readlink()}", f"Ear: {ear}, leads to {ear.readlink()}"]
+        with subprocess.Popen(
+            [*command, "--json", "sniff", ear, "-n", "8"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as sniffer:
+            # It has begun to listen when it has heard something.
+            while sniffer.poll() is None:
+                ask_by_pymodbus(str(port), 4)
+            assert sniffer.stdout is not None
+            rows = [json.loads(line) for line in sniffer.stdout]
+        simulation.terminate()
+    assert sniffer.returncode == 0
+    # It may have come amid an exchange, of which it hears the rest.
+    assert (len(rows), rows[-1]["answered"] >= 6) == (9, True), rows
+    assert not ear.is_symlink()

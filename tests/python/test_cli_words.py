@@ -25,7 +25,9 @@ def run(*words: str, port: str | None = SIM) -> Result:
     ("words", "said"),
     [
         (["--unit", "abc", "status"], '"abc" is not a unit address; write 1-247, or a list such as 1-31,40'),
-        (["--unit", "0", "status"], 'units "0" are out of range, or the first is above the last; allowed is 1 to 247'),
+        (["--unit", "0", "status"], 'unit "0" is out of range; allowed is 1 to 247'),
+        (["--unit", "200-300", "status"], 'units "200-300" are out of range; allowed is 1 to 247'),
+        (["--unit", "9-3", "status"], 'units "9-3": the first is above the last; write 3-9'),
         (["--baud", "fast", "status"], '"fast" is not a whole number; allowed is 1 or more'),
         (["monitor", "--count", "0"], "0 is out of range; allowed is 1 or more"),
         (["monitor", "--interval", "often"], '"often" is not a number of seconds'),

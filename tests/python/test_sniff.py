@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import select
-import socket
 import subprocess
 import sys
 import threading
@@ -14,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus import Exchange
@@ -22,7 +20,6 @@ from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
-from drivebus.sniffer.replay import Replay
 
 LINE = drivebus.SerialFormat(parity="N")
 
@@ -153,6 +150,42 @@ def test_a_family_is_told_or_guessed_or_left_open() -> None:
     assert dict(exchange.values) == {0x4E20: 1, 0x4E21: 2, 0x4E22: 3, 0x4E23: 4}
 
 
+POLLED = ">01 03 30 00 00 06", "<01 03 0C" + " 00 00" * 6
+"""What six families mean the same by."""
+
+
+def test_a_guess_stays_where_the_next_register_does_not_tell_which_family_it_is() -> None:
+    # 2000H is a command of one of them and a setpoint of another; 9999H is refused, so nobody has it.
+    other = ">01 06 20 00 00 07", "<01 06 20 00 00 07", ">01 03 99 99 00 01", "<01 83 02"
+    told = ">01 03 20 01 00 01", "<01 03 02 00 00"
+    families = Families()
+    heard = list(exchanges_in(talk(*POLLED, *other, *POLLED, *told, *other, *POLLED), LINE, families))
+    assert [next(iter(each.values), None) for each in heard] == [
+        "running_frequency", 0x2000, None, "running_frequency", "set_frequency", "control_command", None,
+        "running_frequency",
+    ]  # fmt: skip
+    assert families.withdrawn() == []
+    profile = families.of(1)
+    assert profile is not None
+    assert (profile.name, families.is_guess(1)) == ("gd350", True)
+
+
+def test_a_guess_that_does_not_hold_is_taken_back_and_that_is_said(tmp_path: Path) -> None:
+    foreign = ">01 03 9A 00 00 01", "<01 03 02 00 01"
+    families = Families()
+    heard = list(exchanges_in(talk(*POLLED, *foreign, *POLLED), LINE, families))
+    assert [next(iter(each.values)) for each in heard] == ["running_frequency", 0x9A00, 0x3000]
+    assert families.withdrawn() == [(1, "gd350", 0x9A00)]
+    assert families.withdrawn() == [], "once"
+    path = kept(tmp_path / "polled.pcapng", *POLLED, *foreign, *POLLED)
+    done = CliRunner().invoke(cli, ["decode", str(path)])
+    assert done.stderr.startswith("unit 1 was taken for gd350 by what it was asked. It was asked for 9A00H now, ")
+    assert "`--profile 1=FAMILY` names them." in done.stderr
+    named = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(path)])
+    assert [" running_frequency" in line for line in named.stdout.splitlines()] == [True, False, True]
+    assert named.stderr == ""
+
+
 def test_figures_count_and_say_what_is_wrong() -> None:
     figures = Figures(LINE.t35)
     silent = [">05 03 21 00 00 01"] * 30
@@ -175,69 +208,22 @@ def test_figures_count_and_say_what_is_wrong() -> None:
     ]
 
 
-@pytest.fixture
-def capture(tmp_path: Path) -> Path:
-    path = tmp_path / "seen.pcapng"
-    exchanges = talk(
-        ">01 03 21 00 00 01", "<01 03 02 00 03", ">01 06 20 01 07 D0", "<01 06 20 01 07 D0",
-        ">01 03 21 00 00 01", "<01 03 02 00 01", ">09 03 21 00 00 01", ">01 03 99 99 00 01", "<01 83 02",
-    )  # fmt: skip
+def kept(path: Path, *bodies: str) -> Path:
+    """A capture of what `talk` makes of *bodies*."""
     with path.open("wb") as stream:
         writer = Writer(stream, "COM3", "19200 8N1")
-        for each in exchanges:
+        for each in talk(*bodies):
             writer.write(each)
     return path
 
 
-@contextmanager
-def opened(port: str) -> Iterator[int]:
-    """A descriptor of what *port* names."""
-    if port.startswith("socket://"):
-        host, _, number = port.removeprefix("socket://").rpartition(":")
-        with socket.create_connection((host, int(number))) as connection:
-            yield connection.fileno()
-    else:
-        descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
-        yield descriptor
-        os.close(descriptor)
-
-
-@pytest.mark.parametrize("transport", ["pty", "tcp"])
-def test_a_capture_answers_as_its_units_did(capture: Path, transport: str) -> None:
-    exchanges = list(exchanges_in(read(capture), LINE))
-    with Replay(exchanges, LINE, transport) as units, opened(units.port) as port:
-
-        def ask(body: str) -> str:
-            os.write(port, frame(body))
-            ready, _, _ = select.select([port], [], [], 0.3)
-            return os.read(port, 256)[:-2].hex(" ").upper() if ready else ""
-
-        state = [ask("01 03 21 00 00 01") for _ in range(3)]
-        assert state == ["01 03 02 00 03", "01 03 02 00 01", "01 03 02 00 01"], "in their order, then the last"
-        assert ask("01 06 20 01 07 D0") == "01 06 20 01 07 D0"
-        assert ask("01 03 99 99 00 01") == "01 83 02"
-        assert ask("01 08 00 00 AB CD") == "01 08 00 00 AB CD", "an echo is new each time"
-        assert ask("09 03 21 00 00 01") == "", "as in the capture"
-        assert ask("01 03 30 00 00 01") == ""
-    assert units.unknown == {frame("01 03 30 00 00 01")}
-
-
-def test_a_program_gets_the_same_answers_from_its_capture(simulator: Simulator, tmp_path: Path) -> None:
-    def program(port: str, trace: Path | None) -> list[object]:
-        with drivebus.Bus(port, parity="N", trace=trace, share="never") as bus:
-            drive = bus.drive(1)
-            drive.prepare_control()
-            with drive.running(hz=5.0):
-                drive.wait_for_speed(timeout=30)
-                seen = [drive.status().state, drive.monitor("running_frequency", "bus_voltage"), drive.setpoint]
-            drive.wait_until_stopped(timeout=30)
-            return [*seen, drive.status().state]
-
-    path = tmp_path / "job.pcapng"
-    first = program(simulator.port, path)
-    with Replay(exchanges_in(read(path), LINE), LINE) as units:
-        assert program(units.port, None) == first
-        assert not units.unknown
+@pytest.fixture
+def capture(tmp_path: Path) -> Path:
+    return kept(
+        tmp_path / "seen.pcapng",
+        ">01 03 21 00 00 01", "<01 03 02 00 03", ">01 06 20 01 07 D0", "<01 06 20 01 07 D0",
+        ">01 03 21 00 00 01", "<01 03 02 00 01", ">09 03 21 00 00 01", ">01 03 99 99 00 01", "<01 83 02",
+    )  # fmt: skip
 
 
 def test_the_commands_show_a_capture(capture: Path) -> None:
@@ -252,13 +238,6 @@ def test_the_commands_show_a_capture(capture: Path) -> None:
     rows = [json.loads(line) for line in as_json.stdout.splitlines()]
     assert rows[0]["values"] == {"0x2100": 3}
     assert [row.get("exit_code") for row in rows] == [None, None, None, 3, 4]
-
-
-def test_what_cannot_be_replayed_is_said(tmp_path: Path) -> None:
-    (tmp_path / "silent.txt").write_text("TX: 01 03 21 00 00 01 8E 36\n")
-    done = CliRunner().invoke(cli, ["replay", str(tmp_path / "silent.txt"), "--for", "0"])
-    assert (done.exit_code, done.stdout) == (2, "")
-    assert "no request in the capture has an answer" in done.stderr
 
 
 def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> None:
@@ -284,6 +263,49 @@ def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> Non
     assert again.exit_code == 2
     assert "is there already; give another name, or --force" in again.stderr
     assert list(read(path)) == kept
+
+
+def sniffed(port: str, *words: str) -> Result:
+    return CliRunner().invoke(cli, ["--format", "8N1", "sniff", port, *words])
+
+
+def test_who_hears_nothing_is_shown_what_looks_at_that_line(simulator: Simulator) -> None:
+    done = sniffed(simulator.port, "--for", "0")
+    assert done.exit_code == 0
+    assert done.stderr.splitlines()[1] == "0 requests to 0 units, 0 answered."
+    assert f"`drivebus doctor {simulator.port} --format 8N1` looks at the line." in done.stderr
+
+
+def test_a_capture_without_a_frame_leaves_no_file(simulator: Simulator, tmp_path: Path) -> None:
+    path = tmp_path / "new.pcapng"
+    for port, code in (("/dev/nowhere", 5), (simulator.port, 0), (simulator.port, 0)):
+        done = sniffed(port, "-w", str(path), "--for", "0")
+        assert (done.exit_code, path.exists()) == (code, False), done.stderr
+    assert f"{path} was not written: there was nothing to write." in done.stderr
+
+
+def test_a_capture_without_a_frame_leaves_an_older_one_as_it_is(simulator: Simulator, capture: Path) -> None:
+    before = capture.read_bytes()
+    for port, code in (("/dev/nowhere", 5), (simulator.port, 0)):
+        assert sniffed(port, "-w", str(capture), "--force", "--for", "0").exit_code == code
+        assert capture.read_bytes() == before
+
+
+def test_a_capture_replaces_an_older_one_and_what_is_empty(simulator: Simulator, capture: Path, tmp_path: Path) -> None:
+    capture.write_bytes(capture.read_bytes() * 9)
+    empty = tmp_path / "empty.pcapng"
+    empty.touch()
+    for words in (["-w", str(capture), "--force"], ["-w", str(empty)]):
+        command = [sys.executable, "-m", "drivebus", "-f", "8N1", "sniff", simulator.port, "-n", "1", *words]
+        with (
+            drivebus.Bus(simulator.port, parity="N") as bus,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
+        ):
+            while process.poll() is None:
+                bus.read(1, 0x2100)
+            assert process.stderr is not None
+            assert "1 request to 1 unit, 1 answered." in process.stderr.read()
+        assert [each.asks for each in read(Path(words[1]))] == [True, False]
 
 
 @pytest.mark.parametrize(

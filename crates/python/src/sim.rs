@@ -59,6 +59,30 @@ impl Server {
     }
 }
 
+/// What another program overhears the line by. It is there until this is dropped.
+struct Ear {
+    path: String,
+    #[cfg(target_os = "linux")]
+    _server: sim::EarServer,
+}
+
+impl Ear {
+    #[cfg(target_os = "linux")]
+    fn start(simulator: &sim::Simulator, link: Option<PathBuf>) -> PyResult<Self> {
+        let server = match link {
+            None => simulator.serve_ear(),
+            Some(link) => simulator.serve_ear_linked(&link),
+        };
+        let server = server.map_err(|error| sim_error("simulator (ear)", error))?;
+        Ok(Self { path: server.path().display().to_string(), _server: server })
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn start(_: &sim::Simulator, _: Option<PathBuf>) -> PyResult<Self> {
+        Err(not_allowed(String::from("an ear needs Linux; here, drivebus.sniff hears a bus of the same program")))
+    }
+}
+
 /// A simulated line with simulated drives.
 #[pyclass(frozen, module = "drivebus._native")]
 pub(crate) struct Simulator {
@@ -67,6 +91,10 @@ pub(crate) struct Simulator {
     port: Mutex<String>,
     /// `None` once it is closed.
     server: Mutex<Option<Server>>,
+    /// What its ear is called, if it has one.
+    heard_at: Option<String>,
+    /// `None` where it has none, and once it is closed.
+    ear: Mutex<Option<Ear>>,
 }
 
 impl Simulator {
@@ -97,8 +125,8 @@ impl Simulator {
 impl Simulator {
     #[new]
     #[pyo3(
-        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false, link = None, fifo = None),
-        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False, link=None, fifo=None)"
+        signature = (units, format, *, seed = 0, transport = "pty", realtime = true, strict_silence = false, link = None, fifo = None, ear = false, ear_link = None),
+        text_signature = "(units, format, *, seed=0, transport='pty', realtime=True, strict_silence=False, link=None, fifo=None, ear=False, ear_link=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
     fn new(
@@ -110,6 +138,8 @@ impl Simulator {
         strict_silence: bool,
         link: Option<PathBuf>,
         fifo: Option<usize>,
+        ear: bool,
+        ear_link: Option<PathBuf>,
     ) -> PyResult<Self> {
         let units = units_of(units)?;
         let mut options =
@@ -121,7 +151,9 @@ impl Simulator {
         let core = sim::Simulator::new(models, options).map_err(refuse)?;
         let server = Server::start(&core, transport, link)?;
         let port = Mutex::new(server.port(&core));
-        Ok(Self { core, port, server: Mutex::new(Some(server)) })
+        let ear = if ear || ear_link.is_some() { Some(Ear::start(&core, ear_link)?) } else { None };
+        let heard_at = ear.as_ref().map(|ear| ear.path.clone());
+        Ok(Self { core, port, server: Mutex::new(Some(server)), heard_at, ear: Mutex::new(ear) })
     }
 
     #[getter]
@@ -129,11 +161,17 @@ impl Simulator {
         self.current_port()
     }
 
+    #[getter]
+    fn ear(&self) -> Option<&str> {
+        self.heard_at.as_deref()
+    }
+
     fn close(&self, py: Python<'_>) {
         self.current_port();
         let server = self.server().take();
+        let ear = self.ear.lock().unwrap_or_else(PoisonError::into_inner).take();
         // Ending a server waits for its thread.
-        py.detach(|| drop(server));
+        py.detach(|| drop((server, ear)));
     }
 
     fn now(&self) -> f64 {

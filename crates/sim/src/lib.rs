@@ -8,6 +8,8 @@
 //! - a pseudo-terminal ([`Simulator::serve_pty`], on Linux), for every program that opens a serial port;
 //! - RTU over TCP on 127.0.0.1 ([`Simulator::serve_tcp`], on Unix).
 //!
+//! [`Simulator::serve_ear`] (on Linux) lets another program overhear what they say.
+//!
 //! [`SimulatedLine`] is the wire as a test bench sees it: counters, trace, faults on demand.
 //!
 //! ```
@@ -76,6 +78,8 @@
 
 mod clock;
 mod drive;
+#[cfg(target_os = "linux")]
+mod ear;
 mod error;
 mod faults;
 mod handles;
@@ -83,6 +87,8 @@ mod heard;
 #[cfg(unix)]
 mod lateness;
 mod line;
+#[cfg(target_os = "linux")]
+mod link;
 mod model;
 mod motor;
 mod outlet;
@@ -106,6 +112,8 @@ mod wire_handle;
 mod world;
 
 pub use drive::WriteRecord;
+#[cfg(target_os = "linux")]
+pub use ear::EarServer;
 pub use error::SimError;
 pub use faults::FaultKind;
 pub use handles::SimulatedDrive;

@@ -99,8 +99,7 @@ impl Port {
 
     /// What a program has set its side to: a speed, and for the rest what the units are set to.
     fn looked_up(&self, units: &SerialFormat) -> Option<SerialFormat> {
-        let speed = self.looks_up.and_then(|look_up| look_up(&self.descriptor))?;
-        SerialFormat::new(speed, units.data_bits(), units.parity(), units.stop_bits(), units.silence()).ok()
+        at_speed(self.looks_up.and_then(|look_up| look_up(&self.descriptor))?, units)
     }
 
     /// Hands `bytes` to the other side. What it has no room for is lost, as on a wire.
@@ -110,6 +109,11 @@ impl Port {
             Err(_) => Err(Disconnected),
         }
     }
+}
+
+/// What a port of that speed is set to: for the rest, what the units are.
+pub(crate) fn at_speed(speed: u32, units: &SerialFormat) -> Option<SerialFormat> {
+    SerialFormat::new(speed, units.data_bits(), units.parity(), units.stop_bits(), units.silence()).ok()
 }
 
 impl Drop for Port {

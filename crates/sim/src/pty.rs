@@ -1,18 +1,17 @@
 //! The simulated line behind a pseudo-terminal: what opens it takes it for a serial port. Linux only.
 
 use std::ffi::OsStr;
-use std::fs;
 use std::io;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::symlink;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
+use crate::link::Link;
 use crate::outlet::Outlet;
 use crate::pacer::{Next, Served, Serving};
 use crate::port::Port;
@@ -88,20 +87,7 @@ struct Pty {
 
 impl Pty {
     fn open(shared: &Arc<Shared>) -> io::Result<Self> {
-        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
-        grantpt(&ours)?;
-        unlockpt(&ours)?;
-        let path = PathBuf::from(OsStr::from_bytes(ptsname(&ours, Vec::new())?.as_bytes()));
-
-        let held = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
-        // Without this the terminal would echo requests back as answers and translate line ends.
-        let mut raw = tcgetattr(&held)?;
-        raw.make_raw();
-        // A program that never sets a speed is taken to fit.
-        raw.set_speed(shared.began_as.baud_rate())?;
-        tcsetattr(&held, OptionalActions::Now, &raw)?;
-        rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
-
+        let (ours, held, path) = open_raw(shared.began_as.baud_rate())?;
         let shared = Arc::clone(shared);
         let serving =
             Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, Some(speed), watch, key)?))))?;
@@ -109,8 +95,26 @@ impl Pty {
     }
 }
 
+/// A new pseudo-terminal at `baud_rate`: our side, which does not block, the programs' side, and its name.
+pub(crate) fn open_raw(baud_rate: u32) -> io::Result<(OwnedFd, OwnedFd, PathBuf)> {
+    let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    grantpt(&ours)?;
+    unlockpt(&ours)?;
+    let path = PathBuf::from(OsStr::from_bytes(ptsname(&ours, Vec::new())?.as_bytes()));
+
+    let held = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
+    // Without this the terminal would echo requests back as answers and translate line ends.
+    let mut raw = tcgetattr(&held)?;
+    raw.make_raw();
+    // A program that never sets a speed is taken to fit.
+    raw.set_speed(baud_rate)?;
+    tcsetattr(&held, OptionalActions::Now, &raw)?;
+    rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
+    Ok((ours, held, path))
+}
+
 /// The speed that the programs' side is set to. The system tells it at our side too.
-fn speed(ours: &OwnedFd) -> Option<u32> {
+pub(crate) fn speed(ours: &OwnedFd) -> Option<u32> {
     tcgetattr(ours).ok().map(|settings| settings.output_speed())
 }
 
@@ -124,48 +128,5 @@ impl Served for Ours {
 
     fn leave(&mut self, watch: &Watch) {
         self.0.leave(watch);
-    }
-}
-
-/// A symbolic link that leads to the pseudo-terminal, whatever its name is by now; removed when this is dropped.
-#[derive(Debug)]
-struct Link {
-    path: PathBuf,
-    /// The process that made it. It outlives a child that was forked meanwhile.
-    made_by: u32,
-}
-
-impl Link {
-    fn new(path: PathBuf, target: &Path) -> io::Result<Self> {
-        match fs::symlink_metadata(&path) {
-            Ok(there) if !there.is_symlink() => {
-                let message = format!("{} is there and is not a link; give another name", path.display());
-                return Err(io::Error::new(io::ErrorKind::AlreadyExists, message));
-            }
-            _ => {}
-        }
-        let link = Self { path, made_by: std::process::id() };
-        link.lead_to(target)?;
-        Ok(link)
-    }
-
-    /// In one step: there is no moment without the link.
-    fn lead_to(&self, target: &Path) -> io::Result<()> {
-        let mut name = self.path.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".{}", std::process::id()));
-        let new = self.path.with_file_name(name);
-        symlink(target, &new).and_then(|()| fs::rename(&new, &self.path)).map_err(|error| {
-            let _ = fs::remove_file(&new); // where it was made, and leads nowhere that anybody asked for
-            io::Error::new(error.kind(), format!("the link {} cannot be made: {error}", self.path.display()))
-        })
-    }
-}
-
-impl Drop for Link {
-    fn drop(&mut self) {
-        if self.made_by == std::process::id() {
-            // Somebody may have removed it already.
-            let _ = fs::remove_file(&self.path);
-        }
     }
 }

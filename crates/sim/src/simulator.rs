@@ -10,6 +10,8 @@ use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 
 use crate::clock::Clock;
 use crate::drive::{Drive, Drives, Map};
+#[cfg(target_os = "linux")]
+use crate::ear::Ears;
 use crate::error::SimError;
 use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
@@ -94,6 +96,9 @@ pub(crate) struct Shared {
     #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
     pub(crate) began_as: SerialFormat,
     pub(crate) outlets: Outlets,
+    /// What the wire is overheard by.
+    #[cfg(target_os = "linux")]
+    pub(crate) ears: Ears,
 }
 
 impl Shared {
@@ -111,6 +116,11 @@ impl Shared {
     pub(crate) fn present(&self) -> MutexGuard<'_, World> {
         let mut world = self.lock();
         let now = self.clock.now(world.now());
+        #[cfg(target_os = "linux")]
+        if world.wire.ears > 0 {
+            self.ears.advance(&mut world, now, self.fifo);
+            return world;
+        }
         world.advance(now);
         world
     }
@@ -168,6 +178,8 @@ impl Simulator {
             fifo: options.fifo.0,
             began_as: options.format,
             outlets: Outlets::default(),
+            #[cfg(target_os = "linux")]
+            ears: Ears::default(),
         };
         Ok(Self { shared: Arc::new(shared) })
     }
@@ -219,6 +231,34 @@ impl Simulator {
     pub fn serve_pty_linked(&self, link: &std::path::Path) -> Result<crate::PtyServer, SimError> {
         self.require_real_time()?;
         Ok(crate::PtyServer::start(Arc::clone(&self.shared), Some(link.to_owned()))?)
+    }
+
+    /// A pseudo-terminal that hands out all that goes over the wire, of masters and of units, and takes nothing: for a
+    /// program that listens to what another one says at a served port. It is there until it is dropped.
+    ///
+    /// Its speed counts as on [`serve_pty`](Self::serve_pty). While nobody has it open, and where a program does not read
+    /// what it has, what comes is lost to it, and the line goes on. Pulling the adapter out leaves it where it is. It
+    /// moves with the line: who overhears a line of this process hears it while somebody waits on that line.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::VirtualTime`], or [`SimError::Io`] if the system has no pseudo-terminal to give.
+    #[cfg(target_os = "linux")]
+    pub fn serve_ear(&self) -> Result<crate::EarServer, SimError> {
+        self.require_real_time()?;
+        Ok(crate::EarServer::start(Arc::clone(&self.shared), None)?)
+    }
+
+    /// As [`serve_ear`](Self::serve_ear), with a symbolic link that leads to it. A link that is there is replaced; it is
+    /// removed at the end.
+    ///
+    /// # Errors
+    ///
+    /// As above, and [`SimError::Io`] where `link` is something else than a link, or cannot be made.
+    #[cfg(target_os = "linux")]
+    pub fn serve_ear_linked(&self, link: &std::path::Path) -> Result<crate::EarServer, SimError> {
+        self.require_real_time()?;
+        Ok(crate::EarServer::start(Arc::clone(&self.shared), Some(link.to_owned()))?)
     }
 
     /// RTU over TCP on 127.0.0.1, at a port of the system's choosing. Served by a thread until it is dropped.

@@ -30,8 +30,8 @@ pub(crate) enum Step {
     /// What is in [`Wire::arrived`] came from a unit and arrived at every master: a character, or several of which
     /// nothing can tell that they did not come one by one.
     Delivered,
-    /// A character came back to the master that sent it.
-    Echoed(Listener, u8),
+    /// A character of a master's has passed: `back` says whether its adapter hands it back.
+    Passed { from: Listener, byte: u8, back: bool },
 }
 
 /// When the wire wants to be stepped next.
@@ -74,12 +74,13 @@ impl Talking {
     }
 }
 
-/// A character on its way back to its master.
+/// A character of a master's that it hears again, or an ear does.
 #[derive(Debug)]
 struct Echo {
-    to: Listener,
+    from: Listener,
     byte: u8,
     span: Span,
+    back: bool,
 }
 
 /// The wire.
@@ -110,6 +111,8 @@ pub(crate) struct Wire {
     pub(crate) plodding: bool,
     /// Whether masters hear what they send.
     pub(crate) echo: bool,
+    /// How many others do.
+    pub(crate) ears: usize,
     random: Random,
     pub(crate) spoil: Spoil,
     pub(crate) faults: Faults,
@@ -138,6 +141,7 @@ impl Wire {
             #[cfg(test)]
             plodding: false,
             echo: false,
+            ears: 0,
             random: Random::new(seed),
             spoil: Spoil::default(),
             faults: Faults::new(seed, format.t35()),
@@ -186,9 +190,10 @@ impl Wire {
         if sent_as.is_some() {
             self.heard.ignore();
         }
-        if self.echo {
+        if self.echo || self.ears > 0 {
+            let back = self.echo;
             let spans = (0..).map(|place| Span::of_char(&format, begin, place));
-            self.echoes.extend(bytes.iter().zip(spans).map(|(&byte, span)| Echo { to: from, byte, span }));
+            self.echoes.extend(bytes.iter().zip(spans).map(|(&byte, span)| Echo { from, byte, span, back }));
         }
         let end = Span::of_char(&format, begin, bytes.len() - 1).end;
         self.master = Some(match self.master {
@@ -232,6 +237,11 @@ impl Wire {
         self.arrived.iter().map(|byte| byte ^ self.random.next_nonzero()).collect()
     }
 
+    /// The same of one character.
+    pub(crate) fn misread_one(&mut self, byte: u8) -> u8 {
+        byte ^ self.random.next_nonzero()
+    }
+
     /// `unit` answers, from `begin` on, after whatever the wire was told to do to answers, and whatever `hits` it.
     ///
     /// Assumption: a unit answers in the order it was asked, so an answer that is held back holds back those after it. Only
@@ -270,7 +280,7 @@ impl Wire {
             if self.heard_until() == Some(next) {
                 self.end_frame();
             } else if self.echoes.front().is_some_and(|echo| echo.span.end == next) {
-                return self.echo_back();
+                return self.pass();
             } else if self.talking.is_some() {
                 return self.deliver(to);
             } else {
@@ -293,10 +303,11 @@ impl Wire {
         [frame, echo, character].into_iter().flatten().min_by_key(|wakeup| wakeup.at)
     }
 
-    /// Whether more characters follow those that have come, without a pause.
+    /// Whether more characters follow those that have come, without a pause; `by_all`: of masters too.
     #[cfg(unix)]
-    pub(crate) fn is_amid_run(&self) -> bool {
-        !self.echoes.is_empty() || self.talking.as_ref().is_some_and(|talking| talking.delivered > talking.from)
+    pub(crate) fn is_amid_run(&self, by_all: bool) -> bool {
+        (by_all && !self.echoes.is_empty())
+            || self.talking.as_ref().is_some_and(|talking| talking.delivered > talking.from)
     }
 
     /// When to call [`step`](Self::step) next, if `count` more characters at once are enough, or all before a pause.
@@ -425,11 +436,15 @@ impl Wire {
         false
     }
 
-    /// One character of a master's own comes back to it.
-    fn echo_back(&mut self) -> Option<Step> {
-        let Echo { to, byte, span } = self.echoes.pop_front()?;
+    /// One character of a master's own has passed.
+    fn pass(&mut self) -> Option<Step> {
+        let Echo { from, byte, span, back } = self.echoes.pop_front()?;
         let spoilt = self.answers.iter().any(|answer| answer.overlaps(span));
-        Some(Step::Echoed(to, if spoilt { garble(byte, &mut self.random, &mut self.collisions) } else { byte }))
+        // Who only overhears it adds nothing to what is counted.
+        let mut uncounted = 0;
+        let collisions = if back { &mut self.collisions } else { &mut uncounted };
+        let byte = if spoilt { garble(byte, &mut self.random, collisions) } else { byte };
+        Some(Step::Passed { from, byte, back })
     }
 }
 

@@ -37,6 +37,8 @@ pub(crate) struct World {
 struct Master {
     name: Listener,
     inbox: VecDeque<u8>,
+    /// Whether it hears masters too, and only listens. It is on the wire, and not at the adapter that is pulled out.
+    overhears: bool,
     /// What its side of the line is set to; `None`: whatever the units are.
     adapter: Option<SerialFormat>,
 }
@@ -98,11 +100,7 @@ impl World {
                         }
                     }
                 }
-                Step::Echoed(to, byte) => {
-                    if let Some(inbox) = self.inbox_mut(to) {
-                        put(inbox, &[byte]);
-                    }
-                }
+                Step::Passed { from, byte, back } => self.pass(from, byte, back),
                 Step::Heard { bytes, silent } => {
                     self.hear(&bytes, silent);
                     self.wire.spare_frame = bytes;
@@ -121,6 +119,20 @@ impl World {
         self.advance(at);
         let adapter = self.masters.iter().find(|master| master.name == from).and_then(|master| master.adapter);
         self.wire.transmit(from, self.now, bytes, misfit(adapter, self.wire.format()))
+    }
+
+    /// A character of `from` has passed; `back` says whether its adapter hands it back.
+    fn pass(&mut self, from: Listener, byte: u8, back: bool) {
+        let sender = self.masters.iter().find(|master| master.name == from).and_then(|master| master.adapter);
+        let sent_as = sender.unwrap_or(*self.wire.format());
+        for master in &mut self.masters {
+            if master.overhears {
+                let fits = misfit(master.adapter, &sent_as).is_none();
+                put(&mut master.inbox, &[if fits { byte } else { self.wire.misread_one(byte) }]);
+            } else if back && master.name == from {
+                put(&mut master.inbox, &[byte]);
+            }
+        }
     }
 
     /// Sets the adapter of the master `whose`.
@@ -178,13 +190,23 @@ impl World {
     pub(crate) fn attach(&mut self) -> Listener {
         let listener = Listener(self.next_listener);
         self.next_listener += 1;
-        self.masters.push(Master { name: listener, inbox: VecDeque::new(), adapter: None });
+        self.masters.push(Master { name: listener, inbox: VecDeque::new(), overhears: false, adapter: None });
+        listener
+    }
+
+    /// One begins to listen that hears masters too.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn attach_ear(&mut self) -> Listener {
+        let listener = self.attach();
+        self.masters.iter_mut().filter(|master| master.name == listener).for_each(|ear| ear.overhears = true);
+        self.wire.ears += 1;
         listener
     }
 
     /// A master is gone.
     pub(crate) fn detach(&mut self, listener: Listener) {
         self.masters.retain(|master| master.name != listener);
+        self.wire.ears = self.masters.iter().filter(|master| master.overhears).count();
     }
 
     /// Moves what arrived for `listener` into `buffer`; returns how much.
@@ -202,19 +224,18 @@ impl World {
     /// As [`take`](Self::take), but of a run of characters that still goes on only when there are `fifo` of them.
     #[cfg(unix)]
     pub(crate) fn hand_over(&mut self, listener: Listener, buffer: &mut [u8], fifo: usize) -> usize {
-        if self.wire.is_amid_run() && self.held(listener) < fifo { 0 } else { self.take(listener, buffer) }
+        let Some(master) = self.masters.iter().find(|master| master.name == listener) else { return 0 };
+        let amid_run = self.wire.is_amid_run(self.wire.echo || master.overhears);
+        if amid_run && master.inbox.len() < fifo { 0 } else { self.take(listener, buffer) }
     }
 
-    /// When to [`advance`](Self::advance) next for the sake of [`hand_over`](Self::hand_over).
+    /// When to [`advance`](Self::advance) next for the sake of [`hand_over`](Self::hand_over), to `listener` and to all
+    /// that overhear it.
     #[cfg(unix)]
     pub(crate) fn next_hand_over(&self, listener: Listener, fifo: usize) -> Option<Wakeup> {
-        self.wire.next_lump(fifo.saturating_sub(self.held(listener)).max(1))
-    }
-
-    /// How much `listener` has not taken.
-    #[cfg(unix)]
-    fn held(&self, listener: Listener) -> usize {
-        self.masters.iter().find(|master| master.name == listener).map_or(0, |master| master.inbox.len())
+        let held = self.masters.iter().filter(|master| master.overhears || master.name == listener);
+        let lump = |master: &Master| self.wire.next_lump(fifo.saturating_sub(master.inbox.len()).max(1));
+        held.filter_map(lump).min_by_key(|wakeup| wakeup.at)
     }
 
     fn inbox_mut(&mut self, listener: Listener) -> Option<&mut VecDeque<u8>> {
@@ -222,7 +243,7 @@ impl World {
     }
 
     fn empty_inboxes(&mut self) {
-        self.masters.iter_mut().for_each(|master| master.inbox.clear());
+        self.masters.iter_mut().filter(|master| !master.overhears).for_each(|master| master.inbox.clear());
     }
 
     /// Every unit heard `bytes`; the one they are for answers. What is no frame gets silence.

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import drivebus
 from drivebus.cli.names import complete_group
-from drivebus.cli.output import remark, show
+from drivebus.cli.output import counted, remark, show
 from drivebus.cli.session import Session, pass_session, yes_option
 from drivebus.cli.types import Place
 
@@ -136,7 +136,7 @@ def restore(
     if not plan.ok:
         failed = sum(item.failed for item in plan)
         were = "would not be" if dry_run else "was not" if failed == 1 else "were not"
-        remark(f"{failed} parameter{'' if failed == 1 else 's'} {were} restored: see above.")
+        remark(f"{counted(failed, 'parameter')} {were} restored: see above.")
         raise click.exceptions.Exit(1)
 
 
@@ -218,7 +218,7 @@ def _load(session: Session, file: Path) -> drivebus.Backup:
 
 
 def _question(drive: drivebus.Drive, codes: list[str]) -> str:
-    text = f"This writes {len(codes)} parameter{'' if len(codes) == 1 else 's'} to the drive's memory"
+    text = f"This writes {counted(len(codes), 'parameter')} to the drive's memory"
     sources = [item["code"] for item in drive.profile.control() if item["code"] in codes]
     if sources:
         text += (

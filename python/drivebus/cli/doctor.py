@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from rich.status import Status
 
 import drivebus
-from drivebus.cli.output import Output, show
+from drivebus.cli.output import Output, counted, show
 from drivebus.cli.session import EXIT_CODES, Session, parse_format, pass_session
 from drivebus.cli.types import Seconds, Whole
 
@@ -93,7 +93,7 @@ def doctor(
         out.say(f"Nothing is wrong. {took}")
         return
     counts = [(name, sum(finding.severity == name for finding in wrong)) for name in ("fault", "warning")]
-    found = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts if count)
+    found = ", ".join(counted(count, name) for name, count in counts if count)
     out.say(f"{found}. {took}")
     # The first of the worst.
     context.exit(_exit_code(max(wrong, key=lambda finding: finding.severity.rank)))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from typing import Any
 
 import drivebus
-from drivebus.cli.output import Output
+from drivebus.cli.output import Output, remark
 from drivebus.cli.session import exit_code
 from drivebus.line.trace import meaning
 from drivebus.sniffer import Exchange, Families
 
-__all__ = ["Filter", "Lines"]
+__all__ = ["Filter", "Lines", "taken_back"]
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ class Lines:
 
     def show(self, exchange: Exchange) -> None:
         """One exchange."""
+        for text in taken_back(self._families):
+            remark(text)
         if self._out.as_json:
             self._out.record(self._record(exchange))
             return
@@ -70,7 +73,7 @@ class Lines:
         error = exchange.error
         if exchange.request is None:
             return str(error)
-        profile = None if exchange.unit is None else self._families.of(exchange.unit)
+        profile = None if exchange.unit is None else self._families.of(exchange.unit, exchange.request)
         asked = meaning(exchange.request, True, None, profile)
         again = f" (again, {exchange.repeated})" if exchange.repeated else ""
         if isinstance(error, drivebus.Refused):
@@ -114,3 +117,12 @@ class Lines:
 def _after(exchange: Exchange) -> str:
     turnaround = exchange.turnaround
     return "" if not turnaround else f", after {turnaround * 1e3:.2f} ms"
+
+
+def taken_back(families: Families) -> Iterator[str]:
+    """What is to be said of guesses that did not hold."""
+    for unit, name, address in families.withdrawn():
+        yield (
+            f"unit {unit} was taken for {name} by what it was asked. It was asked for {address:04X}H now, which does "
+            f"not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
+        )

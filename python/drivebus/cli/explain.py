@@ -10,6 +10,7 @@ import click
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.crew import each_drive
+from drivebus.cli.output import counted
 from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
@@ -104,7 +105,7 @@ def list_(session: Session, group: str | None) -> None:
     if not chosen and wanted not in _ALWAYS:
         known = ", ".join([*_ALWAYS, *_groups(rows)])
         raise drivebus.NotAllowed(f'{profile.name} has no group "{group}"; it has {known}')
-    session.out.say(f"{profile.title}, {group}: {_counted(len(chosen), 'row')}")
+    session.out.say(f"{profile.title}, {group}: {counted(len(chosen), 'row')}")
     session.out.rows(
         ["name", "code", "address", "unit", "range", "access", "label"],
         [
@@ -127,16 +128,12 @@ def _show_groups(session: Session, profile: drivebus.Profile, rows: list[drivebu
         listed.append(
             [name, len(members), ", ".join(row.label for row in members[:3]) + (", …" if members[3:] else "")]
         )
-    session.out.say(f"{profile.title}: {_counted(len(rows), 'name')}; `drivebus list GROUP` shows those of a group")
+    session.out.say(f"{profile.title}: {counted(len(rows), 'name')}; `drivebus list GROUP` shows those of a group")
     session.out.rows(["group", "names", "such as"], listed)
 
 
 def _groups(rows: list[drivebus.Description]) -> list[str]:
     return list(dict.fromkeys(row.group for row in rows if row.group))
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _address(row: drivebus.Description) -> str | None:

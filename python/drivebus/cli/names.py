@@ -107,10 +107,12 @@ def parse_units(text: str) -> list[int]:
         if match is None:
             raise click.UsageError(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
         first, last = int(match[1]), int(match[2] or match[1])
-        if not 1 <= first <= last <= 247:
-            raise click.UsageError(
-                f'units "{part.strip()}" are out of range, or the first is above the last; allowed is 1 to 247'
-            )
+        if not (1 <= first <= 247 and 1 <= last <= 247):
+            which = "unit" if match[2] is None else "units"
+            are = "is" if match[2] is None else "are"
+            raise click.UsageError(f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247')
+        if first > last:
+            raise click.UsageError(f'units "{part.strip()}": the first is above the last; write {last}-{first}')
         units.extend(range(first, last + 1))
     return units
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-__all__ = ["Output", "about", "laid_out", "plain", "printable", "remark", "show"]
+__all__ = ["Output", "about", "counted", "laid_out", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -300,6 +300,11 @@ def remark(text: str = "") -> None:
             if _is_coloured() and word in shown[: len(_ABOUT.get()) + len(word)]:
                 shown = shown.replace(word, click.style(word, fg=colour, bold=True), 1)
     click.echo(shown, err=True)
+
+
+def counted(count: int, what: str) -> str:
+    """How many there are of *what*, in words: `1 unit`, `2 units`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def laid_out(text: str) -> str:

@@ -11,7 +11,7 @@ from rich.progress import Progress
 import drivebus
 from drivebus.cli import names, rules, searching
 from drivebus.cli.crew import each_drive
-from drivebus.cli.output import Output, remark
+from drivebus.cli.output import Output, counted, remark
 from drivebus.cli.session import Session, exit_code, pass_session, tell
 from drivebus.cli.types import Seconds
 
@@ -69,7 +69,7 @@ def scan(context: click.Context, session: Session, units: str, timeout: float | 
             progress.advance(task)
         took = bus.now() - began
     if count:
-        units_found = f"{count} unit{'' if count == 1 else 's'}"
+        units_found = counted(count, "unit")
         session.out.say(f"{units_found}, {len(wanted) - count} silent, {took:.0f} s")
     else:
         remark(

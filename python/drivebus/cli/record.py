@@ -16,7 +16,7 @@ from rich.text import Text
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.lines import opened_lines
-from drivebus.cli.output import printable, remark
+from drivebus.cli.output import counted, printable, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.types import Place, Seconds, Size, Whole
 from drivebus.record.files import format_of
@@ -87,7 +87,7 @@ def record(
         began = now()
         shown = _Shown(recorder, now)
         if not out.as_json and not out.live:
-            remark(f"Recording {len(drives)} drive{'' if len(drives) == 1 else 's'} into {target}. Ctrl-C ends it.")
+            remark(f"Recording {counted(len(drives), 'drive')} into {target}. Ctrl-C ends it.")
         try:
             with _ended_by_signals(), ExitStack() as live:
                 if out.live:
@@ -120,7 +120,7 @@ class _Shown:
         late = f"{recorder.late} too late  " if recorder.late else ""
         text = Text(
             f"{printable(recorder.files[-1].name)}  {took:.0f} s  {recorder.rows} rows  {rate:.1f}/s  "
-            f"{_bytes(recorder.size)}  {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'}  {late}Ctrl-C ends it"
+            f"{_bytes(recorder.size)}  {counted(recorder.gaps, 'gap')}  {late}Ctrl-C ends it"
         )
         return text if not recorder.problem else text.append(f"\nnot written now: {recorder.problem}", "yellow")
 
@@ -179,7 +179,7 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
     if session.out.as_json:
         session.out.record(told)
     else:
-        gaps = f", {recorder.gaps} gap{'' if recorder.gaps == 1 else 's'} ({recorder.missing} samples missing)"
+        gaps = f", {counted(recorder.gaps, 'gap')} ({recorder.missing} samples missing)"
         into = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
         whole = "" if recorder.late else ", no gap"
         session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else whole}.")

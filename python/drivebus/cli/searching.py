@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 
 import drivebus
-from drivebus.cli.output import remark
+from drivebus.cli.output import counted, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session
 
 __all__ = ["search"]
@@ -51,7 +51,7 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
                 out.rows(["unit", "settings", "family", "certainty", "problem"], [_row(each) for each in found])
                 for line in _meanings(found):
                     out.say(line)
-                out.say(f"{len(found)} unit{'' if len(found) == 1 else 's'}. Talk to the first: {_how(found[0], port)}")
+                out.say(f"{counted(len(found), 'unit')}. Talk to the first: {_how(found[0], port)}")
                 for located in found[1:]:
                     if _named(located) is not None:
                         out.say(f"Unit {located.unit} has to be named: {_how(located, port)}")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import io
-import sys
 from contextlib import ExitStack, closing, nullcontext
-from pathlib import Path
-from typing import BinaryIO
+from dataclasses import replace
 
 import click
 from click.core import ParameterSource
 from rich.live import Live
 
 import drivebus
-from drivebus.capture import Captured, Writer
+from drivebus.capture import Captured
 from drivebus.cli.exchanges import Filter, Lines
+from drivebus.cli.kept import Kept
 from drivebus.cli.names import parse_families
-from drivebus.cli.output import remark
+from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.sniff_table import SniffTable
 from drivebus.cli.types import Place, Seconds, Whole
@@ -78,12 +76,11 @@ def sniff(
     figures = Figures(line.t35)
     screen = SniffTable(port, families, figures) if table and out.live else None
     lines = Lines(out, families)
-    seen, wrote = 0, False
+    seen, settings = 0, f"{session.baud} {bits}{parity}{stop}"
     with ExitStack() as opened:
-        writer = None
+        kept = None
         if target is not None:
-            stream = opened.enter_context(_opened(target, force))
-            writer, wrote = Writer(stream, port, f"{session.baud} {bits}{parity}{stop}", link), True
+            kept = opened.enter_context(Kept(target, force, port, settings, link))
         heard = drivebus.sniff(
             port,
             baudrate=session.baud,
@@ -99,12 +96,12 @@ def sniff(
         )
         quiet = target == "-" or (table and live is not None)
         if not out.as_json and live is None:
-            remark(f"Listening on {port}, {session.baud} {bits}{parity}{stop}. Ctrl-C ends it.")
+            remark(f"Listening on {port}, {settings}. Ctrl-C ends it.")
         try:
             for exchange in heard:
                 figures.take(exchange)
-                if writer is not None:
-                    _keep(writer, exchange, line.char_time)
+                if kept is not None:
+                    _keep(kept, exchange, line.char_time)
                 if not shown.lets_pass(exchange):
                     continue
                 seen += 1
@@ -116,7 +113,7 @@ def sniff(
                     break
         except KeyboardInterrupt:
             pass
-    _told(session, figures, target if wrote else None)
+    _told(replace(session, port=port), figures, target, kept)
 
 
 def _units(context: click.Context, session: Session) -> frozenset[int]:
@@ -136,29 +133,18 @@ def _function(text: str) -> int:
     return function
 
 
-def _opened(target: str, force: bool) -> BinaryIO:
-    if target == "-":
-        return io.BufferedWriter(io.FileIO(sys.stdout.fileno(), "wb", closefd=False))
-    try:
-        return Path(target).open("wb" if force else "xb")
-    except FileExistsError:
-        raise click.UsageError(f"{target} is there already; give another name, or --force") from None
-    except OSError as error:
-        raise drivebus.NotAllowed(f"{target} cannot be written: {error.strerror}; nothing was opened") from None
-
-
-def _keep(writer: Writer, exchange: Exchange, char_time: float) -> None:
+def _keep(kept: Kept, exchange: Exchange, char_time: float) -> None:
     """Writes what was heard of *exchange*, each frame with the moment of its end."""
     if exchange.request is not None:
-        writer.write(Captured(exchange.time + char_time * len(exchange.request), exchange.request, True))
+        kept.write(Captured(exchange.time + char_time * len(exchange.request), exchange.request, True))
     if exchange.answer is not None:
-        writer.write(Captured(exchange.answered or exchange.time, exchange.answer, False))
+        kept.write(Captured(exchange.answered or exchange.time, exchange.answer, False))
     elif exchange.error is not None and exchange.error.raw:
         raw = exchange.error.raw
-        writer.write(Captured(exchange.answered or exchange.time + char_time * len(raw), raw, None))
+        kept.write(Captured(exchange.answered or exchange.time + char_time * len(raw), raw, None))
 
 
-def _told(session: Session, figures: Figures, target: str | None) -> None:
+def _told(session: Session, figures: Figures, target: str | None, kept: Kept | None) -> None:
     """Says what was heard, and what it means."""
     asked = sum(unit.requests for unit in figures.units.values())
     answered = sum(unit.answers for unit in figures.units.values())
@@ -167,7 +153,7 @@ def _told(session: Session, figures: Figures, target: str | None) -> None:
             {"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": list(figures.hints())}
         )
     else:
-        remark(f"{asked} requests to {len(figures.units)} units, {answered} answered.")
+        remark(f"{counted(asked, 'request')} to {counted(len(figures.units), 'unit')}, {answered} answered.")
         for hint in figures.hints():
             remark(f"- {hint}")
     if not figures.exchanges:
@@ -175,7 +161,9 @@ def _told(session: Session, figures: Figures, target: str | None) -> None:
             "Nothing was heard: nobody speaks there, the wires are off or crossed, or the adapter only hears itself. "
             f"`{session.doctor()}` looks at the line."
         )
-    if target not in (None, "-"):
+    if kept is not None and kept.is_empty:
+        remark(f"{target} was not written: there was nothing to write.")
+    elif target not in (None, "-"):
         remark(f"Wireshark opens {target}; with `-o mbrtu.tcp.port:502` it tells a write from its answer.")
 
 

@@ -25,8 +25,10 @@ _LEAST = 3
 class Families:
     """The families of the units on a line that others use.
 
-    A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed where
-    all registers that it is asked for stand in one profile, or in some that mean the same by them; a guess says so.
+    A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed: any
+    that has all registers that it is asked for and does not refuse. Where several have them, names are those on which
+    they agree, so a guess stays where the next request brings a register on which they differ. Where no family has all
+    of them any more, it is taken back; see `withdrawn`.
 
     Args:
         given: A profile for each unit by its address, one for all, or None.
@@ -44,11 +46,19 @@ class Families:
             self._all = None if given is None else Profile.find(given)
         self._told: dict[int, Profile] = {}
         self._asked: dict[int, set[int]] = {}
-        self._guessed: dict[int, Profile | None] = {}
+        self._fitting: dict[int, tuple[Profile, ...]] = {}
+        self._agreed: dict[tuple[int, int, int], bool] = {}
+        self._withdrawn: list[tuple[int, str, int]] = []
 
-    def of(self, unit: int) -> Profile | None:
-        """The profile of *unit*, as far as it is known or guessed."""
-        return self._given.get(unit) or self._all or self._told.get(unit) or self._guess(unit)
+    def of(self, unit: int, request: bytes | None = None) -> Profile | None:
+        """The profile of *unit*, as far as it is known or guessed; a guess only where it tells what *request* means."""
+        known = self._given.get(unit) or self._all or self._told.get(unit)
+        if known is not None:
+            return known
+        fitting = self._fitting.get(unit, ())
+        if not fitting or (request is not None and not self._agree(fitting, request)):
+            return None
+        return fitting[0]
 
     def is_guess(self, unit: int) -> bool:
         """Whether nobody has said what *unit* is, and it has not told."""
@@ -64,10 +74,22 @@ class Families:
             names = shipped(dict.fromkeys(row["family"] for row in listed_at(address, word) if row["verified"]))
             if len(names) == 1:
                 self._told[unit] = Profile.builtin(names[0])
+        if answer is not None and answer[1] & 0x80:
+            # What it refuses it may not have.
+            return
         asked = self._asked.setdefault(unit, set())
-        if not asked.issuperset(range(first, first + count)):
-            asked.update(range(first, first + count))
-            self._guessed.pop(unit, None)
+        new = set(range(first, first + count)) - asked
+        if new:
+            asked |= new
+            self._guess(unit, new)
+
+    def withdrawn(self) -> list[tuple[int, str, int]]:
+        """Guesses that were taken back since this was last asked.
+
+        Each is a unit, the name of the family that it was taken for, and the address that does not fit.
+        """
+        taken_back, self._withdrawn = self._withdrawn, []
+        return taken_back
 
     def values(self, request: bytes, answer: bytes | None) -> dict[str | int, Value]:
         """What *request* wrote or its *answer* carries: by names where the family is known, otherwise by addresses."""
@@ -76,7 +98,7 @@ class Families:
             words = carried(answer)
         if place is None or not words:
             return {}
-        profile, first, found = self.of(request[0]), place[0], dict[str | int, Value]()
+        profile, first, found = self.of(request[0], request), place[0], dict[str | int, Value]()
         at = 0
         while at < len(words):
             name = None if profile is None else profile.name_at(profile.plain_address(first + at))
@@ -93,16 +115,33 @@ class Families:
             at += count
         return found
 
-    def _guess(self, unit: int) -> Profile | None:
-        asked = self._asked.get(unit, set())
-        if unit not in self._guessed:
-            able = [Profile.builtin(name) for name in profiles()] if len(asked) >= _LEAST else []
-            meant = {profile.name: _meant(profile, asked) for profile in able}
-            fitting = [profile for profile in able if None not in meant[profile.name]]
-            # Sisters share registers: where they mean the same by all of these, it does not matter which it is.
-            agree = len({meant[profile.name] for profile in fitting}) == 1
-            self._guessed[unit] = fitting[0] if agree else None
-        return self._guessed[unit]
+    def _guess(self, unit: int, new: set[int]) -> None:
+        """Says what *unit* may be, which was asked for *new* addresses."""
+        asked, before = self._asked[unit], self._fitting.get(unit)
+        if len(asked) < _LEAST:
+            return
+        able = [Profile.builtin(name) for name in profiles()] if before is None else before
+        self._fitting[unit] = fitting = tuple(each for each in able if None not in _meant(each, asked))
+        self._agreed.clear()
+        if before and not fitting:
+            self._withdrawn.append((unit, before[0].name, _misfit(before[0], new)))
+
+    def _agree(self, fitting: tuple[Profile, ...], request: bytes) -> bool:
+        """Whether sisters mean the same by what *request* asks for: then it does not matter which of them it is."""
+        place = place_of(request)
+        if place is None:
+            return True
+        first, count = place
+        key = (request[0], first, count)
+        if key not in self._agreed:
+            self._agreed[key] = len({_meant(each, range(first, first + count)) for each in fitting}) == 1
+        return self._agreed[key]
+
+
+def _misfit(profile: Profile, addresses: set[int]) -> int:
+    """The first of *addresses* that *profile* does not have; the first of all where it has them."""
+    ordered = sorted(addresses)
+    return next((each for each in ordered if profile.name_at(profile.plain_address(each)) is None), ordered[0])
 
 
 def _meant(profile: Profile, addresses: Iterable[int]) -> tuple[object, ...]:

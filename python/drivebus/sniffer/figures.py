@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from statistics import median
 
+from drivebus.checks import counted
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.frames import written_by
@@ -173,8 +174,8 @@ class Figures:
                 )
             if unit.strays:
                 yield (
-                    f"unit {address} answered {unit.strays} times what was not asked then: its answers come after the "
-                    "master's time-out, or two units have this address"
+                    f"unit {address} answered {counted(unit.strays, 'time')} what was not asked then: its answers come "
+                    "after the master's time-out, or two units have this address"
                 )
         if asked >= _SOME and damaged * 50 > asked:
             yield (
@@ -183,7 +184,7 @@ class Figures:
             )
         if self.noise and not asked:
             yield (
-                f"{self.noise} bytes came that make no frame: another baud rate or parity is used there "
+                f"{counted(self.noise, 'byte')} came and no frame: another baud rate or parity is used there "
                 "(`drivebus scan --search` finds it where you may ask)"
             )
         elif self.noise > 20 and self._idle * 2 >= self.noise:

@@ -8,6 +8,7 @@ from typing import TypedDict
 
 from drivebus._native import SerialFormat, Sniffer, crc16, decode_answer
 from drivebus.capture import Captured
+from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.profile import Profile
 from drivebus.sniffer.exchange import Exchange
@@ -91,7 +92,7 @@ class Pairing:
         request = asked[1]
         came = None if answer is None else answer[1]
         self._families.hear(request, came)
-        profile = self._families.of(request[0])
+        profile = self._families.of(request[0], request)
         repeated = self._repeated if request == self._unanswered else 0
         self._unanswered, self._repeated = (b"", 0) if error is None or came is not None else (request, repeated + 1)
         self._open, self._noise, self._doubt = None, b"", b""
@@ -119,7 +120,7 @@ class Pairing:
             text = f"{who} may have answered, or was asked once more: what was heard does not tell"
             return self._ended(asked, None, BadAnswer(text, raw=self._doubt, **facts))
         if self._noise:
-            text = f"{who} was answered by {len(self._noise)} bytes that are not a frame"
+            text = f"{who} was answered by {counted(len(self._noise), 'byte')} and no frame"
             return self._ended(asked, None, BadAnswer(text, raw=self._noise, **facts))
         return self._ended(asked, None, NoAnswer(f"{who} did not answer", **facts))
 
@@ -138,7 +139,7 @@ class Pairing:
         role, data, began, ended, gap, _, _, why = piece
         if role == "noise":
             error = CrcError if len(data) >= 4 else BadAnswer
-            text = f"{len(data)} bytes are not a frame: {why}"
+            text = f"{counted(len(data), 'byte')} {'is' if len(data) == 1 else 'are'} not a frame: {why}"
             return Exchange(None, None, None, began + self._ahead, gap, None, error(text, raw=data), lump=self._lump)
         texts = {
             "late": f"unit {data[0]} answered late, when something else had been asked",

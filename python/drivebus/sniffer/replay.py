@@ -7,49 +7,66 @@ import select
 import socket
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 
 from drivebus import checks
 from drivebus._native import SerialFormat, crc16
 from drivebus.errors import NotAllowed
 from drivebus.sniffer.exchange import Exchange
+from drivebus.sniffer.seen import Seen
 
 __all__ = ["Replay"]
 
 _LOOK_UP = 0.2
 _CHUNK = 4096
+_ECHO = 0x08
 
 
 class Replay:
     """Serves the answers of *exchanges* on a pseudo-terminal or over TCP, until it is closed.
 
-    Each request gets the answers that it got, in their order, and then the last of them again and again. An echo (08H)
-    of a unit that answered anything is returned: its word is new each time. Answers come at once, after the silence
-    that frames need.
+    Each request gets the answers that it got, in their order, and then the last of them again and again. A read (03H)
+    that is not there gets the words that its registers had by then, if all of them were read there. An echo (08H) of a
+    unit that answered anything is returned: its word is new each time. Answers come at once, after the silence that
+    frames need.
 
     Args:
         exchanges: What was heard; what answers nothing is passed over.
         line: How characters look, for the silence between frames.
         transport: `"pty"`, `"tcp"`, or `"auto"`: the first of them that this system has.
+        told: Is called with each request that cannot be answered, from another thread.
 
     Raises:
         NotAllowed: No exchange has an answer, or this system has no pseudo-terminals.
 
     Attributes:
         port: What a program opens: a path, or `socket://127.0.0.1:…`.
-        unknown: Requests that came and that are not in the capture.
+        unknown: Requests that came and could not be answered from the capture.
     """
 
-    def __init__(self, exchanges: Iterable[Exchange], line: SerialFormat, transport: str = "auto") -> None:
+    def __init__(
+        self,
+        exchanges: Iterable[Exchange],
+        line: SerialFormat,
+        transport: str = "auto",
+        told: Callable[[bytes], object] | None = None,
+    ) -> None:
         checks.one_of("transport", transport, ("auto", "pty", "tcp"))
-        self._answers: dict[bytes, deque[bytes | None]] = {}
-        for exchange in exchanges:
+        self._answers: dict[bytes, deque[tuple[int, bytes | None]]] = {}
+        known = list(exchanges)
+        for at, exchange in enumerate(known):
             if exchange.request is not None:
-                self._answers.setdefault(exchange.request, deque()).append(exchange.answer)
-        if not any(answer for answers in self._answers.values() for answer in answers):
+                self._answers.setdefault(exchange.request, deque()).append((at, exchange.answer))
+        self._units = {exchange.request[0] for exchange in known if exchange.request and exchange.answer}
+        if not self._units:
             raise NotAllowed("no request in the capture has an answer: there is nothing to replay")
-        self._units = {request[0] for request, answers in self._answers.items() if any(answers)}
+        # Who left an echo without an answer there leaves any.
+        self._silent = {request[0] for request in self._answers if request[1] == _ECHO} - self._units
+        self._seen = Seen(known)
+        # The number of the exchange that the replay has come to.
+        self._now = -1
+        self._told = told
         self._line = line
         self.unknown: set[bytes] = set()
         self._over = threading.Event()
@@ -146,11 +163,19 @@ class Replay:
     def _answer(self, request: bytes) -> bytes | None:
         answers = self._answers.get(request)
         if answers is not None:
-            return answers.popleft() if len(answers) > 1 else answers[0]
-        if request[1] == 0x08 and request[0] in self._units:
+            at, answer = answers.popleft() if len(answers) > 1 else answers[0]
+            self._now = max(self._now, at)
+            return answer
+        if request[1] == _ECHO and request[0] in self._units:
             return request
-        self.unknown.add(request)
-        return None
+        if request[1] == _ECHO and request[0] in self._silent:
+            return None
+        answer = self._seen.answer(request, self._now)
+        if answer is None:
+            self.unknown.add(request)
+            if self._told is not None:
+                self._told(request)
+        return answer
 
 
 def _first_frame(heard: bytes) -> bytes | None:

@@ -1,12 +1,14 @@
 //! How the simulated line and the simulated drive behave, seen from the bus and from the shaft.
 //!
 //! Times and values are computed by hand from the character time, the parameters and the motor's figures; frames come
-//! from the manuals. Nothing waits: all but `ports` runs in virtual time.
+//! from the manuals. Nothing waits: all but `ears` and `ports` runs in virtual time.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod anything;
 mod bench;
+#[cfg(target_os = "linux")]
+mod ears;
 mod families;
 mod faults;
 mod goodrives;

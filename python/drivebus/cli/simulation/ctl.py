@@ -70,6 +70,7 @@ def _show(session: Session, now: Order) -> None:
     session.out.facts(
         {
             "port": now["port"] if now["plugged"] else f"{now['port']}, unplugged",
+            **({"ear": now["ear"]} if now.get("ear") else {}),
             "settings": now["settings"],
             "line_faults": faults or "none",
         }

@@ -21,12 +21,20 @@ class Orders:
         simulator: The one that is told.
         opened: What other programs open to reach it.
         said: Is given each order that was carried out, in words.
+        heard_at: What other programs open to hear its line, if it has an ear.
     """
 
-    def __init__(self, simulator: drivebus.Simulator, opened: Callable[[], str], said: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        simulator: drivebus.Simulator,
+        opened: Callable[[], str],
+        said: Callable[[str], None],
+        heard_at: str | None = None,
+    ) -> None:
         self._simulator = simulator
         self._opened = opened
         self._said = said
+        self._heard_at = heard_at
         # Two windows may pull at one adapter.
         self._turn = threading.Lock()
 
@@ -62,6 +70,7 @@ class Orders:
             "pid": os.getpid(),
             "port": self._opened(),
             "leads_to": self._simulator.port,
+            "ear": self._heard_at,
             "settings": in_words(line.format),
             "plugged": line.plugged,
             "faults": line.faults,

@@ -7,6 +7,7 @@ import shlex
 import signal
 import threading
 from contextlib import ExitStack
+from typing import Any
 
 import click
 
@@ -21,6 +22,17 @@ from drivebus.cli.simulation.rates import rates_of
 from drivebus.cli.types import Place, Whole
 
 __all__ = ["sim"]
+
+UNLINKED = ""
+"""An ear without a link."""
+
+
+class Ear(Place):
+    """A link to an ear, or none."""
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
+        """*value* as a path, or as it is where no link was named."""
+        return value if value == UNLINKED else super().convert(value, parameter, context)
 
 
 @click.group(cls=Listing, invoke_without_command=True)
@@ -53,6 +65,14 @@ __all__ = ["sim"]
 @click.option("--echo", is_flag=True, help="Act like an adapter that echoes everything it sends.")
 @click.option("--link", type=Place(), help="Keep a symbolic link to the pseudo-terminal at this path.")
 @click.option(
+    "--ear",
+    type=Ear(),
+    is_flag=False,
+    flag_value=UNLINKED,
+    metavar="[LINK]",
+    help="Also open a port that hears the line, for `drivebus sniff` beside another program. LINK leads there.",
+)
+@click.option(
     "--fifo", type=Whole(1, 256), default=8, show_default=True, help="Characters that a program receives at once."
 )
 @pass_session
@@ -67,6 +87,7 @@ def sim(
     single: tuple[str, ...],
     echo: bool,
     link: str | None,
+    ear: str | None,
     fifo: int,
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other.
@@ -91,6 +112,7 @@ def sim(
         echo=echo,
         link=link,
         fifo=fifo,
+        ear=False if ear is None else ear or True,
     )
     # Whoever ends it, the link goes with it.
     for name in ("SIGTERM", "SIGHUP"):
@@ -105,12 +127,13 @@ def sim(
         def opened() -> str:
             return simulator.port if link is None else link
 
-        orders = Orders(simulator, opened, session.out.say)
+        heard_at = ear or simulator.ear
+        orders = Orders(simulator, opened, session.out.say, heard_at)
         try:
             with ExitStack() as open_things:
                 _take_orders(open_things, orders)
                 # Whoever reads the port may end it at once.
-                _say_what_is_served(session, simulator, opened())
+                _say_what_is_served(session, simulator, opened(), heard_at)
                 threading.Event().wait()
         except KeyboardInterrupt:
             session.out.say("")
@@ -124,17 +147,22 @@ def _take_orders(open_things: ExitStack, orders: Orders) -> None:
         remark(f"Warning: this simulation takes no orders by `drivebus sim ctl`: {error}")
 
 
-def _say_what_is_served(session: Session, simulator: drivebus.Simulator, opened: str) -> None:
+def _say_what_is_served(session: Session, simulator: drivebus.Simulator, opened: str, heard_at: str | None) -> None:
     """What to open, what is there, and what to do next."""
     drives = {unit: simulator.drive(unit).profile for unit in simulator.units}
     settings = in_words(simulator.format)
     if session.out.as_json:
-        told = {"port": opened, "leads_to": simulator.port, "units": drives, "settings": settings}
+        told: dict[str, Any] = {"port": opened, "leads_to": simulator.port, "units": drives, "settings": settings}
+        if heard_at is not None:
+            told |= {"ear": heard_at, "ear_leads_to": simulator.ear}
         session.out.record({**told, "seed": simulator.seed, "faults": simulator.line.faults})
         return
     session.out.say(opened)
     if opened != simulator.port:
         session.out.say(f"Leads to: {simulator.port}")
+    if heard_at is not None:
+        leads = "" if heard_at == simulator.ear else f", leads to {simulator.ear}"
+        session.out.say(f"Ear: {heard_at}{leads}")
     for unit, family in drives.items():
         session.out.say(f"Unit {unit}: {family}")
     session.out.say(f"Settings: {settings}")
@@ -145,6 +173,8 @@ def _say_what_is_served(session: Session, simulator: drivebus.Simulator, opened:
     which = "" if first == 1 else f" --unit {first}"
     words = "".join(f" --{name} {value}" for name, value, usual in _settings_of(session) if value != usual)
     session.out.say(f"Try in another window: `drivebus --port {shlex.quote(opened)}{words}{which} info`")
+    if heard_at is not None:
+        session.out.say(f"Hear it: `drivebus{words} sniff {shlex.quote(heard_at)}`")
     session.out.say("Trip, load, unplug: `drivebus sim ctl --help`")
     session.out.say("Ctrl-C ends it.")
 
