@@ -6,9 +6,11 @@ import contextlib
 import signal
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,6 +20,9 @@ if sys.platform == "win32":
 
 import drivebus
 from drivebus import Simulator
+from drivebus.cli.panel.app import Panel
+from drivebus.cli.panel.journal import Journal
+from drivebus.cli.panel.motors import Motor
 
 from .panels import Terminal, on_a_terminal
 
@@ -167,6 +172,49 @@ def test_a_stop_takes_back_a_start_that_was_just_allowed(simulator: Simulator, t
             assert simulator.drive(1).state == "stopped"
         terminal.press("q")
         assert terminal.ends() == 0
+
+
+def test_stops_leave_a_start_room_to_end() -> None:
+    """Space again and again while a start is under way: one thread repeats the stop, and the others send one each."""
+    sent: Counter[threading.Thread] = Counter()
+    go, plenty = threading.Event(), threading.Event()
+
+    def halt(_: float | None) -> None:
+        sent[threading.current_thread()] += 1
+        if sum(sent.values()) >= 8:
+            plenty.set()
+
+    motor = Motor("unit 1", halt, Journal(), None)
+    under_way = threading.Event()
+
+    def order() -> None:
+        under_way.set()
+        go.wait()
+
+    motor.later("a start", order, motor.stops)
+    under_way.wait()
+    for _ in range(3):
+        motor.stop()
+    plenty.wait()
+    go.set()
+    assert sum(count > 1 for count in sent.values()) == 1, sent
+
+
+def test_space_stops_all_though_the_cursor_moves_meanwhile() -> None:
+    told: list[str] = []
+    panel: Panel
+
+    class Moved(Motor):
+        started = True
+
+        def stop(self) -> None:
+            told.append(self.called)
+            panel.current = panel.members[1]
+
+    motors = [Moved(called, lambda _: None, Journal(), None) for called in ("unit 1", "unit 2", "unit 3")]
+    panel = Panel([SimpleNamespace(motor=motor) for motor in motors], Journal())  # type: ignore[misc]
+    panel.stop_now()
+    assert told == ["unit 1", "unit 2", "unit 3"]
 
 
 BREAKS = """

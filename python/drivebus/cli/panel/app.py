@@ -106,8 +106,10 @@ class Panel(App[None]):
     def stop_now(self) -> None:
         """Stops the drive that the keys are for, and every motor that this panel started. From any thread."""
         self._stops += 1
-        self.current.motor.stop()
-        stop_all(member.motor for member in self.members if member is not self.current)
+        # Looked at once: the cursor may move in the other thread.
+        current = self.current
+        current.motor.stop()
+        stop_all(member.motor for member in self.members if member is not current)
 
     def end_soon(self) -> None:
         """Ends the screen, as soon as it can. From any thread."""

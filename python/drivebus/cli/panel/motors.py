@@ -17,8 +17,8 @@ from drivebus.cli.panel.journal import Journal
 
 __all__ = ["Motor", "stop_all", "wait_for_all"]
 
-_PAUSE = 0.02
-"""Seconds between two stops that could not be sent."""
+_PAUSE = 0.05
+"""Seconds between two stops while a start is under way: on a line full of stops, which go first, no start ends."""
 
 
 _STOPPED = "it was told to stop meanwhile; nothing was sent"
@@ -69,6 +69,7 @@ class Motor:
         self._under_way = 0
         self._block: _Block | None = None
         self._proving = False
+        self._repeating = False
         self._thread: threading.Thread | None = None
         self.stops = 0
         self.failure: drivebus.DrivebusError | None = None
@@ -199,13 +200,15 @@ class Motor:
 
     def _stop(self, prove: bool) -> None:
         """Sends stops until nothing that moves it is under way any more; with *prove*, looks at the drive then."""
+        mine = False
         try:
-            while self._moves():
+            while (mine := self._repeats(mine)) or (prove and self._moves()):
                 try:
-                    self._halt(0.0)
+                    if mine:
+                        self._halt(0.0)
                 except drivebus.DrivebusError as error:
                     self._journal.fail(f"{self.called}: stop", error)
-                    threading.Event().wait(_PAUSE)
+                threading.Event().wait(_PAUSE)
             if not prove:
                 # Its own thread proves it, or the stop before this one.
                 self._halt(0.0)
@@ -217,6 +220,16 @@ class Motor:
         finally:
             if prove:
                 self._proving = False
+            if mine:  # what nobody foresaw ended it
+                self._repeating = False
+
+    def _repeats(self, mine: bool) -> bool:
+        """Whether this thread sends the next stop: one at a time does, and while something is under way."""
+        with self._lock:
+            if self._repeating and not mine:
+                return False
+            self._repeating = self._under_way > 0
+            return self._repeating
 
     def _moves(self) -> bool:
         with self._lock:
