@@ -76,7 +76,8 @@ def use(terminal: Terminal, simulator: Simulator, backup: Path, size: tuple[int,
     terminal.until("1 of 4", "reset the fault: done", "stopped, 0.00 of")
     assert simulator.drive(1).fault == 0
     terminal.press("\x1b[D", "\x1b[D")
-    terminal.until("3 of 4", "commands from keypad")
+    terminal.until("3 of 4", "commands from keypad: b prepares it", "b prepare p params")
+    assert "ready" not in terminal.words
     terminal.press("r")
     terminal.until("how many Hz")
     # Two numbers of which the second takes back the first, in a lump.
@@ -85,10 +86,22 @@ def use(terminal: Terminal, simulator: Simulator, backup: Path, size: tuple[int,
     terminal.press("r")
     terminal.until("how many Hz")
     terminal.press("10\r")
-    terminal.until("run forward to 10 Hz")
+    # What would be written is told, in the words of `prepare`, and nothing is asked of the machine before.
+    terminal.until("prepare it? To RAM", "P00.01: 0 -> 2, run commands come from communication")
+    terminal.until("This takes its commands and its setpoint from the bus. Is the machine clear?")
+    keep("prepare", terminal.lines, size)
+    assert "run forward" not in terminal.words
     terminal.press("y")
-    # It takes its commands from the keypad: what helps is told in words of the command line.
-    terminal.until("`drivebus prepare`")
+    terminal.until("unit 3: prepare: it obeys the bus now: done", "ready, commands from communication")
+    assert simulator.drive(3).eeprom_writes == 0
+    terminal.press("b")
+    terminal.until("unit 3: it obeys the bus; there is nothing to write")
+    terminal.press("r")
+    terminal.until("how many Hz")
+    terminal.press("10\r")
+    terminal.until("run forward to 10 Hz. Is the machine clear?")
+    terminal.press("\x1b")
+    terminal.without("Is the machine clear?")
     terminal.press("\x1b[C", "\x1b[C")
     terminal.until("1 of 4")
     terminal.press("p")

@@ -28,7 +28,7 @@ from .panels import Terminal, on_a_terminal
 
 CONTROL, FORWARD, STOP = 0x2000, 1, 5
 RAMP = 2.0
-STOPPED = "drivebus.panel unit 1: stopped"
+STOPPED = "drivebus.panel unit 1: stop confirmed: "
 BETWEEN = 2
 """Requests that may lie between the key and the stop: one that was under way, and one that had its turn."""
 
@@ -66,8 +66,8 @@ def has_tripped(simulator: Simulator) -> bool:
 
 
 def says(terminal: Terminal, since: int, line: str) -> bool:
-    """Whether the panel's record has *line* behind the first *since*."""
-    return line in terminal.record()[since:]
+    """Whether the panel's record has a line that begins as *line* behind the first *since*."""
+    return any(each.startswith(line) for each in terminal.record()[since:])
 
 
 def start(terminal: Terminal, hz: str = "10") -> None:
@@ -184,7 +184,7 @@ def test_stops_leave_a_start_room_to_end() -> None:
         if sum(sent.values()) >= 8:
             plenty.set()
 
-    motor = Motor("unit 1", halt, Journal(), None)
+    motor = Motor("unit 1", halt, lambda: "", Journal(), None)
     under_way = threading.Event()
 
     def order() -> None:
@@ -211,7 +211,7 @@ def test_space_stops_all_though_the_cursor_moves_meanwhile() -> None:
             told.append(self.called)
             panel.current = panel.members[1]
 
-    motors = [Moved(called, lambda _: None, Journal(), None) for called in ("unit 1", "unit 2", "unit 3")]
+    motors = [Moved(called, lambda _: None, lambda: "", Journal(), None) for called in ("unit 1", "unit 2", "unit 3")]
     panel = Panel([SimpleNamespace(motor=motor) for motor in motors], Journal())  # type: ignore[misc]
     panel.stop_now()
     assert told == ["unit 1", "unit 2", "unit 3"]
@@ -291,3 +291,25 @@ def test_space_stops_and_a_signal_ends_what_hangs(simulator: Simulator, tmp_path
         assert told(simulator) == [FORWARD, STOP]
         terminal.send(signal.SIGTERM)
         assert terminal.ends() == 143
+
+
+def test_a_motor_on_the_ramp_is_stopping(tmp_path: Path) -> None:
+    """A stop is confirmed long before standstill: the record and the screen say what is true by then."""
+    with Simulator({1: "gd350"}, transport="pty") as simulator:
+        with drivebus.Bus(simulator) as bus:
+            drive = bus.drive(1)
+            drive.prepare_control()
+            drive.write({"P00.11": 0.5, "P00.12": 60.0})
+        with on_a_terminal(["--port", simulator.port, "panel"], tmp_path / "record") as terminal:
+            terminal.until("stopped")
+            start(terminal)
+            terminal.until("forward, 10.00 of 10.00 Hz")
+            terminal.press(" ")
+            terminal.until("unit 1: stop confirmed: stopping, ", "unit 1 stopping, ")
+            terminal.without("unit 1 forward")
+            # Somebody else starts it on the ramp.
+            with drivebus.Bus(simulator.port) as bus:
+                bus.drive(1).run(hz=20.0)
+            terminal.until("unit 1 forward, ")
+            terminal.press("q")
+            assert terminal.ends() == 0

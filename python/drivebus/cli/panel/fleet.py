@@ -6,6 +6,7 @@ does not answer. The screen takes what is newest and waits for nobody.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from typing import Any
 import drivebus
 from drivebus.cli import watching
 from drivebus.cli.advice import in_commands
+from drivebus.cli.move import on_the_way
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.motors import Motor
 from drivebus.cli.screen import Watched
@@ -31,6 +33,8 @@ _AGAIN = 1.0
 """Seconds after which a drive that did not answer is looked for again, for each such drive."""
 _GLANCE = 0.1
 """Seconds that such a drive is given: it must not keep the others waiting."""
+_RISE = 0.5
+"""Hz that a motor on its way to a stop does not gain."""
 
 
 class Member:
@@ -52,7 +56,7 @@ class Member:
     def __init__(self, session: Session, line: Line, journal: Journal, watchdog: float | None) -> None:
         self.session = session
         self.line = line
-        self.motor = Motor(session.called, self._halt, journal, watchdog)
+        self.motor = Motor(session.called, self._halt, self._tell, journal, watchdog)
         self.drive: drivebus.Drive | None = None
         self.watched: Watched | None = None
         self.highest: float | None = None
@@ -63,6 +67,7 @@ class Member:
         self._words: list[str] = []
         self._newest: drivebus.Sample | None = None
         self._taken: drivebus.Sample | None = None
+        self._slowest = 0.0, math.inf
 
     @property
     def called(self) -> str:
@@ -133,12 +138,44 @@ class Member:
         self._taken = sample
         self.watched.take(sample)
         if sample.missing is None:
+            self._see_whether_it_slows(sample)
             self.told = {}
             for word in self._words:
                 self.told.update(self.watched.profile.fields(word, int(sample[word])))
             for name in self.watched.rows:
                 self.trends.setdefault(name, deque(maxlen=KEPT)).append(float(sample[name]))
         return True
+
+    @property
+    def state(self) -> drivebus.State | None:
+        """What it said last that it does; None if it does not tell."""
+        watched = self.watched
+        if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
+            return None
+        return drivebus.State(watched.profile.state(int(watched.now[watched.state])))
+
+    def _see_whether_it_slows(self, sample: drivebus.Sample) -> None:
+        """One that stands is not on its way to a stop any more, nor is one that somebody else has started again."""
+        since, least = self._slowest
+        if not self.motor.is_slowing or sample.time < since:
+            return
+        name = self.role("frequency")
+        now = 0.0 if name is None else abs(float(sample[name]))
+        self._slowest = since, min(now, least)
+        if now > least + _RISE or self.state is None or not self.state.running:
+            self.motor.is_slowing = False
+
+    def _tell(self) -> str:
+        """What the motor does that was told to stop."""
+        self._slowest = 0.0, math.inf
+        if self.drive is None:
+            return "what it does now is not known"
+        try:
+            status = self.drive.status()
+        except drivebus.DrivebusError as error:
+            return f"what it does now could not be read: {error}"
+        self._slowest = status.time, math.inf if status.frequency is None else abs(status.frequency)
+        return on_the_way(status, drivebus.State.STOPPED) or str(status)
 
     def _halt(self, confirm: float | None) -> None:
         """Stops it: with its own code where it is known what it is."""

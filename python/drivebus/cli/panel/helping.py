@@ -15,6 +15,7 @@ _HELP = [
     ("j, J", "jogs the motor forward, in reverse, for some seconds"),
     ("f", "changes the setpoint"),
     ("x", "resets a fault"),
+    ("b", "prepares the drive: sets it to obey the bus, in RAM. Says what it would write, and asks"),
     ("p", "parameters: look, search, change, compare with a backup"),
     ("m", "all messages"),
     ("Enter", "in the overview: looks at the drive under the cursor"),

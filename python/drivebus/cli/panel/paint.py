@@ -11,6 +11,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 from textual.renderables.digits import Digits
 
+import drivebus
+from drivebus.cli.move import going
 from drivebus.cli.output import printable
 from drivebus.cli.panel.fleet import Member
 from drivebus.cli.screen import MARKS
@@ -61,7 +63,7 @@ def doing(member: Member) -> Text:
     """What it does now: state, frequency and setpoint, and what its status words say beside that."""
     told = Text(_nothing(member), "yellow")
     if member.watched is not None:
-        told = member.watched.doing()
+        told = _state(member)
     if member.watched is not None and member.watched.now is not None:
         frequencies = [value(member, name) for role in _ROLES if (name := member.role(role)) is not None]
         if frequencies:
@@ -73,9 +75,18 @@ def doing(member: Member) -> Text:
 def state(member: Member) -> Text:
     """State and fault alone, or why there is none."""
     if member.watched is not None and not member.why:
-        return member.watched.doing()
+        return _state(member)
     why = f": {member.why}" if member.why else ""
     return Text(printable(f"{_nothing(member)}{why}"), "yellow")
+
+
+def _state(member: Member) -> Text:
+    """State and fault; of one that was stopped here and turns still, that it is stopping."""
+    assert member.watched is not None
+    state = member.state
+    if member.motor.is_slowing and state is not None and (doing := going(state, drivebus.State.STOPPED)):
+        return Text(doing, "yellow")
+    return member.watched.doing()
 
 
 def _nothing(member: Member) -> str:
@@ -87,10 +98,7 @@ def _nothing(member: Member) -> str:
 
 def turns(member: Member) -> bool:
     """Whether its motor turns, as far as it tells."""
-    watched = member.watched
-    if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
-        return False
-    return watched.profile.state(int(watched.now[watched.state])) in ("forward", "reverse")
+    return member.state is not None and member.state.running
 
 
 def tripped(member: Member) -> bool:
@@ -103,10 +111,12 @@ def _beside(member: Member) -> Text:
     """What the status words say beside the state, as `status` has it."""
     ready, source = member.told.get("ready"), member.told.get("control_channel")
     told = Text()
-    if ready is not None:
+    obeys = source in (None, "communication")
+    # Ready for its keypad would read as ready for r.
+    if ready is not None and (obeys or ready != "ready"):
         told.append(f", {ready.replace('_', ' ')}")
     if source is not None:
-        told.append(f", commands from {source}", "" if source == "communication" else "yellow")
+        told.append(f", commands from {source}{'' if obeys else ': b prepares it'}", "" if obeys else "yellow")
     if member.told.get("overload_alarm", "none") != "none":
         told.append(", overload pre-alarm", "bold yellow")
     return told

@@ -18,20 +18,11 @@ from drivebus.cli.panel.fleet import Member
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.overview import Overview, summary
 
-__all__ = ["KEYS", "DriveView", "Fleet", "Piece", "View"]
+__all__ = ["DriveView", "Fleet", "Piece", "View"]
 
-KEYS = [
-    ("Space", "STOP"),
-    ("r", "run"),
-    ("s", "stop"),
-    ("j", "jog"),
-    ("f", "setpoint"),
-    ("x", "reset"),
-    ("p", "params"),
-    ("?", "help"),
-    ("q", "quit"),
-]
-"""The keys that the last line names."""
+_KEYS = "Space STOP  r run  s stop  j jog  f set Hz  {next}  p params  ? help  q quit"
+_FAULT, _PREPARE = "x reset", "b prepare"
+"""The keys that the last line names. In one of its places stands what helps now: not all have room in 80 columns."""
 
 _TILE = 19
 """Columns of a big value: six figures and a point."""
@@ -87,10 +78,11 @@ class View(Screen[None]):
     def show(self) -> None:
         """Shows what is known now."""
         self.query_one("#messages", Piece).put(self._messages())
-        keys = Text()
-        for key, meaning in KEYS:
-            keys.append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}  ")
-        self.query_one("#keys", Piece).put(keys)
+        self.query_one("#keys", Piece).put(_keys(paint.tripped(self.shown())))
+
+    def shown(self) -> Member:
+        """The drive that the keys are for."""
+        raise NotImplementedError
 
     def _messages(self) -> Text:
         """The newest message in full, as far as there is room, and those before it."""
@@ -129,6 +121,10 @@ class Fleet(View):
         self._members = members
         self._current = current
 
+    def shown(self) -> Member:
+        """The one under the cursor."""
+        return self._current()
+
     def compose(self) -> ComposeResult:
         """How many they are, a line each, what there is to say of the one under the cursor, and the foot."""
         yield Piece("head")
@@ -166,6 +162,10 @@ class DriveView(View):
         super().__init__(journal)
         self.member = member
         self._members = members
+
+    def shown(self) -> Member:
+        """The one in view."""
+        return self.member
 
     def turn_to(self, member: Member) -> None:
         """Shows another drive."""
@@ -211,3 +211,12 @@ class DriveView(View):
             drawn = paint.trend(self.member, name, width).plain
             key = (name, paint.value(self.member, name), drawn, self.member.highest)
             tile.put(paint.big(self.member, name, width), key)
+
+
+def _keys(is_tripped: bool) -> Text:
+    """The last line."""
+    keys = Text()
+    for named in _KEYS.format(next=_FAULT if is_tripped else _PREPARE).split("  "):
+        key, _, meaning = named.partition(" ")
+        keys.append("  " if keys else "").append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}")
+    return keys
