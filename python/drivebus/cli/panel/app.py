@@ -51,17 +51,18 @@ class Panel(App[None]):
 
     CSS = """
     Screen { background: ansi_default; }
+    View { overflow: hidden; }
+    #foot { dock: bottom; height: 4; }
     #head, #keys { height: 1; }
     #doing { height: auto; max-height: 2; }
     #messages { height: 3; }
-    #keys { margin-top: 0; }
     #tiles { height: 6; margin-top: 1; margin-bottom: 1; }
     #tiles Piece { width: 1fr; height: 6; }
     #values { height: 1fr; }
     #lamps, #fault, #line { height: auto; }
     #fault { max-height: 5; }
     #line { max-height: 3; }
-    #chosen { height: auto; max-height: 5; margin-top: 1; }
+    #chosen { height: auto; max-height: 7; margin-top: 1; }
     Overview { height: 1fr; scrollbar-size-vertical: 0; }
     ModalScreen { align: center bottom; background: transparent; }
     Show { align: center middle; }
@@ -367,7 +368,12 @@ class Panel(App[None]):
     # --- what ends it ------------------------------------------------------------------------------------------
 
     def _handle_exception(self, error: Exception) -> None:
-        """A mistake of ours ends the panel; it is raised when the screen is given back, and the motors stand."""
-        self.error = self.error or error
-        stop_all(member.motor for member in self.members)
+        """A mistake of ours ends the panel."""
+        self.fail(error)
         self.exit()
+
+    def fail(self, error: Exception) -> None:
+        """Stops what was started, and keeps *error*, which is told when the screen is given back. From any thread."""
+        stop_all(member.motor for member in self.members)
+        self.journal.trace(error)
+        self.error = self.error or error

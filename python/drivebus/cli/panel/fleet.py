@@ -10,7 +10,7 @@ import math
 import threading
 from collections import deque
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 import drivebus
@@ -50,6 +50,7 @@ class Member:
         problem: Why it is not known, or not polled; None if it is.
         trends: The latest values of each register, the newest last.
         asked: What it is polled for.
+        may_be: The families that it may be of and that have a profile, where it does not say surely which.
         told: What its status words say beside the state, in the drive's own words.
     """
 
@@ -63,6 +64,8 @@ class Member:
         self.problem: drivebus.DrivebusError | None = None
         self.trends: dict[str, deque[float]] = {}
         self.told: dict[str, str] = {}
+        self.may_be: list[str] = []
+        self._is_unsure = False
         self.asked: list[str] = []
         self._words: list[str] = []
         self._newest: drivebus.Sample | None = None
@@ -86,7 +89,18 @@ class Member:
         """Why nothing is known of it now; empty if something is."""
         if self.watched is not None:
             return self.watched.missing
-        return "" if self.problem is None else in_commands(str(self.problem))
+        if self.problem is None:
+            return ""
+        naming = f"give `{self.naming}`" + (" in drivebus.toml" if self.session.name else "")
+        return in_commands(str(self.problem)).replace("give `--profile`", naming)
+
+    @property
+    def naming(self) -> str:
+        """How its family can be named, where it does not say itself what it is; empty where that helps nothing."""
+        if not self._is_unsure or self.problem is None:
+            return ""
+        family = self.may_be[0] if len(self.may_be) == 1 else "NAME"
+        return f'profile = "{family}"' if self.session.name else f"--profile {self.session.unit}={family}"
 
     @property
     def is_silent(self) -> bool:
@@ -103,6 +117,7 @@ class Member:
     def identify(self, again: bool) -> bool:
         """Finds out what it is; returns whether it did. *again*: it did not answer before."""
         bus = self.line.bus
+        drive = None
         try:
             # Who is silent costs the others as little as can be.
             if again and self.session.profile is None and not list(bus.scan([self.session.unit], _GLANCE)):
@@ -110,12 +125,21 @@ class Member:
             drive = self.session.drive_on(bus)
             watched = watching.watched(self.session, drive)
         except drivebus.DrivebusError as error:
+            self._is_unsure = drive is None and isinstance(error, drivebus.NotAllowed) and self.session.profile is None
+            if self._is_unsure and not self.may_be:
+                self._ask_families()
             self.problem = error
             return False
         self._words = [name for name in drive.profile.status_words if _may_be_read(drive, name)]
         self.asked = list(dict.fromkeys([*watching.asked(watched), *self._words]))
         self.drive, self.watched, self.problem = drive, watched, None
         return True
+
+    def _ask_families(self) -> None:
+        """Asks which families it may be of."""
+        with suppress(drivebus.DrivebusError):
+            found = self.line.bus.identify(self.session.unit)
+            self.may_be = [name for name in found.candidates if name in drivebus.profiles()]
 
     def ask_limit(self) -> None:
         """Asks for its highest frequency."""
@@ -269,7 +293,7 @@ class Line:
             for sample in poll.batch(len(by_drive), timeout=_INTERVAL):
                 by_drive[sample.drive].put(sample)
             if beats % 4 == 0:
-                units = [member.session.unit for member in by_drive.values()]
+                units = [member.session.unit for member in self.members]
                 self.links = {unit: self.bus.link(unit) for unit in units}
                 self.stats = self.bus.stats()
             beats += 1

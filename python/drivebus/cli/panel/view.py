@@ -9,7 +9,7 @@ from rich.console import RenderableType
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal
+from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import Static
 
@@ -72,8 +72,9 @@ class View(Screen[None]):
 
     def foot(self) -> ComposeResult:
         """The last lines of the screen."""
-        yield Piece("messages")
-        yield Piece("keys")
+        with Vertical(id="foot"):
+            yield Piece("messages")
+            yield Piece("keys")
 
     def show(self) -> None:
         """Shows what is known now."""
@@ -156,12 +157,15 @@ class DriveView(View):
         Binding("escape", "app.leave_view", "back"),
         Binding("left,up", "app.next(-1)", "previous drive"),
         Binding("right,down", "app.next(1)", "next drive"),
+        Binding("pageup", "page(-1)", "previous values"),
+        Binding("pagedown", "page(1)", "next values"),
     ]
 
     def __init__(self, member: Member, members: Sequence[Member], journal: Journal) -> None:
         super().__init__(journal)
         self.member = member
         self._members = members
+        self._page = 0
 
     def shown(self) -> Member:
         """The one in view."""
@@ -170,6 +174,12 @@ class DriveView(View):
     def turn_to(self, member: Member) -> None:
         """Shows another drive."""
         self.member = member
+        self._page = 0
+        self.show()
+
+    def action_page(self, by: int) -> None:
+        """Shows other values."""
+        self._page += by
         self.show()
 
     def compose(self) -> ComposeResult:
@@ -190,14 +200,19 @@ class DriveView(View):
         head = paint.head(member)
         if len(self._members) > 1:
             head.append(f"  {self._members.index(member) + 1} of {len(self._members)}", "dim")
+        if meant := paint.marks(member):
+            head.append(f"  {meant}", "dim")
         self.query_one("#head", Piece).put(head)
         self.query_one("#doing", Piece).put(paint.doing(member))
         names = paint.tiles(member, min(max(self.size.width // (_TILE + 1), 1), _MOST_TILES))
         self._show_tiles(names)
         values = self.query_one("#values", Piece)
-        values.put(paint.values(member, names, values.size.width, values.size.height))
+        values.put(paint.values(member, names, values.size.width, values.size.height, self._page))
         self.query_one("#lamps", Piece).put(Text("\n").join(paint.lamps(member)))
-        self.query_one("#fault", Piece).put(paint.fault(member))
+        fault = self.query_one("#fault", Piece)
+        told = paint.fault(member)
+        fault.display = bool(told)
+        fault.put(told)
         self.query_one("#line", Piece).put(paint.line(member))
         super().show()
 
@@ -208,7 +223,7 @@ class DriveView(View):
             if place >= len(names):
                 continue
             name, width = names[place], max(tile.size.width - 1, 1)
-            drawn = paint.trend(self.member, name, width).plain
+            drawn = paint.scaled(self.member, name, width).plain
             key = (name, paint.value(self.member, name), drawn, self.member.highest)
             tile.put(paint.big(self.member, name, width), key)
 
