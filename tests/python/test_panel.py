@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +16,7 @@ if sys.platform == "win32":
 
 import drivebus
 from drivebus import Simulator
+from drivebus.cli.panel import paint
 
 from .panels import Terminal, on_a_terminal
 from .screens import SIZES
@@ -52,13 +54,23 @@ def test_each_view_has_what_it_is_for(simulator: Simulator, tmp_path: Path, size
     words = ["--port", simulator.port, "--unit", "1-3,9", "panel"]
     with on_a_terminal(words, tmp_path / "record", size, environment={"NO_COLOR": "1"} if plain else {}) as terminal:
         # Who is not known for sure, and who is silent, is told from who is in fault.
-        terminal.until("4 drives, 1 in fault, 1 silent", "537.0", "fault, OV3 (9)", "not known: unit 2 answers")
+        terminal.until(
+            "4 drives, 1 in fault, 1 silent", "537.0", "fault, OV3 (9)", "not known; name it: --profile 2=vfd500"
+        )
         keep("overview", terminal.lines, size)
         terminal.press("\x1b[F")
         terminal.until("unit 9, read 2103H: no answer within 500 ms", "no answer, trying again")
+        terminal.press("\x1b[H", "\x1b[B")
+        terminal.until("not known, trying again: unit 2 answers", "give `--profile 2=vfd500`")
+        terminal.press("\r")
+        terminal.until("2 of 4", "exchanges brought an answer; 0 silent")
+        terminal.press("\x1b")
+        terminal.until("4 drives")
         terminal.press("\x1b[H", "\r")
         terminal.until("1 of 4", "fault, OV3", "cause: ", "remedy: ", "○ S1", "up to 50.00")
         terminal.until("of the last 10 exchanges brought an answer; 0 silent, 0 damaged")
+        # A fault with all that is known of it pushes nothing out.
+        terminal.until(lambda _: terminal.lines[-1].startswith("Space STOP"))
         keep("drive", terminal.lines, size)
         if plain:
             use(terminal, simulator, backup, size)
@@ -76,23 +88,45 @@ def use(terminal: Terminal, simulator: Simulator, backup: Path, size: tuple[int,
     terminal.until("1 of 4", "reset the fault: done", "stopped, 0.00 of")
     assert simulator.drive(1).fault == 0
     terminal.press("\x1b[D", "\x1b[D")
-    terminal.until("3 of 4", "commands from keypad")
+    terminal.until("3 of 4", "commands from keypad: b prepares it", "b prepare p params")
+    assert "ready" not in terminal.words
     terminal.press("r")
-    terminal.until("how many Hz")
+    terminal.until("how many Hz", "Enter goes on, Escape cancels, q is typed.")
     # Two numbers of which the second takes back the first, in a lump.
     terminal.press("77\x7f\x7f1,5\r")
     terminal.until('"1,5" is not a number of Hz; write 1.5; nothing was sent')
     terminal.press("r")
     terminal.until("how many Hz")
     terminal.press("10\r")
-    terminal.until("run forward to 10 Hz")
+    # What would be written is told, in the words of `prepare`, and nothing is asked of the machine before.
+    terminal.until("prepare it? To RAM", "P00.01: 0 -> 2, run commands come from communication")
+    terminal.until("This takes its commands and its setpoint from the bus. Is the machine clear?")
+    keep("prepare", terminal.lines, size)
+    assert "run forward" not in terminal.words
     terminal.press("y")
-    # It takes its commands from the keypad: what helps is told in words of the command line.
-    terminal.until("`drivebus prepare`")
+    terminal.until("unit 3: prepare: it obeys the bus now: done", "ready, commands from communication")
+    assert simulator.drive(3).eeprom_writes == 0
+    terminal.press("b")
+    terminal.until("unit 3: it obeys the bus; there is nothing to write")
+    terminal.press("r")
+    terminal.until("how many Hz")
+    terminal.press("10\r")
+    terminal.until("run forward to 10 Hz. Is the machine clear?")
+    terminal.press("\x1b")
+    terminal.without("Is the machine clear?")
     terminal.press("\x1b[C", "\x1b[C")
     terminal.until("1 of 4")
+    # What does not fit is on further pages, and they come round.
+    terminal.until("of 2: PageDown", "1 of 4 ? unverified")
+    terminal.press("\x1b[6~")
+    terminal.until("page 2 of 2")
+    assert "output voltage" not in terminal.words
+    terminal.press("\x1b[6~")
+    terminal.until("page 1 of 2", "output voltage")
     terminal.press("p")
-    terminal.until("group P00", "P00.11", "10.0 s Acceleration time 1")
+    terminal.until(
+        "parameters, group P00, 1 of 13: unit 1, INVT", "P00.11", "10.0 s Acceleration time 1", "Escape back"
+    )
     keep("parameters", terminal.lines, size)
     terminal.press("/")
     terminal.until("> ")
@@ -114,6 +148,16 @@ def use(terminal: Terminal, simulator: Simulator, backup: Path, size: tuple[int,
     keep("compared", terminal.lines, size)
 
 
+BEHIND = """
+import os, sys
+child = os.fork()
+if child:
+    sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+os.setpgid(0, 0)
+"""
+"""Has the program go on in the background of its terminal, as `timeout` does."""
+
+
 def test_an_own_mistake_costs_no_screen(simulator: Simulator, tmp_path: Path) -> None:
     """Each is one line and an exit code, and no screen was opened."""
     port = ["--port", simulator.port]
@@ -123,6 +167,7 @@ def test_an_own_mistake_costs_no_screen(simulator: Simulator, tmp_path: Path) ->
         ([*port, "panel"], (79, 24), "xterm", "", 2, "a window of 80 by 24, and this one has 79 by 24"),
         ([*port, "--json", "panel"], SIZES[0], "xterm", "", 2, "--json is for others"),
         ([*port, "panel"], SIZES[0], "xterm", missing, 2, "pip install 'drivebus[panel]'"),
+        ([*port, "panel"], SIZES[0], "xterm", BEHIND, 2, "the panel needs to be in the foreground"),
         (["panel"], SIZES[0], "xterm", "", 2, "no port"),
         (["--port", "/dev/nowhere", "panel"], SIZES[0], "xterm", "", 5, "/dev/nowhere"),
     ):
@@ -146,3 +191,45 @@ def test_a_drive_that_comes_later_is_shown(tmp_path: Path) -> None:
             terminal.until("stopped, 0.00 of 50.00 Hz")
             terminal.press("q")
             assert terminal.ends() == 0
+
+
+def test_each_unit_has_the_family_that_is_named(simulator: Simulator, tmp_path: Path) -> None:
+    words = ["--port", simulator.port, "--unit", "1-3", "panel", "--profile"]
+    with on_a_terminal([*words, "2=vfd500"], tmp_path / "record") as terminal:
+        terminal.until("3 drives", "unit 2 state not told", "unit 3 0.00", "? unverified")
+        terminal.press("q")
+        assert terminal.ends() == 0
+    for given, code, said in (
+        ("4=gd350", 2, "--profile names unit 4, and --unit does not"),
+        ("2=gd35x", 2, "gd35x"),
+        ("2=", 2, "write 3=gd350"),
+    ):
+        with on_a_terminal([*words, given], tmp_path / "record") as terminal:
+            assert (terminal.ends(), said in terminal.words) == (code, True), terminal.text
+
+
+class Seen:
+    """A member of the panel, as far as a trend looks at it."""
+
+    def __init__(self, values: list[float]) -> None:
+        self.trends = {"bus_voltage": values}
+        self.highest = None
+        self.watched = SimpleNamespace(rows={"bus_voltage": SimpleNamespace(text=lambda value: f"{value:.1f}")})
+
+    def role(self, role: str) -> str:
+        return role
+
+
+@pytest.mark.parametrize(
+    ("values", "drawn"),
+    [
+        # 4 V of 537 V are a wobble, of 40 V a trend.
+        ([533.0, 537.0, 535.0], "▄▅▅     533.0…537.0"),
+        ([0.0, 40.0, 20.0], "▁█▅        0.0…40.0"),
+        ([0.0, 0.0], "▁▁              0.0"),
+        ([-5.0, -5.0], "▅▅             -5.0"),
+    ],
+    ids=str,
+)
+def test_a_trend_has_a_scale(values: list[float], drawn: str) -> None:
+    assert paint.scaled(Seen(values), "bus_voltage", 19).plain == drawn  # type: ignore[arg-type]

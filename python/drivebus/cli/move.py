@@ -17,7 +17,10 @@ from drivebus.cli.output import remark
 from drivebus.cli.session import Session, force_option, yes_option
 from drivebus.cli.types import Hertz, Seconds
 
-__all__ = ["COMMANDS"]
+__all__ = ["COMMANDS", "OBEYING", "going", "on_the_way"]
+
+OBEYING = "this takes its commands and its setpoint from the bus"
+"""What `prepare` does to a motor that turns."""
 
 
 class _Run(click.Command):
@@ -115,7 +118,7 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
     """Set the drive to obey the bus, and show the settings. Writes only those that differ. Does not move the motor."""
     session.will_write()
     with session.drive() as drive:
-        session.ask_if_running(drive, "this takes its commands and its setpoint from the bus", yes)
+        session.ask_if_running(drive, OBEYING, yes)
         before = drive.check_control()
         rows = [
             [item.code, item.actual, item.wanted, item.verified, item.label] for item in drive.prepare_control(store)
@@ -262,15 +265,20 @@ def _done(session: Session, drive: drivebus.Drive, command: str, towards: State 
             {"command": command, "unit": drive.unit, **{name: getattr(status, name, None) for name in told}}
         )
     elif status is not None:
-        session.out.say(f"{session.called}: {_on_the_way(status, towards) or status}")
+        session.out.say(f"{session.called}: {on_the_way(status, towards) or status}")
 
 
-def _on_the_way(status: drivebus.Status, towards: State | None) -> str | None:
+def on_the_way(status: drivebus.Status, towards: State | None) -> str | None:
     """What the motor does that turns, but not as it was told yet; None where it does."""
-    if towards is None or not status.state.running or status.state is towards:
+    doing = going(status.state, towards)
+    return doing if doing is None or status.frequency is None else f"{doing}, {status.frequency:.2f} Hz"
+
+
+def going(state: State, towards: State | None) -> str | None:
+    """What a motor in *state* does that was told to go *towards* another; None where it does not turn, or is there."""
+    if towards is None or not state.running or state is towards:
         return None
-    doing = "stopping" if towards is State.STOPPED else "reversing"
-    return doing if status.frequency is None else f"{doing}, {status.frequency:.2f} Hz"
+    return "stopping" if towards is State.STOPPED else "reversing"
 
 
 COMMANDS = [run, stop, coast, jog, reset, prepare, write]

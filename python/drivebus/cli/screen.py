@@ -7,7 +7,7 @@ a small one gets the values only. What does not fit even so is counted, and neve
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,7 @@ from rich.text import Text
 import drivebus
 from drivebus.cli.output import printable
 
-__all__ = ["MARKS", "Screen", "Watched"]
+__all__ = ["MARKS", "Screen", "Watched", "meaning"]
 
 _BETWEEN = 3
 """Blanks between two blocks of rows."""
@@ -140,9 +140,8 @@ class Screen:
             if drive.missing
         ]
         notes += [Text(text, "dim") for text in dict.fromkeys(drive.hint for drive in self._drives) if text]
-        there = {doubt for drive in self._drives for doubt in drive.doubtful.values()}
-        if there:
-            meant = ", ".join(f"{mark} {doubt}" for doubt, mark in MARKS.items() if doubt in there)
+        meant = meaning(doubt for drive in self._drives for doubt in drive.doubtful.values())
+        if meant:
             notes.append(Text(f"{meant}: `drivebus describe NAME` says why", "dim"))
         return notes
 
@@ -204,6 +203,12 @@ class Screen:
             values += [_text(having[0], extreme, name) for extreme in (having[0].least, having[0].greatest)]
         mark = _mark(having[0], name) if of_one else ""
         return [printable(text) for text in (name, *values, unit or "", mark)]
+
+
+def meaning(doubts: Iterable[str]) -> str:
+    """What the marks of *doubts* mean; empty without any."""
+    there = set(doubts)
+    return ", ".join(f"{mark} {doubt}" for doubt, mark in MARKS.items() if doubt in there)
 
 
 def _mark(drive: Watched, name: str) -> str:

@@ -30,6 +30,7 @@ __all__ = [
     "ask_once",
     "exit_code",
     "force_option",
+    "may_turn",
     "parse_format",
     "pass_session",
     "tell",
@@ -266,13 +267,9 @@ class Session:
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:
         """As `ask`, but only where the motor turns, or may: what stands still is not moved by *what*."""
-        try:
-            state = drive.state()
-        except drivebus.NotAllowed:
-            self.ask(f"It is not known whether the motor turns; {what}", yes)
-            return
-        if not state.at_rest:
-            self.ask(f"The motor turns; {what}", yes)
+        turning = may_turn(drive)
+        if turning:
+            self.ask(f"{turning}; {what}", yes)
 
     def ask(self, what: str, yes: bool, unit: int | None = None) -> None:
         """Says that *what* moves the motor of *unit* (None: the one of the options), and goes on only if wanted."""
@@ -282,6 +279,14 @@ class Session:
             self.crew.ask(text, yes)
         else:
             ask_once([text], yes)
+
+
+def may_turn(drive: drivebus.Drive) -> str:
+    """That the motor turns, or that nobody knows whether it does; empty if it stands still. Asks the drive."""
+    try:
+        return "" if drive.state().at_rest else "The motor turns"
+    except drivebus.NotAllowed:
+        return "It is not known whether the motor turns"
 
 
 def ask_once(texts: Sequence[str], yes: bool) -> None:

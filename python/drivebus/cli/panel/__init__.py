@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 
 import click
 
 import drivebus
+from drivebus.cli.names import parse_families
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, exit_code, pass_session
 from drivebus.cli.types import Seconds
@@ -33,9 +35,11 @@ _LEAST = (80, 24)
 def panel(context: click.Context, session: Session, watchdog: float | None) -> None:
     """Watch and command drives on a full screen. Space stops, always. `?` there shows the keys.
 
-    What moves a motor asks first. What the panel started it stops when it ends. It needs
-    `pip install 'drivebus[panel]'` and a terminal of 80 by 24; `drivebus monitor` needs neither.
+    What moves a motor asks first. What the panel started it stops when it ends. --profile names the family of all
+    units, or of each: 3=gd350,5=vfd500. It needs `pip install 'drivebus[panel]'` and a terminal of 80 by 24; `drivebus
+    monitor` needs neither.
     """
+    session = _each_its_family(session)
     _check_terminal(session, bool(context.find_root().params.get("trace")))
     try:
         import textual  # noqa: F401 - whether it is there
@@ -52,8 +56,41 @@ def panel(context: click.Context, session: Session, watchdog: float | None) -> N
         raise click.exceptions.Exit(128 + ended.signal)
     for called, failure in ended.failures:
         remark(f"Error: {called}: stop: {failure}")
+    if ended.mistake is not None:
+        what = f"{type(ended.mistake).__name__}: {ended.mistake}".rstrip(": ").replace("\n", " ")
+        remark(
+            f"Error: the panel ended by a mistake of its own: {what}. What it had started it has stopped first"
+            f"{', but for what is named above' if ended.failures else ''}. `{session.command('status')}` shows the "
+            "drive; the logger drivebus.panel has the rest at level DEBUG."
+        )
     if ended.failures:
         raise click.exceptions.Exit(exit_code(ended.failures[0][1]))
+    if ended.mistake is not None:
+        raise click.exceptions.Exit(1)
+
+
+def _each_its_family(session: Session) -> Session:
+    """*session*, with a family for each unit that --profile names by its address.
+
+    Raises:
+        NotAllowed: There is no such family.
+    """
+    families = parse_families(session.profile)
+    if not isinstance(families, dict):
+        return session
+    members = session.several or (session,)
+    if any(one.name for one in members):
+        raise click.UsageError("drivebus.toml has the family of each drive: `profile` there, or one --profile for all")
+    others = families.keys() - {one.unit for one in members}
+    if others:
+        raise click.UsageError(f"--profile names unit {min(others)}, and --unit does not")
+    for name in families.values():
+        drivebus.Profile.find(name)
+    each = tuple(
+        replace(one, profile=families.get(one.unit), trust_profile=one.trust_profile and one.unit in families)
+        for one in members
+    )
+    return each[0] if len(each) == 1 else replace(session, profile=None, several=each)
 
 
 def _check_terminal(session: Session, traces: bool) -> None:
@@ -65,6 +102,11 @@ def _check_terminal(session: Session, traces: bool) -> None:
         )
     if not all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
         raise drivebus.NotAllowed(f"the panel needs a terminal, and this is none; {plain}")
+    if not _is_in_front():
+        raise drivebus.NotAllowed(
+            "the panel needs to be in the foreground of its terminal, and another program is; bring it there with "
+            f"`fg`, or by `timeout --foreground` where timeout starts it; {plain}"
+        )
     kind = os.environ.get("TERM", "")
     if kind in ("", "dumb", "unknown") and os.name != "nt":
         raise drivebus.NotAllowed(f'the panel needs a terminal with a cursor, and TERM is "{kind}"; {plain}')
@@ -74,6 +116,14 @@ def _check_terminal(session: Session, traces: bool) -> None:
             f"the panel needs a window of {_LEAST[0]} by {_LEAST[1]}, and this one has {columns} by {lines}; make it "
             f"larger, or: {plain}"
         )
+
+
+def _is_in_front() -> bool:
+    """Whether the terminal is this program's now: one in the background is held as soon as it reads a key."""
+    try:
+        return os.name == "nt" or os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except OSError:  # a terminal that controls no programs
+        return True
 
 
 COMMANDS = [panel]

@@ -13,8 +13,9 @@ from typing import ClassVar
 from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
+from textual.screen import ModalScreen
 
-from drivebus import NotAllowed
+from drivebus import Drive, DrivebusError, NotAllowed
 from drivebus.cli.panel import paint
 from drivebus.cli.panel.dialogs import Ask, AskFor, Show
 from drivebus.cli.panel.driver import STOP_KEYS, stopping
@@ -25,6 +26,7 @@ from drivebus.cli.panel.motors import stop_all
 from drivebus.cli.panel.numbers import number
 from drivebus.cli.panel.overview import Overview
 from drivebus.cli.panel.parameters import Parameters
+from drivebus.cli.panel.preparing import lacking, question
 from drivebus.cli.panel.view import DriveView, Fleet, View
 
 __all__ = ["Panel"]
@@ -49,17 +51,18 @@ class Panel(App[None]):
 
     CSS = """
     Screen { background: ansi_default; }
+    View { overflow: hidden; }
+    #foot { dock: bottom; height: 4; }
     #head, #keys { height: 1; }
     #doing { height: auto; max-height: 2; }
     #messages { height: 3; }
-    #keys { margin-top: 0; }
     #tiles { height: 6; margin-top: 1; margin-bottom: 1; }
     #tiles Piece { width: 1fr; height: 6; }
     #values { height: 1fr; }
     #lamps, #fault, #line { height: auto; }
     #fault { max-height: 5; }
     #line { max-height: 3; }
-    #chosen { height: auto; max-height: 5; margin-top: 1; }
+    #chosen { height: auto; max-height: 7; margin-top: 1; }
     Overview { height: 1fr; scrollbar-size-vertical: 0; }
     ModalScreen { align: center bottom; background: transparent; }
     Show { align: center middle; }
@@ -83,6 +86,7 @@ class Panel(App[None]):
         Binding("J", "jog(True)", "jog in reverse"),
         Binding("f", "setpoint", "setpoint"),
         Binding("x", "reset", "reset a fault"),
+        Binding("b", "prepare", "prepare"),
         Binding("p", "parameters", "parameters"),
         Binding("m", "messages", "messages"),
         Binding("question_mark,f1", "help", "help"),
@@ -106,8 +110,10 @@ class Panel(App[None]):
     def stop_now(self) -> None:
         """Stops the drive that the keys are for, and every motor that this panel started. From any thread."""
         self._stops += 1
-        self.current.motor.stop()
-        stop_all(member.motor for member in self.members if member is not self.current)
+        # Looked at once: the cursor may move in the other thread.
+        current = self.current
+        current.motor.stop()
+        stop_all(member.motor for member in self.members if member is not current)
 
     def end_soon(self) -> None:
         """Ends the screen, as soon as it can. From any thread."""
@@ -168,10 +174,13 @@ class Panel(App[None]):
         if drive is None:
             self._unknown(member)
             return
-        way = "in reverse" if reverse else "forward"
+        motor, way = member.motor, "in reverse" if reverse else "forward"
 
         def ask(hz: float) -> None:
-            self._ask(member, f"run {way} to {hz:g} Hz", lambda since: member.motor.run(drive, hz, reverse, since))
+            what = f"run {way} to {hz:g} Hz"
+            self._if_it_obeys(
+                member, drive, lambda: self._ask(member, what, lambda since: motor.run(drive, hz, reverse, since))
+            )
 
         self._ask_number(member, f"run {way}, to how many Hz?", "Hz", self._setpoint(member), ask)
 
@@ -182,11 +191,13 @@ class Panel(App[None]):
         if drive is None:
             self._unknown(member)
             return
-        way = "in reverse" if reverse else "forward"
+        motor, way = member.motor, "in reverse" if reverse else "forward"
 
         def ask(seconds: float) -> None:
             what = f"jog {way} for {seconds:g} s"
-            self._ask(member, what, lambda since: member.motor.jog(drive, seconds, reverse, since))
+            self._if_it_obeys(
+                member, drive, lambda: self._ask(member, what, lambda since: motor.jog(drive, seconds, reverse, since))
+            )
 
         question = f"jog {way} at the drive's jog frequency, for how many seconds?"
         self._ask_number(member, question, "seconds", "1", ask, _LONGEST_JOG)
@@ -205,7 +216,9 @@ class Panel(App[None]):
             def give() -> None:
                 drive.setpoint = hz
 
-            self._ask(member, what, lambda since: member.motor.later(what, give, since))
+            self._if_it_obeys(
+                member, drive, lambda: self._ask(member, what, lambda since: member.motor.later(what, give, since))
+            )
 
         self._ask_number(member, "change the setpoint, to how many Hz?", "Hz", self._setpoint(member), ask)
 
@@ -219,6 +232,19 @@ class Panel(App[None]):
         what = "reset the fault"
         more = "A drive that is still told to run may start."
         self._ask(member, what, lambda since: member.motor.later(what, drive.reset_fault, since), more)
+
+    def action_prepare(self) -> None:
+        """Looks whether the drive obeys the bus, and offers to set it so."""
+        member = self.current
+        if member.drive is None:
+            self._unknown(member)
+            return
+        self._if_it_obeys(
+            member,
+            member.drive,
+            lambda: self.journal.say(f"{member.called}: it obeys the bus; there is nothing to write"),
+            only_sure=False,
+        )
 
     def action_parameters(self) -> None:
         """Shows the parameters of the drive that the keys are for."""
@@ -277,6 +303,36 @@ class Panel(App[None]):
 
     # --- what is asked -----------------------------------------------------------------------------------------
 
+    def _if_it_obeys(self, member: Member, drive: Drive, then: Callable[[], None], only_sure: bool = True) -> None:
+        """Looks whether the drive obeys the bus, and does *then* if it does. If not, offers to set it so."""
+        since = member.motor.stops
+
+        def look() -> None:
+            try:
+                items = lacking(member, drive, only_sure)
+                text = question(member, drive, items) if len(items) else ""
+            except DrivebusError as error:
+                self.journal.fail(f"{member.called}: look whether it obeys the bus", error)
+                return
+            self.call_later(go_on, text)
+
+        def go_on(text: str) -> None:
+            # What somebody does meanwhile is the answer.
+            if member.motor.stops != since or isinstance(self.screen, ModalScreen):
+                self.journal.say(f"{member.called}: nothing was sent: another key was pressed meanwhile", "yellow")
+            elif text:
+                self.push_screen(Ask(text, {"y": "yes, prepare it"}), lambda key: prepare() if key == "y" else None)
+            else:
+                then()
+
+        def prepare() -> None:
+            def order() -> None:
+                drive.prepare_control()
+
+            member.motor.later("prepare: it obeys the bus now", order, since)
+
+        threading.Thread(target=look, name=f"panel {member.called}", daemon=True).start()
+
     def _ask(self, member: Member, what: str, do: Callable[[int], None], more: str = "") -> None:
         """Says which motor will do *what*, and does it only on yes. A stop meanwhile takes the yes back."""
         since = member.motor.stops
@@ -312,7 +368,12 @@ class Panel(App[None]):
     # --- what ends it ------------------------------------------------------------------------------------------
 
     def _handle_exception(self, error: Exception) -> None:
-        """A mistake of ours ends the panel; it is raised when the screen is given back, and the motors stand."""
-        self.error = self.error or error
-        stop_all(member.motor for member in self.members)
+        """A mistake of ours ends the panel."""
+        self.fail(error)
         self.exit()
+
+    def fail(self, error: Exception) -> None:
+        """Stops what was started, and keeps *error*, which is told when the screen is given back. From any thread."""
+        stop_all(member.motor for member in self.members)
+        self.journal.trace(error)
+        self.error = self.error or error

@@ -40,7 +40,7 @@ class Ask(ModalScreen[str]):
     def compose(self) -> ComposeResult:
         """The question, and the keys."""
         keys = Text()
-        for key, meaning in {**self._answers, "n": "no"}.items():
+        for key, meaning in {**self._answers, "n": "no (Escape, q too)"}.items():
             keys.append(f" {key} ", "reverse bold").append(f" {meaning}   ")
         with Vertical(classes="dialog"):
             yield Static(Text(printable(self._text)))
@@ -80,7 +80,7 @@ class AskFor(ModalScreen[str]):
         with Vertical(classes="dialog"):
             yield Static(Text(printable(self._text)))
             yield LineField(self._value)
-            yield Static(Text("Enter goes on, Escape cancels. ", "dim").append_text(_STOP))
+            yield Static(Text("Enter goes on, Escape cancels, q is typed. ", "dim").append_text(_STOP))
 
     def on_line_field_submitted(self, event: LineField.Submitted) -> None:
         """Goes on with what was typed."""
@@ -102,5 +102,7 @@ class Show(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         """The text, in a box that scrolls."""
-        with VerticalScroll(classes="page"):
+        page = VerticalScroll(classes="page")
+        page.border_subtitle = "Escape or q closes"
+        with page:
             yield Static(self._text)

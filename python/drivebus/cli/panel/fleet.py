@@ -6,15 +6,17 @@ does not answer. The screen takes what is newest and waits for nobody.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 import drivebus
 from drivebus.cli import watching
 from drivebus.cli.advice import in_commands
+from drivebus.cli.move import on_the_way
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.motors import Motor
 from drivebus.cli.screen import Watched
@@ -31,6 +33,8 @@ _AGAIN = 1.0
 """Seconds after which a drive that did not answer is looked for again, for each such drive."""
 _GLANCE = 0.1
 """Seconds that such a drive is given: it must not keep the others waiting."""
+_RISE = 0.5
+"""Hz that a motor on its way to a stop does not gain."""
 
 
 class Member:
@@ -46,23 +50,27 @@ class Member:
         problem: Why it is not known, or not polled; None if it is.
         trends: The latest values of each register, the newest last.
         asked: What it is polled for.
+        may_be: The families that it may be of and that have a profile, where it does not say surely which.
         told: What its status words say beside the state, in the drive's own words.
     """
 
     def __init__(self, session: Session, line: Line, journal: Journal, watchdog: float | None) -> None:
         self.session = session
         self.line = line
-        self.motor = Motor(session.called, self._halt, journal, watchdog)
+        self.motor = Motor(session.called, self._halt, self._tell, journal, watchdog)
         self.drive: drivebus.Drive | None = None
         self.watched: Watched | None = None
         self.highest: float | None = None
         self.problem: drivebus.DrivebusError | None = None
         self.trends: dict[str, deque[float]] = {}
         self.told: dict[str, str] = {}
+        self.may_be: list[str] = []
+        self._is_unsure = False
         self.asked: list[str] = []
         self._words: list[str] = []
         self._newest: drivebus.Sample | None = None
         self._taken: drivebus.Sample | None = None
+        self._slowest = 0.0, math.inf
 
     @property
     def called(self) -> str:
@@ -81,7 +89,18 @@ class Member:
         """Why nothing is known of it now; empty if something is."""
         if self.watched is not None:
             return self.watched.missing
-        return "" if self.problem is None else in_commands(str(self.problem))
+        if self.problem is None:
+            return ""
+        naming = f"give `{self.naming}`" + (" in drivebus.toml" if self.session.name else "")
+        return in_commands(str(self.problem)).replace("give `--profile`", naming)
+
+    @property
+    def naming(self) -> str:
+        """How its family can be named, where it does not say itself what it is; empty where that helps nothing."""
+        if not self._is_unsure or self.problem is None:
+            return ""
+        family = self.may_be[0] if len(self.may_be) == 1 else "NAME"
+        return f'profile = "{family}"' if self.session.name else f"--profile {self.session.unit}={family}"
 
     @property
     def is_silent(self) -> bool:
@@ -98,6 +117,7 @@ class Member:
     def identify(self, again: bool) -> bool:
         """Finds out what it is; returns whether it did. *again*: it did not answer before."""
         bus = self.line.bus
+        drive = None
         try:
             # Who is silent costs the others as little as can be.
             if again and self.session.profile is None and not list(bus.scan([self.session.unit], _GLANCE)):
@@ -105,12 +125,21 @@ class Member:
             drive = self.session.drive_on(bus)
             watched = watching.watched(self.session, drive)
         except drivebus.DrivebusError as error:
+            self._is_unsure = drive is None and isinstance(error, drivebus.NotAllowed) and self.session.profile is None
+            if self._is_unsure and not self.may_be:
+                self._ask_families()
             self.problem = error
             return False
         self._words = [name for name in drive.profile.status_words if _may_be_read(drive, name)]
         self.asked = list(dict.fromkeys([*watching.asked(watched), *self._words]))
         self.drive, self.watched, self.problem = drive, watched, None
         return True
+
+    def _ask_families(self) -> None:
+        """Asks which families it may be of."""
+        with suppress(drivebus.DrivebusError):
+            found = self.line.bus.identify(self.session.unit)
+            self.may_be = [name for name in found.candidates if name in drivebus.profiles()]
 
     def ask_limit(self) -> None:
         """Asks for its highest frequency."""
@@ -133,12 +162,44 @@ class Member:
         self._taken = sample
         self.watched.take(sample)
         if sample.missing is None:
+            self._see_whether_it_slows(sample)
             self.told = {}
             for word in self._words:
                 self.told.update(self.watched.profile.fields(word, int(sample[word])))
             for name in self.watched.rows:
                 self.trends.setdefault(name, deque(maxlen=KEPT)).append(float(sample[name]))
         return True
+
+    @property
+    def state(self) -> drivebus.State | None:
+        """What it said last that it does; None if it does not tell."""
+        watched = self.watched
+        if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
+            return None
+        return drivebus.State(watched.profile.state(int(watched.now[watched.state])))
+
+    def _see_whether_it_slows(self, sample: drivebus.Sample) -> None:
+        """One that stands is not on its way to a stop any more, nor is one that somebody else has started again."""
+        since, least = self._slowest
+        if not self.motor.is_slowing or sample.time < since:
+            return
+        name = self.role("frequency")
+        now = 0.0 if name is None else abs(float(sample[name]))
+        self._slowest = since, min(now, least)
+        if now > least + _RISE or self.state is None or not self.state.running:
+            self.motor.is_slowing = False
+
+    def _tell(self) -> str:
+        """What the motor does that was told to stop."""
+        self._slowest = 0.0, math.inf
+        if self.drive is None:
+            return "what it does now is not known"
+        try:
+            status = self.drive.status()
+        except drivebus.DrivebusError as error:
+            return f"what it does now could not be read: {error}"
+        self._slowest = status.time, math.inf if status.frequency is None else abs(status.frequency)
+        return on_the_way(status, drivebus.State.STOPPED) or str(status)
 
     def _halt(self, confirm: float | None) -> None:
         """Stops it: with its own code where it is known what it is."""
@@ -232,7 +293,7 @@ class Line:
             for sample in poll.batch(len(by_drive), timeout=_INTERVAL):
                 by_drive[sample.drive].put(sample)
             if beats % 4 == 0:
-                units = [member.session.unit for member in by_drive.values()]
+                units = [member.session.unit for member in self.members]
                 self.links = {unit: self.bus.link(unit) for unit in units}
                 self.stats = self.bus.stats()
             beats += 1

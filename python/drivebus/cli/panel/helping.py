@@ -15,10 +15,12 @@ _HELP = [
     ("j, J", "jogs the motor forward, in reverse, for some seconds"),
     ("f", "changes the setpoint"),
     ("x", "resets a fault"),
+    ("b", "prepares the drive: sets it to obey the bus, in RAM. Says what it would write, and asks"),
     ("p", "parameters: look, search, change, compare with a backup"),
     ("m", "all messages"),
     ("Enter", "in the overview: looks at the drive under the cursor"),
     ("arrows", "choose the drive"),
+    ("PageDown", "in the view of one drive: the values that did not fit"),
     ("Escape", "goes back; no to a question"),
     ("q, Ctrl-C", "end the panel"),
 ]
@@ -31,7 +33,9 @@ a computer without power stop nothing: for those there is --watchdog.
 
 A motor that was started elsewhere goes on when the panel ends.
 
-? behind a value: not verified. ! behind a value: assumed.
+? behind a value: not verified. ! behind a value: assumed. `drivebus describe NAME` says why.
+
+Behind a trend stand the least and the greatest value that it shows.
 
 An emergency stop is a wire."""
 

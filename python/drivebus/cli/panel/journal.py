@@ -54,6 +54,10 @@ class Journal:
         notes = getattr(error, "__notes__", ())
         self.say(f"{what}: {'; '.join(in_commands(str(part)) for part in (error, *notes))}", "bold red")
 
+    def trace(self, error: Exception) -> None:
+        """Has the logger alone keep where *error*, which nobody foresaw, came from."""
+        self._logger.debug("it ends by a mistake of its own", exc_info=error)
+
     def lines(self) -> list[Line]:
         """All that are kept."""
         return list(self._lines)

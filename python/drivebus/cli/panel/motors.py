@@ -17,8 +17,8 @@ from drivebus.cli.panel.journal import Journal
 
 __all__ = ["Motor", "stop_all", "wait_for_all"]
 
-_PAUSE = 0.02
-"""Seconds between two stops that could not be sent."""
+_PAUSE = 0.05
+"""Seconds between two stops while a start is under way: on a line full of stops, which go first, no start ends."""
 
 
 _STOPPED = "it was told to stop meanwhile; nothing was sent"
@@ -50,27 +50,37 @@ class Motor:
     Args:
         called: What the drive is called.
         halt: Stops it, whether it is known already what drive it is or not.
+        tell: Asks the drive what the motor does now, and says it in words.
         journal: Who is told what came of it.
         watchdog: After how many seconds of silence the drive stops by itself while this panel runs it; None: never.
 
     Attributes:
         stops: How often it was told to stop. Who asks before a start keeps it: a stop meanwhile takes the answer back.
+        is_slowing: Whether a stop was confirmed, as it is on the ramp, and it was not seen to stand or run since.
         failure: Why a motor that this panel started could not be stopped when it was stopped last; None if it could.
     """
 
     def __init__(
-        self, called: str, halt: Callable[[float | None], None], journal: Journal, watchdog: float | None
+        self,
+        called: str,
+        halt: Callable[[float | None], None],
+        tell: Callable[[], str],
+        journal: Journal,
+        watchdog: float | None,
     ) -> None:
         self.called = called
         self._halt = halt
+        self._tell = tell
         self._journal = journal
         self._watchdog = watchdog
         self._lock = threading.Lock()
         self._under_way = 0
         self._block: _Block | None = None
         self._proving = False
+        self._repeating = False
         self._thread: threading.Thread | None = None
         self.stops = 0
+        self.is_slowing = False
         self.failure: drivebus.DrivebusError | None = None
 
     @property
@@ -148,7 +158,7 @@ class Motor:
         enter: Callable[[], AbstractContextManager[drivebus.Drive]],
         seconds: float | None,
     ) -> None:
-        self._block, self.failure = block, None
+        self._block, self.failure, self.is_slowing = block, None, False
         # Before the thread begins: a stop that comes before it is to find it.
         self._under_way += 1
         self._thread = threading.Thread(
@@ -179,7 +189,8 @@ class Motor:
                 if turns:
                     self._journal.say(f"{self.called}: {what}: done")
                     self._obey(block, seconds)
-            self._journal.say(f"{self.called}: stopped")
+            if turns:
+                self._say_stopped()
         except drivebus.DrivebusError as error:
             self.failure = error if turns else None
             self._journal.fail(f"{self.called}: {'stop' if turns else what}", error)
@@ -199,24 +210,42 @@ class Motor:
 
     def _stop(self, prove: bool) -> None:
         """Sends stops until nothing that moves it is under way any more; with *prove*, looks at the drive then."""
+        mine = False
         try:
-            while self._moves():
+            while (mine := self._repeats(mine)) or (prove and self._moves()):
                 try:
-                    self._halt(0.0)
+                    if mine:
+                        self._halt(0.0)
                 except drivebus.DrivebusError as error:
                     self._journal.fail(f"{self.called}: stop", error)
-                    threading.Event().wait(_PAUSE)
+                threading.Event().wait(_PAUSE)
             if not prove:
                 # Its own thread proves it, or the stop before this one.
                 self._halt(0.0)
                 return
             self._halt(None)
-            self._journal.say(f"{self.called}: stopped")
+            self._say_stopped()
         except drivebus.DrivebusError as error:
             self._journal.fail(f"{self.called}: stop", error)
         finally:
             if prove:
                 self._proving = False
+            if mine:  # what nobody foresaw ended it
+                self._repeating = False
+
+    def _say_stopped(self) -> None:
+        """Says that the stop is confirmed, and what the motor does then."""
+        told = self._tell()
+        self.is_slowing = True
+        self._journal.say(f"{self.called}: stop confirmed: {told}")
+
+    def _repeats(self, mine: bool) -> bool:
+        """Whether this thread sends the next stop: one at a time does, and while something is under way."""
+        with self._lock:
+            if self._repeating and not mine:
+                return False
+            self._repeating = self._under_way > 0
+            return self._repeating
 
     def _moves(self) -> bool:
         with self._lock:

@@ -136,7 +136,7 @@ class Overview(ScrollView, can_focus=True):
             shown = "" if name is None else paint.value(member, name)
             line.append(f"{shown:>{_NUMBER}}")
         if trends:
-            drawn = paint.trend(member, roles[0], _TREND) if roles[0] is not None else Text("")
+            drawn = paint.scaled(member, roles[0], _TREND) if roles[0] is not None else Text("")
             drawn.pad_right(_TREND - drawn.cell_len)
             line.append("  ").append_text(drawn)
         line.append("  ").append_text(paint.state(member))
@@ -158,4 +158,5 @@ def summary(members: Sequence[Member]) -> Text:
     ):
         if count:
             told.append(f", {count} {what}", style)
-    return told
+    meant = paint.marks(*members)
+    return told.append(f"  {meant}", "dim") if meant else told

@@ -11,9 +11,11 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 from textual.renderables.digits import Digits
 
+import drivebus
+from drivebus.cli.move import going
 from drivebus.cli.output import printable
 from drivebus.cli.panel.fleet import Member
-from drivebus.cli.screen import MARKS
+from drivebus.cli.screen import MARKS, meaning
 
 __all__ = [
     "big",
@@ -22,8 +24,10 @@ __all__ = [
     "head",
     "lamps",
     "line",
+    "marks",
     "named",
     "plain_value",
+    "scaled",
     "state",
     "tiles",
     "trend",
@@ -33,6 +37,8 @@ __all__ = [
     "values",
 ]
 
+_LEAST_SPAN = 0.1
+"""Which part of its greatest value a trend spans at least: a small wobble does not look like a collapse."""
 _LEVELS = "▁▂▃▄▅▆▇█"
 _ON, _OFF = "●", "○"
 
@@ -61,7 +67,7 @@ def doing(member: Member) -> Text:
     """What it does now: state, frequency and setpoint, and what its status words say beside that."""
     told = Text(_nothing(member), "yellow")
     if member.watched is not None:
-        told = member.watched.doing()
+        told = _state(member)
     if member.watched is not None and member.watched.now is not None:
         frequencies = [value(member, name) for role in _ROLES if (name := member.role(role)) is not None]
         if frequencies:
@@ -73,9 +79,21 @@ def doing(member: Member) -> Text:
 def state(member: Member) -> Text:
     """State and fault alone, or why there is none."""
     if member.watched is not None and not member.why:
-        return member.watched.doing()
+        return _state(member)
     why = f": {member.why}" if member.why else ""
+    if member.naming:
+        why = f"; name it: {member.naming}"
     return Text(printable(f"{_nothing(member)}{why}"), "yellow")
+
+
+def _state(member: Member) -> Text:
+    """State and fault; of one that was stopped here and turns still, that it is stopping."""
+    assert member.watched is not None
+    state = member.state
+    if member.motor.is_slowing and state is not None and (doing := going(state, drivebus.State.STOPPED)):
+        return Text(doing, "yellow")
+    told = member.watched.doing()
+    return told if told.plain else Text("state not told", "dim")
 
 
 def _nothing(member: Member) -> str:
@@ -87,10 +105,7 @@ def _nothing(member: Member) -> str:
 
 def turns(member: Member) -> bool:
     """Whether its motor turns, as far as it tells."""
-    watched = member.watched
-    if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
-        return False
-    return watched.profile.state(int(watched.now[watched.state])) in ("forward", "reverse")
+    return member.state is not None and member.state.running
 
 
 def tripped(member: Member) -> bool:
@@ -103,10 +118,12 @@ def _beside(member: Member) -> Text:
     """What the status words say beside the state, as `status` has it."""
     ready, source = member.told.get("ready"), member.told.get("control_channel")
     told = Text()
-    if ready is not None:
+    obeys = source in (None, "communication")
+    # Ready for its keypad would read as ready for r.
+    if ready is not None and (obeys or ready != "ready"):
         told.append(f", {ready.replace('_', ' ')}")
     if source is not None:
-        told.append(f", commands from {source}", "" if source == "communication" else "yellow")
+        told.append(f", commands from {source}{'' if obeys else ': b prepares it'}", "" if obeys else "yellow")
     if member.told.get("overload_alarm", "none") != "none":
         told.append(", overload pre-alarm", "bold yellow")
     return told
@@ -117,8 +134,18 @@ def value(member: Member, name: str) -> str:
     watched = member.watched
     if watched is None or watched.now is None or name not in watched.now:
         return ""
-    mark = MARKS.get(watched.doubtful.get(name, ""), "")
-    return f"{watched.rows[name].text(watched.now[name])}{mark}"
+    return f"{watched.rows[name].text(watched.now[name])}{_mark(member, name)}"
+
+
+def _mark(member: Member, name: str) -> str:
+    """What stands behind what is not proved."""
+    assert member.watched is not None
+    return MARKS.get(member.watched.doubtful.get(name, ""), "")
+
+
+def marks(*members: Member) -> str:
+    """What the marks mean that *members* have; empty if they have none."""
+    return meaning(doubt for member in members if member.watched for doubt in member.watched.doubtful.values())
 
 
 def plain_value(member: Member, name: str) -> str:
@@ -132,25 +159,21 @@ def named(name: str) -> str:
 
 
 def limits(member: Member, name: str) -> str:
-    """Between which values *name* lies: up to the drive's own highest frequency, where it tells that."""
+    """Its unit, and up to which value *name* goes on this drive where it tells that: a register may hold far more."""
     assert member.watched is not None
     row = member.watched.rows[name]
     highest = member.highest if name in (member.role("frequency"), member.role("setpoint")) else None
-    if highest is not None:
-        return f"{row.unit}, up to {row.text(highest)}"
-    if row.low is None or row.high is None:
-        return row.unit
-    return f"{row.unit}, {row.text(row.low)} to {row.text(row.high)}".removeprefix(", ")
+    return row.unit if highest is None else f"{row.unit}, up to {row.text(highest)}"
 
 
 def big(member: Member, name: str, width: int) -> RenderableType:
     """One value in big figures, with its name, its unit, its limits and its trend, in six lines."""
     shown = plain_value(member, name)
     return Group(
-        Text(_fitting(named(name), width), "bold"),
+        Text(_fitting(named(name) + _mark(member, name), width), "bold"),
         Digits(shown, "bold") if shown else Text("\n\n"),
         Text(_fitting(limits(member, name), width), "dim"),
-        trend(member, name, width),
+        scaled(member, name, width),
     )
 
 
@@ -169,13 +192,33 @@ def trend(member: Member, name: str, width: int) -> Text:
     low, high = min(seen), max(seen)
     if member.highest and name in (member.role("frequency"), member.role("setpoint")):
         low, high = min(0.0, low), max(member.highest, high)
-    span = (high - low) or 1.0
+    span = max(high - low, _LEAST_SPAN * max(abs(low), abs(high))) or 1.0
+    # What is wider than what was seen is so to both sides, and does not begin below 0 for that.
+    bottom = (low + high - span) / 2
+    bottom = max(bottom, 0.0) if low >= 0 else bottom
     steps = len(_LEVELS) - 1
-    return Text("".join(_LEVELS[round((each - low) / span * steps)] for each in seen), "cyan")
+    return Text("".join(_LEVELS[round((each - bottom) / span * steps)] for each in seen), "cyan")
 
 
-def values(member: Member, shown_big: Sequence[str], width: int, height: int) -> Text:
-    """The other values, in as many columns as *width* takes; what does not fit is counted."""
+def scaled(member: Member, name: str, width: int) -> Text:
+    """The trend of *name*, and behind it the least and the greatest value that it shows."""
+    seen = list(member.trends.get(name, ()))
+    if not seen or member.watched is None:
+        return Text("")
+    row = member.watched.rows[name]
+
+    def ends(count: int) -> str:
+        least, greatest = (row.text(end(seen[-count:])) for end in (min, max))
+        return least if least == greatest else f"{least}…{greatest}"
+
+    room = width - len(ends(width)) - 1
+    if room < 1:
+        return Text(ends(width), "dim")
+    return _filled(trend(member, name, room), room).append(f" {ends(room)}", "dim")
+
+
+def values(member: Member, shown_big: Sequence[str], width: int, height: int, page: int) -> Text:
+    """The other values, in as many columns as *width* takes; what does not fit is on other pages, which are counted."""
     watched = member.watched
     if watched is None or height < 1:
         return Text("")
@@ -184,12 +227,15 @@ def values(member: Member, shown_big: Sequence[str], width: int, height: int) ->
     trends = width >= 2 * (_CELL + _TREND)
     for name in names:
         text = Text(f"{named(name):<21.21} {value(member, name):>8} {watched.rows[name].unit:<5.5}")
-        cells.append(text.append_text(_filled(trend(member, name, _TREND), _TREND)) if trends else text)
+        cells.append(text.append_text(_filled(scaled(member, name, _TREND), _TREND)) if trends else text)
     across = max(1, width // (_CELL + _TREND if trends else _CELL))
     room = height * across
-    lacking = len(cells) - room
-    if lacking > 0:
-        cells = [*cells[: room - 1], Text(f"{lacking + 1} more: make the window larger", "dim")]
+    if len(cells) > room:
+        each = max(room - 1, 1)  # one place says that there are more
+        pages = -(-len(cells) // each)
+        at = page % pages
+        more = Text(f"page {at + 1} of {pages}: PageDown", "bold")
+        cells = [*cells[at * each : (at + 1) * each], more][:room]
     lines = Text()
     down = -(-len(cells) // across)
     for row in range(down):
@@ -202,7 +248,7 @@ def values(member: Member, shown_big: Sequence[str], width: int, height: int) ->
 _BETWEEN = "  "
 _CELL = 21 + 1 + 8 + 1 + 5 + len(_BETWEEN)
 """Columns of one value: name, value, unit, and what lies between them."""
-_TREND = 16
+_TREND = 24
 """Columns of its trend, where there is room."""
 
 
@@ -257,7 +303,8 @@ def line(member: Member) -> Text:
     own = stats.units.get(unit, stats)
     silent, damaged = own.timeouts, own.crc_errors + own.bad_answers
     told = Text("line: ", "bold")
-    told.append(str(member.line.links.get(unit, "")))
+    link = member.line.links.get(unit)
+    told.append("nothing was asked yet" if link is None or not link.asked else str(link))
     told.append(f"; {silent} silent, {damaged} damaged", "yellow" if silent or damaged else "")
     if own.answers:
         told.append(f"; {own.round_trip.min * 1e3:.0f} to {own.round_trip.max * 1e3:.0f} ms")

@@ -129,7 +129,7 @@ class Parameters(Screen[None]):
         self._title = title
         self._shown = list(rows)
         self._turn += 1
-        self.query_one("#head", Piece).put(Text(printable(f"{self._member.what}: parameters, {title}"), "bold"))
+        self.query_one("#head", Piece).put(_title(f"parameters, {title}: {self._member.what}"))
         table = self._table()
         table.clear()
         for row in rows:
@@ -273,16 +273,21 @@ def _range(row: drivebus.Description) -> str:
     return f"{row.text(row.low)} to {row.text(row.high)}"
 
 
+def _title(text: str) -> Text:
+    """One line, of which the end may be cut."""
+    return Text(printable(text), "bold", no_wrap=True, overflow="ellipsis")
+
+
 def _keys() -> Text:
     keys = Text()
     for key, meaning in (
         ("Space", "STOP"),
         ("/", "search"),
-        ("arrows", "group, row"),
+        ("\u2190 \u2192", "group"),
         ("Enter", "change"),
-        ("u", "read again"),
+        ("u", "reread"),
         ("d", "compare"),
         ("Escape", "back"),
     ):
-        keys.append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}  ")
+        keys.append("  " if keys else "").append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}")
     return keys

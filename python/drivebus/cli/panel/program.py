@@ -38,10 +38,12 @@ class Ended:
     Attributes:
         signal: The signal that ended it; 0 for none.
         failures: Which drives it could not stop, and why.
+        mistake: What nobody foresaw and ended it; None for nothing.
     """
 
     signal: int = 0
     failures: list[tuple[str, drivebus.DrivebusError]] = field(default_factory=list)
+    mistake: Exception | None = None
 
 
 def run(session: Session, watchdog: float | None) -> Ended:
@@ -55,9 +57,11 @@ def run(session: Session, watchdog: float | None) -> Ended:
     with opened(session, journal, watchdog) as members:
         app = Panel(members, journal)
         ended = Ended()
-        with _heeding_signals(app, ended):
+        with _heeding_signals(app, ended), _heeding_threads(app):
             try:
                 app.run(mouse=False)
+            except Exception as error:  # a screen that could not even be opened
+                app.fail(error)
             finally:
                 _end(members)
         ended.failures = [
@@ -65,8 +69,9 @@ def run(session: Session, watchdog: float | None) -> Ended:
         ]
         if app.terminal_lost.is_set() and not ended.signal:
             ended.signal = getattr(signal, "SIGHUP", signal.SIGTERM)
-        if app.error is not None:
+        if isinstance(app.error, drivebus.DrivebusError):
             raise app.error
+        ended.mistake = app.error
     return ended
 
 
@@ -80,6 +85,23 @@ def _end(members: Sequence[Member]) -> None:
         with suppress(OSError):
             remark(f"Stopping {', '.join(turning)} …")
     wait_for_all(motors)
+
+
+@contextmanager
+def _heeding_threads(app: Panel) -> Iterator[None]:
+    """A block in which what nobody foresaw in a thread ends the screen, and is not written across it."""
+    before = threading.excepthook
+
+    def hook(failed: threading.ExceptHookArgs) -> None:
+        if isinstance(failed.exc_value, Exception):
+            app.fail(failed.exc_value)
+            app.end_soon()
+
+    threading.excepthook = hook
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 @contextmanager

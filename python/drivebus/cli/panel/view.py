@@ -9,7 +9,7 @@ from rich.console import RenderableType
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal
+from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import Static
 
@@ -18,20 +18,11 @@ from drivebus.cli.panel.fleet import Member
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.overview import Overview, summary
 
-__all__ = ["KEYS", "DriveView", "Fleet", "Piece", "View"]
+__all__ = ["DriveView", "Fleet", "Piece", "View"]
 
-KEYS = [
-    ("Space", "STOP"),
-    ("r", "run"),
-    ("s", "stop"),
-    ("j", "jog"),
-    ("f", "setpoint"),
-    ("x", "reset"),
-    ("p", "params"),
-    ("?", "help"),
-    ("q", "quit"),
-]
-"""The keys that the last line names."""
+_KEYS = "Space STOP  r run  s stop  j jog  f set Hz  {next}  p params  ? help  q quit"
+_FAULT, _PREPARE = "x reset", "b prepare"
+"""The keys that the last line names. In one of its places stands what helps now: not all have room in 80 columns."""
 
 _TILE = 19
 """Columns of a big value: six figures and a point."""
@@ -81,16 +72,18 @@ class View(Screen[None]):
 
     def foot(self) -> ComposeResult:
         """The last lines of the screen."""
-        yield Piece("messages")
-        yield Piece("keys")
+        with Vertical(id="foot"):
+            yield Piece("messages")
+            yield Piece("keys")
 
     def show(self) -> None:
         """Shows what is known now."""
         self.query_one("#messages", Piece).put(self._messages())
-        keys = Text()
-        for key, meaning in KEYS:
-            keys.append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}  ")
-        self.query_one("#keys", Piece).put(keys)
+        self.query_one("#keys", Piece).put(_keys(paint.tripped(self.shown())))
+
+    def shown(self) -> Member:
+        """The drive that the keys are for."""
+        raise NotImplementedError
 
     def _messages(self) -> Text:
         """The newest message in full, as far as there is room, and those before it."""
@@ -129,6 +122,10 @@ class Fleet(View):
         self._members = members
         self._current = current
 
+    def shown(self) -> Member:
+        """The one under the cursor."""
+        return self._current()
+
     def compose(self) -> ComposeResult:
         """How many they are, a line each, what there is to say of the one under the cursor, and the foot."""
         yield Piece("head")
@@ -160,16 +157,29 @@ class DriveView(View):
         Binding("escape", "app.leave_view", "back"),
         Binding("left,up", "app.next(-1)", "previous drive"),
         Binding("right,down", "app.next(1)", "next drive"),
+        Binding("pageup", "page(-1)", "previous values"),
+        Binding("pagedown", "page(1)", "next values"),
     ]
 
     def __init__(self, member: Member, members: Sequence[Member], journal: Journal) -> None:
         super().__init__(journal)
         self.member = member
         self._members = members
+        self._page = 0
+
+    def shown(self) -> Member:
+        """The one in view."""
+        return self.member
 
     def turn_to(self, member: Member) -> None:
         """Shows another drive."""
         self.member = member
+        self._page = 0
+        self.show()
+
+    def action_page(self, by: int) -> None:
+        """Shows other values."""
+        self._page += by
         self.show()
 
     def compose(self) -> ComposeResult:
@@ -190,14 +200,19 @@ class DriveView(View):
         head = paint.head(member)
         if len(self._members) > 1:
             head.append(f"  {self._members.index(member) + 1} of {len(self._members)}", "dim")
+        if meant := paint.marks(member):
+            head.append(f"  {meant}", "dim")
         self.query_one("#head", Piece).put(head)
         self.query_one("#doing", Piece).put(paint.doing(member))
         names = paint.tiles(member, min(max(self.size.width // (_TILE + 1), 1), _MOST_TILES))
         self._show_tiles(names)
         values = self.query_one("#values", Piece)
-        values.put(paint.values(member, names, values.size.width, values.size.height))
+        values.put(paint.values(member, names, values.size.width, values.size.height, self._page))
         self.query_one("#lamps", Piece).put(Text("\n").join(paint.lamps(member)))
-        self.query_one("#fault", Piece).put(paint.fault(member))
+        fault = self.query_one("#fault", Piece)
+        told = paint.fault(member)
+        fault.display = bool(told)
+        fault.put(told)
         self.query_one("#line", Piece).put(paint.line(member))
         super().show()
 
@@ -208,6 +223,15 @@ class DriveView(View):
             if place >= len(names):
                 continue
             name, width = names[place], max(tile.size.width - 1, 1)
-            drawn = paint.trend(self.member, name, width).plain
+            drawn = paint.scaled(self.member, name, width).plain
             key = (name, paint.value(self.member, name), drawn, self.member.highest)
             tile.put(paint.big(self.member, name, width), key)
+
+
+def _keys(is_tripped: bool) -> Text:
+    """The last line."""
+    keys = Text()
+    for named in _KEYS.format(next=_FAULT if is_tripped else _PREPARE).split("  "):
+        key, _, meaning = named.partition(" ")
+        keys.append("  " if keys else "").append(key, "bold red" if meaning == "STOP" else "bold").append(f" {meaning}")
+    return keys
