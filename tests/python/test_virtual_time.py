@@ -54,7 +54,7 @@ def test_a_command_that_has_no_effect_is_unconfirmed(
     virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive
 ) -> None:
     # Commands from a bus that is not this one: the state words say "communication", and the drive does not obey.
-    virtual_drive.write("P00.02", 1)
+    virtual_drive.write("P00.02", 1, unverified=True)
     began = virtual_bus.now()
     with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent to unit 1.*stopped"):
         virtual_drive.run(hz=10.0, confirm=2.0)
@@ -66,7 +66,7 @@ def test_a_command_that_has_no_effect_is_unconfirmed(
 def test_a_motor_that_does_not_turn_round_is_told(virtual: Simulator, virtual_drive: Drive) -> None:
     virtual_drive.run(hz=10.0)
     virtual_drive.wait_for_speed(timeout=60)
-    virtual_drive.write("P00.02", 1)  # as above: the next command has no effect
+    virtual_drive.write("P00.02", 1, unverified=True)  # as above: the next command has no effect
     with pytest.raises(drivebus.Unconfirmed, match=r"run_reverse was sent to unit 1.*forward"):
         virtual_drive.run(hz=10.0, reverse=True)
     assert virtual.drive(1).state == "forward"
@@ -112,7 +112,7 @@ def test_the_first_error_is_kept_when_stopping_fails_too(virtual: Simulator, vir
 
 
 def test_a_start_that_is_not_confirmed_is_stopped(virtual: Simulator, virtual_drive: Drive) -> None:
-    virtual_drive.write("P00.02", 1)
+    virtual_drive.write("P00.02", 1, unverified=True)
     with pytest.raises(drivebus.Unconfirmed), virtual_drive.running(hz=5.0):
         pytest.fail("the block must not be entered")
     assert commands(virtual) == [FORWARD, STOP]
