@@ -211,7 +211,8 @@ def scaled(member: Member, name: str, width: int) -> Text:
         least, greatest = (row.text(end(seen[-count:])) for end in (min, max))
         return least if least == greatest else f"{least}…{greatest}"
 
-    room = width - len(ends(width)) - 1
+    # Of fewer values the ends may be the longer ones: 9.49…30.00 and then 21.49…30.00.
+    room = next((room for room in range(width, 0, -1) if room + 1 + len(ends(room)) <= width), 0)
     if room < 1:
         return Text(ends(width), "dim")
     return _filled(trend(member, name, room), room).append(f" {ends(room)}", "dim")
