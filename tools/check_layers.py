@@ -75,6 +75,7 @@ ROOMS: list[set[str]] = [
     {"identify"},
     {"operations"},
     {"backup"},
+    {"discovery"},
     {"watchdog", "poll"},
     {"drive"},
     {"bus"},

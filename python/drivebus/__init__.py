@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from drivebus._native import SerialFormat, __version__, crc16
     from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
     from drivebus.bus import Bus
+    from drivebus.discovery import Discovery
     from drivebus.drive import Drive
     from drivebus.errors import (
         BadAnswer,
@@ -70,6 +71,7 @@ __all__ = [
     "Description",
     "Diff",
     "Difference",
+    "Discovery",
     "Drive",
     "DrivebusError",
     "DrivebusWarning",
@@ -121,6 +123,7 @@ if not TYPE_CHECKING:
             "_native": ("SerialFormat", "__version__", "crc16"),
             "backup": ("Backup", "Diff", "Difference", "Restoration", "Restored"),
             "bus": ("Bus",),
+            "discovery": ("Discovery",),
             "drive": ("Drive",),
             "errors": (
                 "BadAnswer",

@@ -14,6 +14,7 @@ from typing import overload
 from drivebus import checks
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
+from drivebus.discovery import asking
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
@@ -114,6 +115,7 @@ class Drive(DriveFace):
     backup = blocking(keeping.backup)
     restore = blocking(keeping.restore)
     diff = blocking(keeping.diff)
+    discover = blocking(asking.discover)
 
     torque = _Setpoint("torque")
     pid = _Setpoint("pid")

@@ -44,6 +44,7 @@ LOOKING = [
     ["raw", "01 03 21 03 00 01"],
     ["raw", "01 08 00 00 12 34"],
     ["describe", "P00.11"],
+    ["discover", "{file.parent}/asked", "--group", "P05"],
 ]
 
 

@@ -86,6 +86,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "list": (["--profile", "gd350", "list"], 0),
     "list a group": (["--profile", "gd350", "list", "P00"], 0),
     "doctor": (["doctor", ONE, "--unit", "1"], 0),
+    "discover": (["--port", ONE, "discover", "asked", "--group", "P05"], 0),
     "profiles": (["profiles"], 0),
     "profiles show": (["profiles", "show", "gd350"], 0),
     "profiles check": (["profiles", "check", "."], 2),
@@ -157,7 +158,7 @@ def looked_at(name: str, size: tuple[int, int], colours: bool, folder: Path) -> 
     """What *name* showed; kept for whoever looks."""
     for kept in folder.glob("kept.*"):
         kept.unlink()
-    for path in (folder / "acme").glob("*"):
+    for path in [*(folder / "acme").glob("*"), *(folder / "asked").glob("*")]:
         path.unlink()
     words, _ = COMMANDS[name]
     seen = on_a_terminal(words, size, {} if colours else {"NO_COLOR": "1"}, cwd=folder, until=WHILE.get(name))

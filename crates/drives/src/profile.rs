@@ -29,6 +29,9 @@ use crate::parts::watchdog::Watchdog;
 use crate::plan::{ReadRules, ReadSpan, plan_spans};
 use crate::profile::roles::Roles;
 
+/// The greatest number of a group or of a parameter in it: codes have two digits for each.
+const LAST_NUMBER: u8 = 99;
+
 /// What one family of drives means by its registers.
 ///
 /// Get one by [`Profile::builtin`] or [`Profile::load`]. It never changes afterwards and is the same for every drive of
@@ -220,6 +223,19 @@ impl Profile {
     pub fn is_closed(&self, address: u16) -> bool {
         let [group, _] = (address & !self.memory_mask()).to_be_bytes();
         self.groups.closed.contains(&group)
+    }
+
+    /// The groups in which a code is its own address: P05.06 is at 0506H. Empty where the profile lists the addresses.
+    ///
+    /// Left out are those that the maker keeps closed, and those at whose addresses registers stand.
+    pub fn parameter_groups(&self) -> impl Iterator<Item = u8> {
+        let registers = |group: u8| {
+            let here = |entry: &Entry| entry.address.is_some_and(|address| address.to_be_bytes()[0] == group);
+            self.entries.iter().any(|entry| entry.kind == Kind::Register && here(entry))
+        };
+        (0..=LAST_NUMBER)
+            .filter(|_| !self.groups.listed)
+            .filter(move |&group| !self.groups.closed.contains(&group) && !registers(group))
     }
 
     /// What the identification code `code` says; `None` if this profile does not know it.

@@ -106,6 +106,11 @@ impl Profile {
         self.0.max_words()
     }
 
+    fn parameter_groups(&self) -> Vec<u16> {
+        // Bytes would become a `bytes` object.
+        self.0.parameter_groups().map(u16::from).collect()
+    }
+
     #[pyo3(signature = (role, /))]
     fn role(&self, role: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
         Ok(self.0.role(&text("role", role)?).map(known_as))

@@ -26,7 +26,7 @@ use std::time::Duration;
 use drivebus_rtu::{ExceptionCode, Instant, UnitAddress};
 
 pub(crate) use all::Drives;
-pub(crate) use family::{Family, own};
+pub(crate) use family::{Family, own, unlisted};
 use family::{Kind, OnSilence, Scaled, Silence};
 use machine::{Command, Machine, RunState, Settings};
 pub(crate) use map::Map;

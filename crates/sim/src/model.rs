@@ -2,7 +2,7 @@
 
 use drivebus_drives::Profile;
 
-use crate::drive::{Family, Map, own};
+use crate::drive::{Family, Map, own, unlisted};
 use crate::error::SimError;
 
 /// What a simulated unit behaves like.
@@ -50,6 +50,12 @@ fn is_shipped(profile: &Profile) -> bool {
 }
 
 fn shipped(name: &str, profile: &Profile) -> Result<Map, SimError> {
-    let family = Family::named(name).ok_or_else(|| SimError::NotSimulated { profile: name.to_owned() })?;
+    let mut family = Family::named(name).ok_or_else(|| SimError::NotSimulated { profile: name.to_owned() })?;
+    // What is typed or listed comes later, or is left out here: it is more than a stand-in.
+    let groups: Vec<u8> = profile.parameter_groups().collect();
+    let unlisted = unlisted().filter(|stand_in| {
+        profile.entry_at(stand_in.address).is_none() && groups.contains(&stand_in.address.to_be_bytes()[0])
+    });
+    family.parameters = unlisted.chain(family.parameters).collect();
     Ok(Map::new(family, profile))
 }

@@ -11,6 +11,7 @@ from drivebus import checks
 from drivebus.aio.watchdog import Watchdog
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
+from drivebus.discovery import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
 from drivebus.operations.face import DriveFace, awaited, documented_by, unit_of
@@ -106,6 +107,7 @@ class Drive(DriveFace):
     backup = awaited(keeping.backup)
     restore = awaited(keeping.restore)
     diff = awaited(keeping.diff)
+    discover = awaited(asking.discover)
 
     set_setpoint = awaited(setpoints.set_setpoint)
     set_torque = awaited(setpoints.setter("torque"))

@@ -66,6 +66,7 @@ async def restore(
     groups: Sequence[str] | None = None,
     serial: bool = False,
     motor: bool = False,
+    raw: Sequence[str] = (),
     force: bool = False,
     twice: bool = False,
     unverified: bool = False,
@@ -74,9 +75,9 @@ async def restore(
     """Writes the values of *backup* back to the drive: only those that differ, to EEPROM, and each is read back.
 
     Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
-    settings of the serial line, the data of the motor, what can only be read, the fault history, and what does
-    something when it is written; the report says so of each. Cut off at any moment, the same call goes on where it
-    was: the memory of no parameter is written twice, unless *twice*.
+    settings of the serial line, the data of the motor, what can only be read, the fault history, what does something
+    when it is written, and what nothing is known of; the report says so of each. Cut off at any moment, the same call
+    goes on where it was: the memory of no parameter is written twice, unless *twice*.
 
     Args:
         backup: A backup, or its file.
@@ -84,6 +85,8 @@ async def restore(
         groups: Only these, such as `["P00", "P09"]`; single codes may be among them.
         serial: Also the settings of the serial line. The drive may then not be heard any more.
         motor: Also the data of the motor.
+        raw: Also these codes, of which nothing is known but that the drive has them, as after a discovery. They go to
+            EEPROM, or to RAM alone where the backup has them with `ram = true`.
         force: Also to a drive of another identification or firmware, or of another family: then what has the same
             code there gets the same value.
         twice: Where a drive stands beyond its own limits and only another value on the way leads to the wanted one,
@@ -105,7 +108,7 @@ async def restore(
     serial, motor, twice = checks.flag("serial", serial), checks.flag("motor", motor), checks.flag("twice", twice)
     kept = _kept(unit, backup, force)
     work = Restore(unit.trusting(unverified), kept, dry_run=dry_run, twice=twice, progress=progress)
-    return await work.run(groups=groups, serial=serial, motor=motor, force=force)
+    return await work.run(groups=groups, serial=serial, motor=motor, raw=raw, force=force)
 
 
 async def diff(

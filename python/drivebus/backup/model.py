@@ -118,7 +118,15 @@ class Backup(Mapping[str, Value]):
         """
         path = Path(checks.path("file", path))
         found = parse.parse(path, disk.read(path), _shipped if profile is None else _meant_by(profile))
-        return cls(Origin(**found.origin), found.raw, {}, found.profile, complete=found.complete, told=found.told)
+        return cls(
+            Origin(**found.origin),
+            found.raw,
+            {},
+            found.profile,
+            complete=found.complete,
+            told=found.told,
+            in_ram=found.in_ram,
+        )
 
     def diff(self, other: Backup | None = None, *, everything: bool = False) -> Diff:
         """How *other* differs from this backup. None: how this differs from the factory settings, as far as known.

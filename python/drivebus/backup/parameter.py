@@ -11,7 +11,7 @@ from drivebus.values import Description, counted
 
 __all__ = ["FIELDS", "Wrong", "word"]
 
-FIELDS = ("value", "unit", "raw", "told", "beyond")
+FIELDS = ("value", "unit", "raw", "told", "beyond", "ram")
 """What may stand in the line of a parameter."""
 
 
@@ -33,13 +33,14 @@ def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
             raise Wrong(f'{code} has no field "{key}"{checks.closest(key, FIELDS)}')
     if "value" not in fields:
         raise Wrong(f"{code} lacks its value; write {_example(profile, known)}")
-    value, unit, raw, told, beyond = (fields.get(key) for key in FIELDS)
+    value, unit, raw, told, beyond, _ = (fields.get(key) for key in FIELDS)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise Wrong(f"{code}: value {_shown(value)} is not a number")
     if "unit" in fields and unit != known.unit:
         raise Wrong(f"{code} is in {known.unit or 'a plain number'}, not in {_shown(unit)}")
-    if "beyond" in fields and not isinstance(beyond, bool):
-        raise Wrong(f"{code}: beyond must be true or false, and is {_shown(beyond)}")
+    for key in ("beyond", "ram"):
+        if not isinstance(fields.get(key, False), bool):
+            raise Wrong(f"{code}: {key} must be true or false, and is {_shown(fields[key])}")
     most = (1 << 16 * known.words) - 1
     for key in ("raw", "told"):
         given = fields.get(key, 0)

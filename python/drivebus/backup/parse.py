@@ -61,6 +61,7 @@ class Parsed:
         origin: The fields of an `Origin`.
         raw: The word of each parameter.
         told: The word that the drive told, of those whose line has that.
+        in_ram: The codes whose line says that the drive had them in RAM alone.
         complete: Whether the backup was finished.
     """
 
@@ -68,6 +69,7 @@ class Parsed:
     origin: dict[str, Any]
     raw: dict[str, int]
     told: dict[str, int]
+    in_ram: frozenset[str]
     complete: bool
 
 
@@ -149,7 +151,8 @@ def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) 
         "taken": datetime.fromtimestamp(0, timezone.utc),
         **file.drive,
     }
-    return Parsed(profile, origin, raw, told, file.top.get("complete", True))
+    in_ram = frozenset(code for _, code, fields in file.parameters if isinstance(fields, dict) and fields.get("ram"))
+    return Parsed(profile, origin, raw, told, in_ram, file.top.get("complete", True))
 
 
 def _line(file: _File, number: int, data: bytes) -> None:

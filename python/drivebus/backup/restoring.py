@@ -6,8 +6,10 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Collection, Sequence
 
+from drivebus import checks
 from drivebus.backup.compare import amount
 from drivebus.backup.model import Backup
 from drivebus.backup.order import Order, Step
@@ -48,28 +50,35 @@ class Restore:
         lost = backup.unread if backup.translated_from else {}
         self._results: dict[str, tuple[str, str]] = {code: ("missing", reason) for code, reason in lost.items()}
         self._refused: list[str] = []
+        self._raw: Collection[str] = ()
         self._order: list[str] = []
 
-    async def run(self, *, groups: Sequence[str] | None, serial: bool, motor: bool, force: bool) -> Restoration:
+    async def run(
+        self, *, groups: Sequence[str] | None, serial: bool, motor: bool, raw: Sequence[str], force: bool
+    ) -> Restoration:
         """See `Drive.restore`."""
         try:
-            return await self._run(groups=groups, serial=serial, motor=motor, force=force)
+            return await self._run(groups=groups, serial=serial, motor=motor, raw=raw, force=force)
         except (*LINE_ERRORS, KeyboardInterrupt) as error:
             if not self._dry_run:
                 self._note(error)
             raise
 
-    async def _run(self, *, groups: Sequence[str] | None, serial: bool, motor: bool, force: bool) -> Restoration:
+    async def _run(
+        self, *, groups: Sequence[str] | None, serial: bool, motor: bool, raw: Sequence[str], force: bool
+    ) -> Restoration:
         chosen = self._rules.selected(self._backup, groups)
+        self._raw = frozenset(self._named(raw))
+        left = functools.partial(self._rules.unasked, serial=serial, motor=motor, raw=self._raw)
         wanted = [code for code in chosen if not self._leave(code)]
-        asked = [code for code in wanted if self._rules.unasked(code, serial=serial, motor=motor) is None]
+        asked = [code for code in wanted if left(code) is None]
         await self._check_identity(force)
         pairs = self._rules.bounds()
         bounding = {code for pair in pairs if {*pair} & {*asked} for code in pair}
         await self._read(wanted, bounding)
         for code in wanted:
             if code not in self._results and code not in asked:
-                self._results[code] = ("skipped", self._rules.unasked(code, serial=serial, motor=motor) or "")
+                self._results[code] = ("skipped", left(code) or "")
         pending = [code for code in asked if code not in self._results and self._may_be_sent(code)]
         if pending and not self._dry_run:
             await self._check_stopped(pending)
@@ -81,6 +90,23 @@ class Restore:
         await self._change_line(lines)
         lost = [code for code in self._results if code not in self._backup]
         return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, self._dry_run)
+
+    def _named(self, raw: Sequence[str]) -> Sequence[str]:
+        """*raw*, if the backup has each.
+
+        Raises:
+            NotAllowed: It is no list of codes, or the backup lacks one; nothing was sent.
+        """
+        if isinstance(raw, str) or not all(isinstance(code, str) for code in raw):
+            raise NotAllowed(f'raw is {checks.shown(raw)}, not a list of codes; give one such as ["P05.01"]')
+        for code in raw:
+            if code not in self._backup:
+                raise NotAllowed(f"the backup has no {checks.shown(code)}{checks.closest(code, self._backup)}")
+        return raw
+
+    def _to_ram(self, code: str) -> bool:
+        """Whether *code* goes to RAM alone: nothing is known of it but where the backup had it."""
+        return code in self._raw and code in self._backup.in_ram
 
     def _leave(self, code: str) -> bool:
         reason = self._rules.unread(code, self._unit.unverified) or self._rules.uncompared(code)
@@ -105,14 +131,16 @@ class Restore:
         for code in wanted:
             if code in words.unread:
                 self._results[code] = ("missing", words.unread[code])
-            elif words.raw[code] == self._backup.raw[code] and not parameters.is_in_ram(self._unit, code):
+            elif words.raw[code] == self._backup.raw[code] and (
+                self._to_ram(code) or not parameters.is_in_ram(self._unit, code)
+            ):
                 self._results[code] = ("same", "")
 
     def _may_be_sent(self, code: str) -> bool:
         """Whether it is known where *code* is stored, and what its value means; of all, before the first is written."""
         unproved = None if self._unit.unverified else self._backup.unproved(code)
         try:
-            place(self._unit, code, store=True)
+            place(self._unit, code, store=not self._to_ram(code))
         except NotAllowed as error:
             self._results[code] = ("blocked", str(error))
         else:
@@ -175,7 +203,8 @@ class Restore:
         code = step.code
         raw = self._backup.raw[code] if step.final else self._profile.encode(code, step.value)
         try:
-            shown = await self._write(code, raw, store=step.final or not self._keeps_in_ram(code), final=step.final)
+            keep = not self._to_ram(code) if step.final else not self._keeps_in_ram(code)
+            shown = await self._write(code, raw, store=keep, final=step.final)
         except Refused:
             if step.final:
                 self._refused.append(code)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
@@ -61,13 +61,20 @@ class Rules:
             return "writing it triggers an action, and it may read differently from what was written"
         return None
 
-    def unasked(self, code: str, *, serial: bool, motor: bool) -> str | None:
+    def unasked(self, code: str, *, serial: bool, motor: bool, raw: Collection[str] = ()) -> str | None:
         """Why *code* is not given back unless that is asked for; None if it is."""
+        if code not in raw and self.is_raw(code):
+            return "what it means is not known; given back only by its name, with raw=[…] (`--raw`)"
         if not serial and self.is_serial(code):
             return "a setting of the serial line; given back only where that is asked for"
         if not motor and _among(code, self._motor):
             return "data of the motor; given back only where that is asked for"
         return None
+
+    def is_raw(self, code: str) -> bool:
+        """Whether nothing is known of *code* but that a drive has it: it has neither a name nor a scale."""
+        known = self.profile.describe(code)
+        return known.evidence == "unverified" and known.unit == "raw" and known.name == known.code
 
     def is_serial(self, code: str) -> bool:
         """Whether *code* is a setting of the serial line."""

@@ -77,12 +77,14 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     codes = [code for code in codes if code not in unread]
     origin = await origin_of(unit)
     raw: dict[str, int] = {}
+    were_in_ram: frozenset[str] = frozenset()
     if path is not None:
         _check_old(path, origin, unit, force)
         before = _begun(disk.part_of(path), origin, unit) if resume else None
         if before is not None:
             origin = replace(origin, taken=before.origin.taken)
             raw = {code: word for code, word in before.raw.items() if code in codes}
+            were_in_ram = before.in_ram
             for code in raw.keys() & before.told.keys():
                 # What was changed by hand meanwhile is read again.
                 if before.told[code] != raw[code]:
@@ -91,7 +93,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     total, done, steps = len(codes), len(raw), 0
 
     def taken(complete: bool) -> Backup:
-        in_ram = [code for code in raw if parameters.is_in_ram(unit, code)]
+        in_ram = [code for code in raw if code in were_in_ram or parameters.is_in_ram(unit, code)]
         return Backup(origin, raw, unread, unit.profile, complete=complete, in_ram=in_ram)
 
     def keep() -> None:

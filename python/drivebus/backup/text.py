@@ -81,6 +81,8 @@ def _line(backup: Backup, code: str, is_set: bool) -> str:
         fields["told"] = str(backup.told[code])
     if _is_beyond(profile, code, raw):
         fields["beyond"] = "true"
+    if code in backup.in_ram:
+        fields["ram"] = "true"
     comment = f"{known.label}: {value.label}" if isinstance(value, Choice) else known.label
     if code in backup.in_ram:
         comment += "; in RAM alone, where the program that took this had put it: lost when the drive is switched off"

@@ -17,7 +17,7 @@ from drivebus.cli.output import counted, remark, show
 from drivebus.cli.session import Session, pass_session, yes_option
 from drivebus.cli.types import Place
 
-__all__ = ["COMMANDS"]
+__all__ = ["COMMANDS", "progress_bar"]
 
 _FACTORY = "factory"
 """Stands for what the factory set, where a file could."""
@@ -38,7 +38,7 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     """
     if not force:
         _keep_older(file)
-    with session.drive() as drive, _progress(session, "reading") as progress:
+    with session.drive() as drive, progress_bar(session, "reading") as progress:
         kept = drive.backup(file, not fresh, progress, force=force)
     if session.out.as_json:
         origin = {name: value for name, value in vars(kept.origin).items() if name != "taken"}
@@ -88,6 +88,12 @@ def _keep_older(file: Path) -> None:
     "--serial", is_flag=True, help="Also restore the serial settings. The drive may not be reachable afterwards."
 )
 @click.option("--motor", is_flag=True, help="Also restore the motor data.")
+@click.option(
+    "--raw",
+    multiple=True,
+    metavar="CODE",
+    help="Also restore this parameter, of which only its word is known; may be repeated.",
+)
 @click.option("--force", is_flag=True, help="Also write to a drive of another family, identification or firmware.")
 @click.option(
     "--twice", is_flag=True, help="Allow a second EEPROM write where a value can only be reached in two steps."
@@ -101,6 +107,7 @@ def restore(
     groups: tuple[str, ...],
     serial: bool,
     motor: bool,
+    raw: tuple[str, ...],
     force: bool,
     twice: bool,
     dry_run: bool,
@@ -118,6 +125,7 @@ def restore(
         "groups": groups or None,
         "serial": serial,
         "motor": motor,
+        "raw": raw,
         "force": force,
         "twice": twice,
     }
@@ -130,7 +138,7 @@ def restore(
             if not session.out.as_json:
                 _show_report(session, kept.profile, plan, "")
             session.ask(_question(drive, [item.code for item in planned]), yes)
-            with _progress(session, "writing") as progress:
+            with progress_bar(session, "writing") as progress:
                 plan = drive.restore(kept, progress=progress, **options)
             _show_report(session, kept.profile, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
     if not plan.ok:
@@ -273,7 +281,7 @@ def _is_told(item: drivebus.Restored) -> bool:
 
 
 @contextmanager
-def _progress(session: Session, what: str) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(session: Session, what: str) -> Iterator[Callable[[int, int], None]]:
     """A bar for who watches a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=session.out.console, transient=True, disable=not session.out.live) as bar:

@@ -21,7 +21,12 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "Move, write": {"move": ("run", "stop", "coast", "jog", "reset", "prepare", "write"), "trying": ("try",)},
     "Keep": {"backup": ("backup", "restore", "diff"), "record": ("record",), "plot": ("plot",)},
-    "Find out": {"explain": ("faults", "describe", "list"), "doctor": ("doctor",), "profiles": ("profiles",)},
+    "Find out": {
+        "explain": ("faults", "describe", "list"),
+        "doctor": ("doctor",),
+        "discover": ("discover",),
+        "profiles": ("profiles",),
+    },
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
     "Tools": {"raw": ("raw",), "frames": ("decode",), "simulation": ("sim",), "tools": ("completion", "demo")},
 }

@@ -115,6 +115,13 @@ class Profile:
         """Most words in one read or write."""
         return self._native.max_words
 
+    def parameter_groups(self) -> list[int]:
+        """The groups, 0..99, in which a code is its own address: P05.06 is at 0506H. Empty where there is no such rule.
+
+        Left out are groups that the maker keeps closed, and those at whose addresses registers stand.
+        """
+        return self._native.parameter_groups()
+
     def requests(self) -> dict[str, Any]:
         """What else is known of requests: `across_groups`, `verified`, `note`, `source`."""
         return self._native.requests()

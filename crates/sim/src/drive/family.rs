@@ -17,6 +17,7 @@ mod gd600;
 pub(crate) mod own;
 mod register;
 mod roles;
+mod unlisted;
 mod vfd500;
 
 use std::borrow::Cow;
@@ -25,6 +26,7 @@ use super::machine::Command;
 use super::refusal::Refusal;
 pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
 pub(crate) use roles::{OnSilence, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
+pub(crate) use unlisted::unlisted;
 
 /// One family.
 #[derive(Debug, Clone)]

@@ -1,0 +1,117 @@
+"""What a discovery has found so far, in a file beside the folder that it will fill: a break costs one group."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from drivebus.backup import disk
+from drivebus.backup.model import Origin
+from drivebus.errors import NotAllowed
+
+__all__ = ["Group", "Kept"]
+
+
+@dataclass(slots=True)
+class Group:
+    """What is known of one group.
+
+    Attributes:
+        words: The word of each number that is there.
+        refused: Numbers that are there and were not told, and what the drive said.
+        doubtful: Whether it answers to numbers that cannot be there.
+    """
+
+    words: dict[int, int] = field(default_factory=dict)
+    refused: dict[int, str] = field(default_factory=dict)
+    doubtful: bool = False
+
+
+@dataclass(slots=True)
+class Kept:
+    """A discovery that goes on.
+
+    Attributes:
+        path: Where it is kept; None keeps nothing.
+        whose: What tells one drive from another.
+        taken: When it began.
+        groups: What was found, by group.
+        requests: How many reads it took.
+    """
+
+    path: Path | None
+    whose: dict[str, Any]
+    taken: datetime
+    groups: dict[int, Group] = field(default_factory=dict)
+    requests: int = 0
+
+    @classmethod
+    def begin(cls, path: Path | None, origin: Origin, *, resume: bool) -> Kept:
+        """What an earlier call left in *path*, if it was of the same drive; else a new one.
+
+        Raises:
+            NotAllowed: It was of another drive, or it cannot be read or written.
+        """
+        whose = {
+            "family": origin.family,
+            "profile": origin.profile,
+            "profile_version": origin.profile_version,
+            "unit": origin.unit,
+            "identification": origin.identification,
+        }
+        kept = cls(path, whose, origin.taken)
+        if path is not None and resume and disk.is_there(path):
+            kept._take(disk.read(path))
+        # Whether it can be written there at all is known before the drive is asked for minutes.
+        kept.keep()
+        return kept
+
+    def keep(self) -> None:
+        """Writes the file anew, whole."""
+        if self.path is None:
+            return
+        groups = {
+            str(group): {
+                "words": {str(index): word for index, word in one.words.items()},
+                "refused": {str(index): told for index, told in one.refused.items()},
+                "doubtful": one.doubtful,
+            }
+            for group, one in self.groups.items()
+        }
+        whole = {"discovery": self.whose, "taken": self.taken.isoformat(), "requests": self.requests, "groups": groups}
+        disk.write(self.path, json.dumps(whole, indent=1) + "\n")
+
+    def done(self) -> None:
+        """Takes the file away."""
+        if self.path is not None:
+            disk.remove(self.path)
+
+    def _take(self, data: bytes) -> None:
+        try:
+            whole = json.loads(data)
+            whose = dict(whole["discovery"])
+            taken, requests = datetime.fromisoformat(whole["taken"]), int(whole["requests"])
+            groups = {
+                int(group): Group(_numbered(one["words"], int), _numbered(one["refused"], str), bool(one["doubtful"]))
+                for group, one in whole["groups"].items()
+            }
+        except (ValueError, TypeError, KeyError, AttributeError):
+            raise NotAllowed(
+                f"{self.path} is not what an interrupted discovery left; nothing was asked. Give another name, or "
+                "resume=False (`--fresh`) replaces it"
+            ) from None
+        if whose != self.whose:
+            other = ", ".join(f"{name} {whose.get(name)}" for name in self.whose if whose.get(name) != self.whose[name])
+            raise NotAllowed(
+                f"{self.path} was begun with another drive ({other}); nothing was asked. Give another name, or "
+                "resume=False (`--fresh`) starts again"
+            )
+        self.taken, self.requests, self.groups = taken, requests, groups
+
+
+def _numbered(given: dict[str, Any], kind: Callable[[Any], Any]) -> dict[int, Any]:
+    return {int(index): kind(value) for index, value in given.items()}
