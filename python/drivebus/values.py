@@ -250,6 +250,7 @@ class Description:
         words: How many words it takes, 1 or 2 of which the first is the low one.
         variant: What decides its unit, scale and range, such as `"speed_unit"`, or None.
         unverified_bits: Those of *bits* whose place in the word no document of this family prints.
+        listed: Whether the profile has a row for it; else only its address is known, which follows from its code.
     """
 
     name: str
@@ -275,6 +276,7 @@ class Description:
     words: int = 1
     variant: str | None = None
     unverified_bits: tuple[str, ...] = ()
+    listed: bool = True
 
     @property
     def reason(self) -> str:

@@ -146,7 +146,23 @@ def test_what_was_found_is_a_profile_to_go_on_with(tmp_path: Path) -> None:
         assert [(address, word) for _, address, word in simulator.drive(1).writes()] == [(0x8516, 9)]
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+COMMANDED = [name for name in FAMILIES if Profile.builtin(name).command_address is not None]
+"""Families of which it is known where they take commands. Nothing is written to a code of others that no row lists."""
+
+
+@pytest.mark.parametrize("family", sorted({*FAMILIES} - {*COMMANDED}))
+def test_what_might_be_a_command_is_only_read(family: str, tmp_path: Path) -> None:
+    with on_a_bus(family) as (simulator, bus):
+        bus.drive(1, profile=family).discover(tmp_path / "mine", groups=["P05"])
+        for profile in (family, tmp_path / "mine"):
+            own = bus.drive(1, profile=profile, unverified=True)
+            assert own.read("P05.03") == 3
+            with pytest.raises(NotAllowed, match="is read-only"):
+                own.write("P05.03", 33, store=True)
+        assert simulator.drive(1).words_written == 0
+
+
+@pytest.mark.parametrize("family", COMMANDED)
 def test_it_is_kept_and_given_back_by_name(family: str, tmp_path: Path) -> None:
     with on_a_bus(family) as (simulator, bus):
         bus.drive(1, profile=family).discover(tmp_path / "mine", groups=["P05"])

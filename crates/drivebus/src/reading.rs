@@ -50,23 +50,26 @@ impl Reading {
     fn plan<'a>(profile: &Profile, names: impl IntoIterator<Item = &'a str>, unverified: bool) -> Result<Self, Error> {
         let (mut entries, mut all) = (Vec::new(), Vec::new());
         for asked in names {
-            let entry = profile.find(asked)?;
+            let entry = profile.resolve(asked)?;
             if entry.evidence() == Evidence::Assumed && !unverified {
                 let (name, label, note) = (entry.name(), entry.label(), entry.note());
                 let message = format!("reading {name} ({label}) is not verified: {note}; nothing was sent");
                 return Err(Error::not_allowed(message));
             }
-            entries.push(entry);
             all.push(Names {
                 name: entry.name().to_owned(),
                 asked: asked.to_owned(),
                 unit: entry.quantity().unit().to_owned(),
             });
+            entries.push(entry);
         }
         if entries.is_empty() {
             return Err(Error::not_allowed("there is nothing to read: give at least one name"));
         }
-        Ok(Self(Arc::new(Planned { plan: profile.compile(&entries)?, names: all })))
+        Ok(Self(Arc::new(Planned {
+            plan: profile.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>())?,
+            names: all,
+        })))
     }
 
     /// What is read, in this order: address and number of words.

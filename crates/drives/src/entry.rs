@@ -75,6 +75,8 @@ pub struct Entry {
     pub(crate) evidence: Evidence,
     pub(crate) note: String,
     pub(crate) source: String,
+    /// Whether a row of the profile has it.
+    pub(crate) listed: bool,
 }
 
 impl Entry {
@@ -155,6 +157,11 @@ impl Entry {
     /// Where it is printed; empty only where it is assumed.
     pub fn source(&self) -> &str {
         &self.source
+    }
+
+    /// Whether a row of the profile has it; else it is a code that nothing is known of but its address.
+    pub fn is_listed(&self) -> bool {
+        self.listed
     }
 
     /// Whether the profile knows that it can be read. False where access is unknown, and where it is assumed: a read

@@ -10,6 +10,7 @@ mod reasons;
 pub(crate) mod roles;
 mod search;
 mod synonyms;
+mod unlisted;
 mod variants;
 
 use std::borrow::Cow;
@@ -391,13 +392,15 @@ impl Profile {
     ///
     /// [`AccessError`]: one of them can only be written, or nobody knows where it is.
     pub fn plan<'a>(&self, entries: impl IntoIterator<Item = &'a Entry>) -> Result<Vec<ReadSpan>, AccessError> {
-        let wanted = entries
-            .into_iter()
-            .map(|entry| match entry.access {
-                Access::Wo => Err(AccessError::WriteOnly { name: entry.name.clone(), label: entry.label.clone() }),
-                _ => Ok(ReadSpan { address: self.read_address(entry)?, count: entry.words() }),
-            })
-            .collect::<Result<Vec<ReadSpan>, AccessError>>()?;
+        let (mut wanted, mut alone) = (Vec::new(), Vec::new());
+        for entry in entries {
+            if entry.access == Access::Wo {
+                return Err(AccessError::WriteOnly { name: entry.name.clone(), label: entry.label.clone() });
+            }
+            let span = ReadSpan { address: self.read_address(entry)?, count: entry.words() };
+            // Whether there is such a parameter is not known, and a drive refuses a read as a whole.
+            if entry.is_listed() { &mut wanted } else { &mut alone }.push(span);
+        }
         // The second word of a wide entry is nobody's own.
         let covers = |address: u16| {
             let (_, &index) = self.by_address.range(..=address).next_back()?;
@@ -410,6 +413,10 @@ impl Profile {
             across_groups: self.requests.across_groups,
             cost: self.serial.as_ref().map_or(USUAL_READ_COST, SerialDefaults::read_cost),
         };
-        Ok(plan_spans(&wanted, rules, |address| covers(address).is_some_and(Entry::is_known_readable)))
+        let mut reads = plan_spans(&wanted, rules, |address| covers(address).is_some_and(Entry::is_known_readable));
+        reads.extend(alone);
+        reads.sort_unstable();
+        reads.dedup();
+        Ok(reads)
     }
 }

@@ -1,5 +1,6 @@
 //! `Profile` for Python: what it asks of a profile, in Python's words.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -182,22 +183,22 @@ impl Profile {
 
     #[pyo3(signature = (name, /))]
     fn describe<'py>(&self, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        tables::description(name.py(), self.find(name)?)
+        tables::description(name.py(), &*self.find(name)?)
     }
 
     #[pyo3(signature = (name, /, *, store = None))]
     fn address(&self, name: &Bound<'_, PyAny>, store: Option<bool>) -> PyResult<u16> {
         let entry = self.find(name)?;
         match store {
-            None => self.0.read_address(entry).map_err(refuse),
-            Some(false) => self.0.write_address(entry, Store::Ram).map_err(refuse),
-            Some(true) => self.0.write_address(entry, Store::Eeprom).map_err(refuse),
+            None => self.0.read_address(&entry).map_err(refuse),
+            Some(false) => self.0.write_address(&entry, Store::Ram).map_err(refuse),
+            Some(true) => self.0.write_address(&entry, Store::Eeprom).map_err(refuse),
         }
     }
 
     #[pyo3(signature = (name, /))]
     fn read_back(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<u16>> {
-        Ok(self.0.read_back(self.find(name)?))
+        Ok(self.0.read_back(&*self.find(name)?))
     }
 
     #[pyo3(signature = (name, raw, /))]
@@ -250,15 +251,15 @@ impl Profile {
     #[pyo3(signature = (names, /))]
     fn plan(&self, names: &Bound<'_, PyAny>) -> PyResult<Vec<(u16, u16)>> {
         let entries = names.try_iter()?.map(|name| self.find(&name?)).collect::<PyResult<Vec<_>>>()?;
-        let spans = self.0.plan(entries).map_err(refuse)?;
+        let spans = self.0.plan(entries.iter().map(AsRef::as_ref)).map_err(refuse)?;
         Ok(spans.into_iter().map(|span| (span.address, span.count)).collect())
     }
 
     #[pyo3(signature = (names, /))]
     fn compile(&self, names: &Bound<'_, PyAny>) -> PyResult<Plan> {
         let names = names.try_iter()?.map(|name| text("name", &name?)).collect::<PyResult<Vec<_>>>()?;
-        let entries = names.iter().map(|name| self.0.find(name).map_err(refuse)).collect::<PyResult<Vec<_>>>()?;
-        let plan = self.0.compile(&entries).map_err(refuse)?;
+        let entries = names.iter().map(|name| self.0.resolve(name).map_err(refuse)).collect::<PyResult<Vec<_>>>()?;
+        let plan = self.0.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>()).map_err(refuse)?;
         Ok(Plan::new(names, plan))
     }
 
@@ -387,9 +388,9 @@ impl Profile {
 }
 
 impl Profile {
-    /// The register or parameter that `name` means.
-    fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<&Entry> {
-        self.0.find(&text("name", name)?).map_err(refuse)
+    /// The register or parameter that `name` means, listed or not.
+    fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<Cow<'_, Entry>> {
+        self.0.resolve(&text("name", name)?).map_err(refuse)
     }
 }
 

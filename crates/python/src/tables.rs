@@ -59,6 +59,7 @@ pub(crate) fn description<'py>(py: Python<'py>, entry: &Entry) -> Table<'py> {
     dict.set_item("evidence", entry.evidence().name())?;
     dict.set_item("note", entry.note())?;
     dict.set_item("words", entry.words())?;
+    dict.set_item("listed", entry.is_listed())?;
     dict.set_item("variant", quantity.variant())?;
     Ok(dict)
 }

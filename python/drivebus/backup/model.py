@@ -156,6 +156,8 @@ class Backup(Mapping[str, Value]):
             here = self.profile.describe(code)
             try:
                 there = profile.describe(code)
+                if not there.listed:
+                    raise NotAllowed(f"{profile.name} does not list {code}")
                 if (there.code, there.name, there.unit) != (here.code, here.name, here.unit):
                     raise NotAllowed(f"{code} is another thing in a {profile.title}: {there.label}")
                 raw[code] = profile.encode(code, value)

@@ -72,6 +72,9 @@ def _known(profile: Profile, code: str) -> Description:
         known = profile.describe(code)
     except NotAllowed as error:
         raise Wrong(str(error)) from None
+    if not known.listed:
+        near = checks.closest(known.code or code, [row for row in profile.names() if "." in row])
+        raise Wrong(f"{profile.name} does not list {known.code}, and a backup keeps only what its profile lists{near}")
     if known.kind != "parameter" or known.code is None:
         raise Wrong(f"{code} is a register, and no parameter that a drive keeps")
     if known.code != code:

@@ -102,7 +102,8 @@ def list_(session: Session, group: str | None) -> None:
     }.get(wanted)
     if chosen is None:
         chosen = [row for row in rows if row.group.lower() == wanted]
-    if not chosen and wanted not in _ALWAYS:
+    unlisted = _unlisted(profile, wanted)
+    if not chosen and not unlisted and wanted not in _ALWAYS:
         known = ", ".join([*_ALWAYS, *_groups(rows)])
         raise drivebus.NotAllowed(f'{profile.name} has no group "{group}"; it has {known}')
     session.out.say(f"{profile.title}, {group}: {counted(len(chosen), 'row')}")
@@ -112,6 +113,20 @@ def list_(session: Session, group: str | None) -> None:
             [row.name, row.code, _address(row), row.unit, _range(row), row.access, row.label]
             for row in sorted(chosen, key=lambda row: (row.kind == "parameter", row.address is None, row.address))
         ],
+    )
+    if unlisted and not session.out.as_json:
+        session.out.say(unlisted)
+
+
+def _unlisted(profile: drivebus.Profile, group: str) -> str:
+    """What is said of the codes in *group* that have no row; nothing where it has none that could be read."""
+    known = {f"p{number:02}" for number in profile.parameter_groups()}
+    if group not in known and not (group == "parameters" and known):
+        return ""
+    code = f"{group.upper()}.00" if group in known else "P05.00"
+    return (
+        f"The drive may have more. A code without a row, such as {code}, is read as a raw word, and written with "
+        "--unverified. `drivebus discover` asks the drive which there are."
     )
 
 

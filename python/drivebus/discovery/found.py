@@ -26,6 +26,7 @@ _COLUMNS = (
     *("access", "choices", "verified", "note", "source"),
 )
 
+_ONLY_READ = "Where this family takes its commands is not known; it might be here, so this is only read."
 _NAME = re.compile("[a-z0-9][a-z0-9_-]*")
 
 _RULES = """\
@@ -148,6 +149,8 @@ class Discovery:
         out = io.StringIO()
         rows = csv.DictWriter(out, _COLUMNS, restval="", lineterminator="\n")
         rows.writeheader()
+        is_no_command = self.profile.command_address is not None
+        told = "Found by asking the drive; it was {word} ({word:04X}H)."
         for code, word in sorted(self.unlisted.items()):
             guess = guesses.guess(self.profile, code, word)
             rows.writerow(
@@ -155,9 +158,11 @@ class Discovery:
                     "code": code,
                     "label": "Not known; the drive has it",
                     "signed": "no",
-                    "access": "unknown",
+                    "access": "unknown" if is_no_command else "ro",
                     "verified": "no",
-                    "note": f"Found by asking the drive; it was {word} ({word:04X}H). {guess}".rstrip(),
+                    "note": " ".join(
+                        filter(None, (told.format(word=word), guess, "" if is_no_command else _ONLY_READ))
+                    ),
                     "source": self._source(),
                 }
             )

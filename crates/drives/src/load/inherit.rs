@@ -28,6 +28,7 @@ pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems
 
 fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], problems: &mut Problems) {
     for name in dropped {
+        base.groups.dropped.extend(base.entry(name.get_ref()).map(|entry| entry.name.clone()));
         if problems.is_full() {
             return;
         }

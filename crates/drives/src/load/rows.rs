@@ -241,6 +241,7 @@ fn entry(
         evidence,
         note,
         source,
+        listed: true,
     };
     Ok(Located { line: row.line(), item })
 }

@@ -47,6 +47,8 @@ pub(crate) struct Groups {
     pub(crate) listed: bool,
     /// Groups that the maker keeps closed.
     pub(crate) closed: Vec<u8>,
+    /// Codes of rows that the profile dropped: its drives do not have them, not even as raw words.
+    pub(crate) dropped: Vec<String>,
     /// Their write does something, and is not simply kept.
     pub(crate) acts: Vec<String>,
     /// They set the line.
