@@ -8,13 +8,15 @@ import struct
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 import drivebus
-from drivebus.capture import Captured, Writer, read
+from drivebus.capture import Captured, Writer, line_of, read
 from drivebus.capture.pcapng import packets
 from drivebus.capture.text import frames
+from drivebus.cli import cli
 from drivebus.sniffer import Families, exchanges_in
 
 # GD350 manual: the state word of unit 1 is read, and is 3 (stopped).
@@ -126,6 +128,26 @@ def test_exchanges_of_a_capture_have_names_and_times(tmp_path: Path) -> None:
     # Without directions and times it is worked out.
     [exchange] = exchanges_in([Captured(None, ASKED), Captured(None, ANSWER)], line, Families({1: "gd350"}))
     assert dict(exchange.values) == {"status_word_1": 3}
+
+
+def test_a_capture_says_of_which_line_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "a.pcapng"
+    # Times are those of last characters. At 9600 8N1 the answer has 7 characters of 10 bits: 7.292 ms.
+    for settings, said in [
+        ("9600 8N1", "after 12.71 ms"),
+        ("115200 8E2", "after 19.27 ms"),
+        ("a line", "after 15.99 ms"),
+    ]:
+        with path.open("wb") as stream:
+            writer = Writer(stream, "COM3", settings)
+            writer.write(Captured(TIME, ASKED, True))
+            writer.write(Captured(TIME + 0.02, ANSWER, False))
+        told = line_of(path)
+        assert (None if told is None else f"{told.baudrate} {told.bytesize}{told.parity}{told.stopbits}") == (
+            None if settings == "a line" else settings
+        )
+        shown = CliRunner().invoke(cli, ["decode", str(path)]).output
+        assert said in shown, shown
 
 
 def test_a_bus_writes_what_it_sends_and_hears(tmp_path: Path) -> None:

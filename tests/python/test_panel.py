@@ -104,16 +104,14 @@ def use(terminal: Terminal, simulator: Simulator, backup: Path, size: tuple[int,
     keep("prepare", terminal.lines, size)
     assert "run forward" not in terminal.words
     terminal.press("y")
+    # What was wanted is not forgotten, and asks by itself.
+    terminal.until("run forward to 10 Hz. Is the machine clear?")
+    terminal.press("\x1b")
+    terminal.without("Is the machine clear?")
     terminal.until("unit 3: prepare: it obeys the bus now: done", "ready, commands from communication")
     assert simulator.drive(3).eeprom_writes == 0
     terminal.press("b")
     terminal.until("unit 3: it obeys the bus; there is nothing to write")
-    terminal.press("r")
-    terminal.until("how many Hz")
-    terminal.press("10\r")
-    terminal.until("run forward to 10 Hz. Is the machine clear?")
-    terminal.press("\x1b")
-    terminal.without("Is the machine clear?")
     terminal.press("\x1b[C", "\x1b[C")
     terminal.until("1 of 4")
     # What does not fit is on further pages, and they come round.

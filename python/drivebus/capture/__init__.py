@@ -5,7 +5,7 @@ tool means. `reading` opens any of them, `writer` makes one.
 """
 
 from drivebus.capture.frame import Captured
-from drivebus.capture.reading import read
+from drivebus.capture.reading import line_of, read
 from drivebus.capture.writer import Writer
 
-__all__ = ["Captured", "Writer", "read"]
+__all__ = ["Captured", "Writer", "line_of", "read"]

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from drivebus.errors import NotAllowed
 
-__all__ = ["MAGIC", "Packet", "interface", "packet", "packets", "section"]
+__all__ = ["MAGIC", "Packet", "description", "interface", "packet", "packets", "section"]
 
 MAGIC = b"\x0a\x0d\x0d\x0a"
 """How every file begins, whichever byte order it has."""
@@ -62,6 +62,25 @@ def packet(time: float, data: bytes, outbound: bool | None) -> bytes:
     head = struct.pack("<IIIII", 0, moment >> 32, moment & 0xFFFF_FFFF, len(data), len(data))
     flags = [] if outbound is None else [(_FLAGS, struct.pack("<I", _OUTBOUND if outbound else _INBOUND))]
     return _block(_ENHANCED, head + _padded(data) + (_options(flags) if flags else b""))
+
+
+def description(stream: BinaryIO, name: str) -> str | None:
+    """What the file says of the line on which its packets were; None where it does not.
+
+    Raises:
+        NotAllowed: It is not such a file, or breaks off before.
+    """
+    order, head = "<", stream.read(8)
+    while head:
+        if int.from_bytes(head[:4], "little") == _SECTION:
+            head += stream.read(4)
+            order = _order(head[8:], name)
+        body, _ = _rest(stream, head, order, name, 0)
+        if struct.unpack(f"{order}I", head[:4])[0] == _INTERFACE:
+            told = next((value for code, value in _listed(body[8:], order) if code == _DESCRIPTION), None)
+            return None if told is None else told.decode(errors="replace")
+        head = stream.read(8)
+    return None
 
 
 def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:

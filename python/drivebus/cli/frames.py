@@ -73,12 +73,12 @@ def _is_file(text: str) -> bool:
 
 
 def _decode_file(session: Session, file: str) -> None:
-    from drivebus.capture import Captured, read
+    from drivebus.capture import Captured, line_of, read
     from drivebus.cli.exchanges import Lines
     from drivebus.sniffer import Families, exchanges_in
 
-    bits, parity, stop = session.line_format
-    line = drivebus.SerialFormat(session.baud, parity, int(stop), int(bits))
+    # Times of frames are those of their last characters: when they began follows from the speed.
+    line = line_of(file) or session.serial_format
     families = Families(names.parse_families(session.profile))
     whole: list[Captured] = []
     broken = None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from drivebus.cli.output import remark
+from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.types import Place, Seconds, Whole
 from drivebus.plot import draw, of_recording
@@ -61,7 +61,7 @@ def plot(
         return
     bits = len({band.drive for band in picture.bands if band.lamp})
     lamps = f" and {bits} bit{'' if bits == 1 else 's'}" if bits else ""
-    session.out.say(f"{sum(map(len, picture.panels.values()))} curves{lamps} in {picture_file}.")
+    session.out.say(f"{counted(sum(map(len, picture.panels.values())), 'curve')}{lamps} in {picture_file}.")
     if picture.late:
         times = "1 time" if picture.late == 1 else f"{picture.late} times"
         remark(

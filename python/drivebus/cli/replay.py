@@ -9,8 +9,7 @@ from time import monotonic
 
 import click
 
-import drivebus
-from drivebus.capture import read
+from drivebus.capture import line_of, read
 from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.types import Place, Seconds
@@ -78,8 +77,7 @@ def replay(session: Session, file: str, transport: str, duration: float | None) 
     is given from then on. What nobody answered there stays without an answer. A read that is not there is answered if
     all its registers were read there; a write only if it is there. What cannot be answered is told.
     """
-    bits, parity, stop = session.line_format
-    line = drivebus.SerialFormat(session.baud, parity, int(stop), int(bits))
+    line = line_of(file) or session.serial_format
     exchanges = list(exchanges_in(read(file), line))
     with Replay(exchanges, line, transport, Missing(remark).take) as units:
         answered = sum(exchange.answer is not None for exchange in exchanges if exchange.request is not None)

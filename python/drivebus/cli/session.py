@@ -124,6 +124,12 @@ class Session:
             )
         return self.port
 
+    @property
+    def serial_format(self) -> drivebus.SerialFormat:
+        """How characters look on the line that the options name."""
+        bits, parity, stop = self.line_format
+        return drivebus.SerialFormat(self.baud, parity, int(stop), int(bits))
+
     @contextmanager
     def bus(self, **options: Any) -> Iterator[drivebus.Bus]:
         """The bus that the options name, opened."""

@@ -304,7 +304,10 @@ class Panel(App[None]):
     # --- what is asked -----------------------------------------------------------------------------------------
 
     def _if_it_obeys(self, member: Member, drive: Drive, then: Callable[[], None], only_sure: bool = True) -> None:
-        """Looks whether the drive obeys the bus, and does *then* if it does. If not, offers to set it so."""
+        """Looks whether the drive obeys the bus, and does *then* if it does. If not, offers to set it so.
+
+        Behind a preparation on the way to something (*only_sure*), *then* follows, which asks by itself.
+        """
         since = member.motor.stops
 
         def look() -> None:
@@ -328,6 +331,8 @@ class Panel(App[None]):
         def prepare() -> None:
             def order() -> None:
                 drive.prepare_control()
+                if only_sure:
+                    self.call_later(go_on, "")
 
             member.motor.later("prepare: it obeys the bus now", order, since)
 
