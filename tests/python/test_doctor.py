@@ -66,6 +66,56 @@ class TestASoundLine:
                 bus.drive(1).prepare_control()
             assert named(list(examine(simulator, 1)), "control").severity is Severity.OK
 
+    @pytest.mark.parametrize(
+        ("family", "settings", "said"),
+        [
+            ("gd350", {"P14.04": 0.0}, "does not notice when the bus falls silent (P14.04 is 0)"),
+            (
+                "gd350",
+                {"P14.05": 0, "P14.04": 2.0},
+                "and coasts when the bus is silent for 2 s (P14.04): P14.05 is alarm and coast",
+            ),
+            # Of the other three the keypad shows nothing, and with 1 the motor runs on.
+            (
+                "gd350",
+                {"P14.05": 1, "P14.04": 2.0},
+                "trips nothing when the bus is silent for 2 s (P14.04): P14.05 is keep running",
+            ),
+            (
+                "gd350",
+                {"P14.05": 3, "P14.04": 2.0},
+                "trips nothing when the bus is silent for 2 s (P14.04): P14.05 is stop silently",
+            ),
+            ("gd3000-rectifier", {"P11.05": 1, "P11.04": 2.0}, "trips nothing when the bus is silent for 2 s (P11.04)"),
+            (
+                "vfd500",
+                {"P30.05": 2.0},
+                "when the bus is silent for 2 s (P30.05); what that does to the motor is set else",
+            ),
+        ],
+    )
+    def test_what_a_silent_bus_does_is_told_as_it_is_set(
+        self, family: str, settings: dict[str, float], said: str
+    ) -> None:
+        with Simulator({1: family}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+            bus.drive(1, family, unverified=True).write(settings, store=True)
+            told = named(list(examine(simulator, 1, profile=family)), "watchdog")
+            assert said in told.text
+            assert ("CE" in told.text) == ("alarm and coast" in said)
+            assert ("Er.485" in told.text) == (family == "vfd500")
+
+    def test_each_family_has_its_own_fault_of_a_silent_bus(self) -> None:
+        # 34 is dEu in a GD350, and 18 an earth fault in a VFD500.
+        for family, fault, severity in [
+            ("gd350", 18, Severity.WARNING),
+            ("gd350", 34, Severity.NOTE),
+            ("vfd500", 34, Severity.WARNING),
+            ("vfd500", 18, Severity.NOTE),
+        ]:
+            with Simulator({1: family}, transport="process", clock="virtual") as simulator:
+                simulator.drive(1).trip(fault)
+                assert named(list(examine(simulator, 1, profile=family)), "fault").severity is severity
+
     def test_a_fault_of_the_bus_is_told(self) -> None:
         with line() as simulator:
             simulator.drive(1).trip("CE")

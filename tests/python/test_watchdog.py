@@ -45,6 +45,26 @@ def test_it_is_set_in_ram_action_first_and_put_back_time_out_first(virtual: Simu
     assert virtual.drive(1).eeprom_writes == 0
 
 
+def test_a_family_without_an_action_trips_and_says_what_that_leaves_open() -> None:
+    """VFD500 manual, p. 97: a slave that hears nothing for P30.05 trips Er.485, which is fault 34 on p. 136."""
+    with Simulator({1: "vfd500"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        drive, simulated = bus.drive(1, "vfd500"), simulator.drive(1)
+        with pytest.raises(drivebus.NotAllowed, match="may keep running"):
+            drive.watchdog(30.0, "trip")
+        with pytest.raises(drivebus.NotAllowed, match="allowed is trip"):
+            drive.watchdog(30.0, unverified=True)
+        assert simulated.words_written == 0
+        with drive.watchdog(30.0, "trip", unverified=True) as watchdog:
+            assert (simulated.register(0x1E05), watchdog.armed) == (300, True)
+        # Plain addresses are RAM alone here.
+        assert [(address, value) for _, address, value in simulated.take_writes()] == [(0x1E05, 300), (0x1E05, 0)]
+        assert simulated.eeprom_writes == 0
+        watchdog = drive.watchdog(30.0, "trip", unverified=True)
+        simulator.advance(31.0)
+        assert simulated.fault == 34
+        watchdog.close()
+
+
 @pytest.mark.parametrize(
     ("ramp", "hz"),
     [

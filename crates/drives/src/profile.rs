@@ -230,13 +230,18 @@ impl Profile {
     ///
     /// Left out are those that the maker keeps closed, and those at whose addresses registers stand.
     pub fn parameter_groups(&self) -> impl Iterator<Item = u8> {
-        let registers = |group: u8| {
-            let here = |entry: &Entry| entry.address.is_some_and(|address| address.to_be_bytes()[0] == group);
-            self.entries.iter().any(|entry| entry.kind == Kind::Register && here(entry))
+        (0..=LAST_NUMBER).filter(|&group| self.is_parameter_group(group))
+    }
+
+    /// Whether `group` is one of them.
+    pub(crate) fn is_parameter_group(&self, group: u8) -> bool {
+        let is_register = |entry: &Entry| {
+            entry.kind == Kind::Register && entry.address.is_some_and(|address| address.to_be_bytes()[0] == group)
         };
-        (0..=LAST_NUMBER)
-            .filter(|_| !self.groups.listed)
-            .filter(move |&group| !self.groups.closed.contains(&group) && !registers(group))
+        group <= LAST_NUMBER
+            && !self.groups.listed
+            && !self.groups.closed.contains(&group)
+            && !self.entries.iter().any(is_register)
     }
 
     /// What the identification code `code` says; `None` if this profile does not know it.

@@ -362,7 +362,7 @@ fn every_row_names_its_source_and_every_doubt_its_reason() {
 fn the_watchdog_is_p14_04_and_p14_05() {
     let profile = gd350();
     let watchdog = profile.watchdog().unwrap();
-    assert_eq!((watchdog.timeout.as_str(), watchdog.action.as_str()), ("P14.04", "P14.05"));
+    assert_eq!((watchdog.timeout.as_str(), watchdog.action.as_deref()), ("P14.04", Some("P14.05")));
     assert_eq!((watchdog.coast, watchdog.stop, watchdog.verified), (Some(0), Some(3), false));
 }
 

@@ -185,6 +185,7 @@ pub(crate) fn watchdog<'py>(py: Python<'py>, watchdog: &Watchdog) -> Table<'py> 
     dict.set_item("timeout", &watchdog.timeout)?;
     dict.set_item("action", &watchdog.action)?;
     dict.set_item("actions", actions)?;
+    dict.set_item("fault", watchdog.fault)?;
     dict.set_item("verified", watchdog.verified)?;
     dict.set_item("note", &watchdog.note)?;
     dict.set_item("source", &watchdog.source)?;

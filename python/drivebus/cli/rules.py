@@ -198,8 +198,11 @@ def _watchdog(profile: drivebus.Profile) -> list[str]:
     watchdog = profile.watchdog
     if watchdog is None:
         return ["nothing known"]
-    actions = " or ".join(watchdog.actions)
+    actions = " or ".join(watchdog.choices)
     doubt = "" if watchdog.verified else " [unverified]"
+    if watchdog.action is None:
+        fault = "" if watchdog.fault is None else f" {profile.fault(watchdog.fault)}"
+        return [f"after {watchdog.timeout}, it trips{fault}; what that does to the motor is set elsewhere{doubt}"]
     return [f"after {watchdog.timeout}, {watchdog.action} makes it {actions}{doubt}"]
 
 

@@ -10,15 +10,15 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.drive import Drive
 from drivebus.errors import NoAnswer, NotAllowed
 from drivebus.profile import profiles
-from drivebus.values import Control
+from drivebus.values import Control, Description, WatchdogSettings
 
 __all__ = ["DriveExamination"]
 
 _SPARE = 0.5
 """The share of a time-out that answers may take before one that is a little later is lost."""
 
-_COMMUNICATION_FAULT = "CE"
-"""What a Goodrive calls the fault of a bus that was silent for too long."""
+_DELAY = "response_delay"
+"""What profiles call the parameter with the time that a drive waits before it answers."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +43,29 @@ class DriveExamination:
         Raises:
             DrivebusError: It could not be read.
         """
-        known = set(self.drive.profile.names())
-        if "P14.03" in known:
-            yield self._response_delay()
-        if "P14.04" in known:
-            yield self._watchdog()
+        delay = self._row(_DELAY)
+        if delay is not None and delay.unit == "ms":
+            yield self._response_delay(delay)
+        watchdog = self.drive.profile.watchdog
+        if watchdog is not None and self.drive.describe(watchdog.timeout).evidence != "assumed":
+            yield self._watchdog(watchdog)
         fault = self._fault()
         if fault is not None:
             yield fault
         yield self._control()
 
-    def _response_delay(self) -> Finding:
-        delay = float(self.drive.read("P14.03")) / 1e3
+    def _row(self, name: str) -> Description | None:
+        """What the family knows as *name*, if it may be read."""
+        try:
+            row = self.drive.describe(name)
+        except NotAllowed:
+            return None
+        return None if row.evidence == "assumed" else row
+
+    def _response_delay(self, row: Description) -> Finding:
+        delay = float(self.drive.read(row.name)) / 1e3
         took = f", and it took {median(self.turnarounds) * 1e3:.1f} ms" if self.turnarounds else ""
-        text = f"unit {self.drive.unit}: its response delay (P14.03) is {delay * 1e3:g} ms{took}"
+        text = f"unit {self.drive.unit}: its response delay ({row.code}) is {delay * 1e3:g} ms{took}"
         values = {"response_delay": delay, "timeout": self.timeout}
         if max([delay, *self.turnarounds]) <= _SPARE * self.timeout:
             return Finding("unit", "response_delay", Severity.OK, text, unit=self.drive.unit, values=values)
@@ -65,18 +74,37 @@ class DriveExamination:
             "timeout",
             Severity.WARNING,
             f"{text}: much of the time-out of {self.timeout:g} s",
-            "lower P14.03, or give a longer time-out",
+            f"lower {row.code}, or give a longer time-out",
             unit=self.drive.unit,
             values=values,
             error=NoAnswer,
         )
 
-    def _watchdog(self) -> Finding:
-        limit = float(self.drive.read("P14.04"))
-        text = f"unit {self.drive.unit} trips {_COMMUNICATION_FAULT} when the bus is silent for {limit:g} s (P14.04)"
+    def _watchdog(self, watchdog: WatchdogSettings) -> Finding:
+        limit = float(self.drive.read(watchdog.timeout))
+        return Finding(
+            "unit",
+            "watchdog",
+            Severity.OK,
+            f"unit {self.drive.unit}: {self._on_silence(watchdog, limit)}",
+            unit=self.drive.unit,
+            values={"silence": limit},
+        )
+
+    def _on_silence(self, watchdog: WatchdogSettings, limit: float) -> str:
+        """What the drive does when the bus is silent for *limit* seconds, as it is set."""
         if limit == 0:
-            text = f"unit {self.drive.unit} does not notice when the bus falls silent (P14.04 is 0)"
-        return Finding("unit", "watchdog", Severity.OK, text, unit=self.drive.unit, values={"silence": limit})
+            return f"it does not notice when the bus falls silent ({watchdog.timeout} is 0)"
+        when = f"when the bus is silent for {limit:g} s ({watchdog.timeout})"
+        fault = "" if watchdog.fault is None else f" {self.drive.profile.fault(watchdog.fault)}"
+        if watchdog.action is None:
+            return f"it trips{fault} {when}; what that does to the motor is set elsewhere in the drive"
+        action = self.drive.read(watchdog.action)
+        set_to = f"{watchdog.action} is {action}"
+        # Only one of the actions is a fault; with the others the keypad shows nothing, and the motor may run on.
+        if watchdog.actions.get("coast") == action:
+            return f"it trips{fault} and coasts {when}: {set_to}"
+        return f"it trips nothing {when}: {set_to}"
 
     def _fault(self) -> Finding | None:
         try:
@@ -85,13 +113,15 @@ class DriveExamination:
             return Finding("unit", "fault", Severity.NOTE, str(error), unit=self.drive.unit)
         if fault is None:
             return None
-        is_ours = fault.mnemonic == _COMMUNICATION_FAULT
+        watchdog = self.drive.profile.watchdog
+        is_ours = watchdog is not None and watchdog.fault == fault.code
+        cause = "" if watchdog is None else f"the bus was silent for longer than {watchdog.timeout}"
         return Finding(
             "unit",
             "fault",
             Severity.WARNING if is_ours else Severity.NOTE,
             f"unit {self.drive.unit} is in fault {fault}",
-            fault.remedy or ("the bus was silent for longer than P14.04" if is_ours else ""),
+            fault.remedy or (cause if is_ours else ""),
             unit=self.drive.unit,
             error=NoAnswer if is_ours else None,
         )

@@ -28,7 +28,7 @@ class BusTimeout:
 
     Attributes:
         timeout: Seconds of silence after which the drive acts.
-        action: What it then does: `"coast"` or `"stop"`.
+        action: What it then does: `"coast"`, `"stop"` or `"trip"`.
         verified: Whether a document of this very family prints the parameters and their values.
         armed: Whether the drive acts by itself when it hears nothing. True after `close` where the motor still turned
             or could not be asked.
@@ -55,24 +55,25 @@ class BusTimeout:
                 unit=drive.address,
             )
         if not (settings.verified or drive.unverified):
-            what = f"the communication time-out of {drive.profile.title} ({settings.timeout}, {settings.action})"
+            parameters_of_it = ", ".join(filter(None, (settings.timeout, settings.action)))
+            what = f"the communication time-out of {drive.profile.title} ({parameters_of_it})"
             raise not_verified(what, settings.note, drive.address)
         high = drive.profile.describe(settings.timeout).high
         self.timeout = checks.number("timeout", timeout, 0.0, math.inf if high is None else high, above=True)
-        self.action = checks.one_of("action", action, list(settings.actions))
+        self.action = checks.one_of("action", action, settings.choices)
         self.verified = settings.verified
         self.armed = False
         self.error = None
         self._unit = drive
         # The action comes first: a time-out must not run out on another one.
-        self._wanted: dict[str, Value] = {
-            settings.action: settings.actions[self.action],
-            settings.timeout: self.timeout,
-        }
+        self._wanted: dict[str, Value] = {}
+        if settings.action is not None:
+            self._wanted[settings.action] = settings.actions[self.action]
+        self._wanted[settings.timeout] = self.timeout
         for name, value in self._wanted.items():
             drive.profile.encode(name, value)
         # The time-out goes back first, for the same reason.
-        self._former: dict[str, Value] = dict.fromkeys((settings.timeout, settings.action), 0)
+        self._former: dict[str, Value] = dict.fromkeys(reversed(self._wanted), 0)
 
     @property
     def interval(self) -> float:

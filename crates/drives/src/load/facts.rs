@@ -150,20 +150,37 @@ pub(super) fn watchdog(
 ) -> Option<Watchdog> {
     let row = spanned.get_ref();
     let timeout = entries.get(file, &row.timeout, problems).map(|entry| entry.name.clone());
-    let action = entries.get(file, &row.action, problems)?;
-    let mut word = |value: &Option<Placed<i64>>| {
-        let value = value.as_ref()?;
-        problems.keep(check(file, line(file, value), &action.quantity, &action.name, *value.get_ref()))
-    };
-    let (coast, stop) = (word(&row.coast), word(&row.stop));
-    if row.coast.is_none() && row.stop.is_none() {
-        problems.add(file, line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\"");
+    let action = row.action.as_ref().map(|action| entries.get(file, action, problems));
+    let (mut coast, mut stop, mut name) = (None, None, None);
+    match action {
+        // The name that it is given is not known, which was noted.
+        Some(None) => return None,
+        Some(Some(action)) => {
+            let mut word = |value: &Option<Placed<i64>>| {
+                let value = value.as_ref()?;
+                problems.keep(check(file, line(file, value), &action.quantity, &action.name, *value.get_ref()))
+            };
+            (coast, stop) = (word(&row.coast), word(&row.stop));
+            if row.coast.is_none() && row.stop.is_none() {
+                problems.add(file, line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\"");
+            }
+            name = Some(action.name.clone());
+        }
+        None if row.coast.is_some() || row.stop.is_some() => {
+            problems.add(
+                file,
+                line(file, spanned),
+                "\"coast\" and \"stop\" are values of \"action\", which is missing",
+            );
+        }
+        None => {}
     }
     Some(Watchdog {
         timeout: timeout?,
-        action: action.name.clone(),
+        action: name,
         coast,
         stop,
+        fault: row.fault,
         verified: row.verified,
         note: row.note.clone(),
         source: row.source.clone(),

@@ -49,7 +49,9 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.setpoints.retain(|_, role| stays(&role.register) && role.needs.iter().all(|need| stays(&need.code)));
         base.variants.retain(|_, variant| stays(&variant.parameter));
         base.state.take_if(|state| !stays(&state.register));
-        base.watchdog.take_if(|watchdog| !stays(&watchdog.timeout) || !stays(&watchdog.action));
+        base.watchdog.take_if(|watchdog| {
+            !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
+        });
         base.moving.retain(|&address| Some(address) != gone.address);
         if base.command_address.is_some_and(|address| Some(address) == gone.address) {
             base.command_address = None;

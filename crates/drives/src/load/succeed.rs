@@ -107,7 +107,11 @@ fn rename(base: &mut Profile, called: &BTreeMap<String, String>) {
         .chain(base.control.iter_mut().map(|item| &mut item.code))
         .chain(setpoints)
         .chain(base.variants.values_mut().map(|variant| &mut variant.parameter))
-        .chain(base.watchdog.iter_mut().flat_map(|watchdog| [&mut watchdog.timeout, &mut watchdog.action]))
+        .chain(
+            base.watchdog
+                .iter_mut()
+                .flat_map(|watchdog| std::iter::once(&mut watchdog.timeout).chain(&mut watchdog.action)),
+        )
         .chain(base.state.iter_mut().map(|state| &mut state.register))
         .for_each(follow);
 }

@@ -6,12 +6,15 @@
 pub struct Watchdog {
     /// The code of the parameter that says how long the bus may be silent.
     pub timeout: String,
-    /// The code of the parameter that says what the drive then does.
-    pub action: String,
+    /// The code of the parameter that says what the drive then does. `None`: it trips, and what it then does about the
+    /// motor is decided elsewhere.
+    pub action: Option<String>,
     /// The word of `action` that takes the voltage off the motor; `None` where the family cannot.
     pub coast: Option<u16>,
     /// The word of `action` that stops the motor as the drive is set to; `None` where the family cannot.
     pub stop: Option<u16>,
+    /// The number of the fault that it trips, where that is known.
+    pub fault: Option<u16>,
     /// Whether a document of this family prints all of it.
     pub verified: bool,
     /// What to know about it; may be empty.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::entry::{Access, Entry, Kind};
+use crate::entry::{Access, Entry, Kind, names};
 use crate::evidence::Evidence;
 use crate::profile::Profile;
 use crate::profile::lookup::NameError;
@@ -24,10 +24,11 @@ impl Profile {
     /// [`NameError`]: as for [`find`](Self::find). A code is unknown where codes tell no addresses, and where registers
     /// stand at its address.
     pub fn resolve(&self, name: &str) -> Result<Cow<'_, Entry>, NameError> {
-        match self.find(name) {
-            Ok(entry) => Ok(Cow::Borrowed(entry)),
-            Err(error @ NameError::Unknown { .. }) => self.unlisted(name).map(Cow::Owned).ok_or(error),
-            Err(error) => Err(error),
+        // A row may be called what looks like a code. Who is not found is searched for, which takes its time: that is last.
+        let is_called = |entry: &Entry| names(entry).any(|known| known.eq_ignore_ascii_case(name.trim()));
+        match self.unlisted(name) {
+            Some(entry) if !self.entries().any(is_called) => Ok(Cow::Owned(entry)),
+            _ => self.find(name).map(Cow::Borrowed),
         }
     }
 
@@ -41,7 +42,7 @@ impl Profile {
         // The second word of a number that takes two is no parameter by itself.
         let is_second = |first: &Entry| first.words() > 1;
         let taken = address.checked_sub(1).and_then(|before| self.entry_at(before)).is_some_and(is_second);
-        (self.parameter_groups().any(|known| known == group) && self.entry_at(address).is_none() && !taken)
+        (self.is_parameter_group(group) && self.entry_at(address).is_none() && !taken)
             .then(|| raw_word(format!("P{group:02}.{index:02}"), address, self.command_address().is_some()))
     }
 }

@@ -180,7 +180,9 @@ class Motor:
             with ExitStack() as stack:
                 try:
                     if self._watchdog is not None:
-                        stack.enter_context(drive.watchdog(self._watchdog))
+                        settings = drive.profile.watchdog
+                        action = "coast" if settings is None else settings.choices[0]
+                        stack.enter_context(drive.watchdog(self._watchdog, action))
                     if not block.over.is_set():
                         stack.enter_context(enter())
                         turns = True

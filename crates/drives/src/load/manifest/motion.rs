@@ -157,12 +157,14 @@ pub(in crate::load) struct VariantChoice {
 pub(in crate::load) struct Watchdog {
     /// The parameter with the time.
     pub(in crate::load) timeout: Placed<String>,
-    /// The parameter with what it does then.
-    pub(in crate::load) action: Placed<String>,
+    /// The parameter with what it does then. Without it, the drive trips, and something else decides what that does.
+    pub(in crate::load) action: Option<Placed<String>>,
     /// What the action must be so that it coasts, in counts.
     pub(in crate::load) coast: Option<Placed<i64>>,
     /// What the action must be so that it stops, in counts.
     pub(in crate::load) stop: Option<Placed<i64>>,
+    /// The number of the fault that it trips.
+    pub(in crate::load) fault: Option<u16>,
     /// Whether a document of this very family prints it.
     pub(in crate::load) verified: bool,
     /// What to know about it; where it is not verified, why.

@@ -230,7 +230,7 @@ impl Own<'_> {
         let on_silence = watchdog.and_then(|watchdog| {
             let words = [(watchdog.coast, OnSilence::Trip), (watchdog.stop, OnSilence::Stop)];
             let words = words.into_iter().filter_map(|(word, action)| Some((word?, action))).collect();
-            Some(Silence { parameter: self.address_of(&watchdog.action)?, words })
+            Some(Silence { parameter: self.address_of(watchdog.action.as_deref()?)?, words })
         });
         Roles {
             acceleration: parameter(Some(ACCELERATION), "s").or(deceleration),
