@@ -119,3 +119,20 @@ def test_what_no_document_prints_is_not_sent_unasked(
     else:
         DO[command](plain)
         assert commanded(simulator) == [(table["register"], table[command])]
+
+
+def test_what_a_vfd500_may_take_for_disable_is_sent_only_if_it_is_forced() -> None:
+    """VFD500 manual, p. 135: 0 is "disable command", which may command nothing or disable the drive."""
+    with (
+        Simulator({1: "vfd500"}, transport="process", clock="virtual") as simulator,
+        Bus(simulator) as bus,
+    ):
+        drive, simulated = bus.drive(1, profile="vfd500"), simulator.drive(1)
+        refused = r"0 at 7000H is not a command .* codes are 1 run forward"
+        with pytest.raises(NotAllowed, match=refused):
+            drive.write_words(0x7000, 0)
+        with pytest.raises(NotAllowed, match=refused):
+            bus.write(1, 0x7000, 0)
+        assert simulated.words_written == 0
+        bus.write(1, 0x7000, 0, force=True)
+        assert [(address, value) for _, address, value in simulated.writes()] == [(0x7000, 0)]
