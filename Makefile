@@ -2,6 +2,7 @@
 # All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
+TEST_JOBS ?= 2
 VENV   := .venv
 BIN    := $(VENV)/bin
 CARGO  := cargo
@@ -119,8 +120,10 @@ schema: $(VENV)/.created ## changes a file
 interop-parts:
 	@sh tools/debian_parts.sh
 
+# Most of these tests wait for a line and not for a core, so two files at a time take half as long. A file stays together:
+# its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
 python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile -p no:benchmark
 
 examples: $(VENV)/.wheel
 	$(BIN)/python tools/run_examples.py
