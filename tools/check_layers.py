@@ -132,6 +132,7 @@ OPERATIONS = [
     "commands",
     "start_checks",
     "motion",
+    "stop_all",
     "bits",
     "waiting",
     "bus_timeout",

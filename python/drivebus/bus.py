@@ -22,7 +22,9 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads, Sample
 from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.operations.face import LivingDrives
 from drivebus.operations.program_end import end_over
+from drivebus.operations.stop_all import stop_all
 from drivebus.poll import Poll
 from drivebus.profile import Profile
 
@@ -76,6 +78,7 @@ class Bus(BusFace, Requests):
 
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
+        self._living = LivingDrives()
         try:
             self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
         except BaseException:
@@ -96,6 +99,25 @@ class Bus(BusFace, Requests):
         end_over(self.line)
         self._native.close()
         self._opening.close()
+
+    def stop_all(self, *, confirm: float = 1.0, unverified: bool = False) -> list[int]:
+        """Stops every drive that `drive` was called for on this bus, and returns their addresses.
+
+        First each gets its own family's stop, once, before all else that waits for the line; those that answered last
+        time come first. Then each is proved as `Drive.stop` proves it, side by side. Nothing is broadcast: the code
+        that stops one family means something else to another. What other programs on a shared port know is not known
+        here.
+
+        Args:
+            confirm: Seconds until each must show it, 0..3600; 0 does not look.
+            unverified: Also where the stop is not verified for the family, as where a drive was asked for so.
+
+        Raises:
+            NotStopped: One or more were not proved to stop; `failures` has the error of each. All others were.
+            NotAllowed: No drive is known here; nothing was sent.
+        """
+        units = self._living.views(BlockingBus(self), self._opening.known.latest())
+        return at_once(stop_all(units, confirm=confirm, unverified=unverified))
 
     def __enter__(self) -> Bus:
         return self
@@ -169,6 +191,7 @@ class Bus(BusFace, Requests):
         known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
+        self._living.add(drive)
         return drive
 
     @overload

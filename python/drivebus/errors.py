@@ -9,6 +9,7 @@ This module uses nothing of the package; the compiled core imports it and raises
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "DrivebusWarning",
     "NoAnswer",
     "NotAllowed",
+    "NotStopped",
     "PortError",
     "Refused",
     "SharedCodeWarning",
@@ -122,6 +124,22 @@ class Unconfirmed(DrivebusError):
     Did the drive take it? Nobody knows from here. The message names the state that was seen last. Commands are never
     repeated by this package: look at the machine, then decide.
     """
+
+
+class NotStopped(Unconfirmed):
+    """Several drives were told to stop, and some of them were not proved to: `Bus.stop_all`.
+
+    Did the drives take it? The error of each says that. The others were stopped.
+
+    Attributes:
+        failures: The error of each unit that was not proved to stop, by its address.
+    """
+
+    failures: dict[int, DrivebusError]
+
+    def __init__(self, message: str = "", *, failures: Mapping[int, DrivebusError] | None = None, **details: Any):
+        super().__init__(message, **details)
+        self.failures = dict(failures or {})
 
 
 class NotAllowed(DrivebusError, ValueError):

@@ -16,6 +16,7 @@ WRITING = [
     ["run", "5", "--yes"],
     ["run", "5", "--yes", "--force"],
     ["stop"],
+    ["stop", "--all"],
     ["coast"],
     ["jog", "--yes"],
     ["try", "step", "--from", "5", "--to", "9", "--max-current", "9", "--for", "1", "--yes"],

@@ -67,6 +67,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "run without leave": (["--port", ONE, "run", "10"], 2),
     "prepare": (["--port", ONE, "prepare", "--yes"], 0),
     "stop": (["--port", ONE, "stop"], 0),
+    "stop_all": (["--port", ONE, "stop", "--all"], 2),
     "coast": (["--port", ONE, "coast"], 0),
     "jog": (["--port", ONE, "jog", "--yes"], 2),
     "try": (["--port", ONE, *TRY, "--yes"], 2),

@@ -15,6 +15,7 @@ from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.aio.requests import AwaitedRequests
 from drivebus.attributes import known_only
+from drivebus.bus import Bus as BlockingFace
 from drivebus.errors import PortError
 from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
@@ -26,8 +27,9 @@ from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
-from drivebus.operations.face import documented_by
+from drivebus.operations.face import LivingDrives, documented_by
 from drivebus.operations.program_end import end_over
+from drivebus.operations.stop_all import stop_all
 from drivebus.profile import Profile
 
 __all__ = ["Bus"]
@@ -55,6 +57,7 @@ class Bus(BusFace):
 
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
+        self._living = LivingDrives()
         self._native: _native.Bus | None = None
         self._line: Line | None = None
         self._requests: AwaitedRequests | None = None
@@ -212,7 +215,14 @@ class Bus(BusFace):
         known, code = await profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
+        self._living.add(drive)
         return drive
+
+    @documented_by(BlockingFace.stop_all)
+    async def stop_all(self, *, confirm: float = 1.0, unverified: bool = False) -> list[int]:
+        """See `drivebus.Bus.stop_all`."""
+        units = self._living.views(self, self._opening.known.latest())
+        return await stop_all(units, confirm=confirm, unverified=unverified)
 
     @overload
     def poll(

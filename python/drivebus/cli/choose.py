@@ -18,7 +18,7 @@ from drivebus.cli.session import Session
 if TYPE_CHECKING:
     from drivebus.site import Site, SiteDrive, SiteLine
 
-__all__ = ["chosen", "complete_drive", "complete_port", "find_site", "parse_unit_list"]
+__all__ = ["chosen", "complete_drive", "complete_port", "find_site", "of_drive", "parse_unit_list"]
 
 _NOT_WITH_NAMES = {
     "port": "--port",
@@ -44,7 +44,7 @@ def chosen(
             if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE:
                 raise click.UsageError(f"--drive says where the drive is: leave {option} out", context)
         drives = find_site(file, needed=True).select(names)
-        sessions = [_of(base, drive) for drive in drives]
+        sessions = [of_drive(base, drive) for drive in drives]
     else:
         line = _line_called(base.port, file)
         if line is not None:
@@ -85,7 +85,7 @@ def _line_called(port: str | None, file: str | None) -> SiteLine | None:
     return None if there else find_site(file).lines.get(port)
 
 
-def _of(base: Session, drive: SiteDrive) -> Session:
+def of_drive(base: Session, drive: SiteDrive) -> Session:
     """*base* for *drive*: what was typed of its family and variants goes before what the file says."""
     baud, line_format = _characters(base, drive.line)
     return replace(

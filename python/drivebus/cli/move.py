@@ -14,7 +14,7 @@ from drivebus import State
 from drivebus.cli import names
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import remark
-from drivebus.cli.session import Session, force_option, yes_option
+from drivebus.cli.session import Session, force_option, pass_session, yes_option
 from drivebus.cli.types import Hertz, Seconds
 
 __all__ = ["COMMANDS", "OBEYING", "going", "on_the_way"]
@@ -58,15 +58,37 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 
 @click.command()
 @click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the motor stands still.")
+@click.option("--all", "every", is_flag=True, help="Stop every drive that is known on the line, or in drivebus.toml.")
+@pass_session
+@click.pass_context
+def stop(context: click.Context, session: Session, wait: float | None, every: bool) -> None:
+    """Stop the motor as the drive is set to stop it, usually by a ramp. Does not ask first.
+
+    With --all, every drive that is known is told first, each by its own family's code, and then looked at. Known are
+    the drives of drivebus.toml, and those on the line that once said surely what they are.
+    """
+    if every:
+        from drivebus.cli.stop_all import stop_all
+
+        session.will_write()
+        stop_all(context, session, lambda one, drive: _stopped(one, drive, wait))
+    else:
+        _stop_named(wait)
+
+
 @each_drive
-def stop(session: Session, wait: float | None) -> None:
-    """Stop the motor as the drive is set to stop it, usually by a ramp. Does not ask first."""
+def _stop_named(session: Session, wait: float | None) -> None:
+    """Stops the drives that the options name."""
     session.will_write()
     with session.bus() as bus:
-        drive = session.halt(bus, "stop", lambda drive: drive.stop())
-        if wait is not None:
-            drive.wait_until_stopped(timeout=wait)
-        _done(session, drive, "stop", State.STOPPED)
+        _stopped(session, session.halt(bus, "stop", lambda drive: drive.stop()), wait)
+
+
+def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> None:
+    """Waits for standstill, if that is wanted, and says what a drive does that was told to stop."""
+    if wait is not None:
+        drive.wait_until_stopped(timeout=wait)
+    _done(session, drive, "stop", State.STOPPED)
 
 
 @click.command()

@@ -65,6 +65,7 @@ def scan(context: click.Context, session: Session, units: str, timeout: float | 
         for unit in wanted:
             for found in bus.scan([unit], timeout):
                 count += 1
+                session.keep_found(found)
                 _show_found(session, found)
             progress.advance(task)
         took = bus.now() - began

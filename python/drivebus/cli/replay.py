@@ -81,12 +81,12 @@ def replay(session: Session, file: str, transport: str, duration: float | None) 
     exchanges = list(exchanges_in(read(file), line))
     with Replay(exchanges, line, transport, Missing(remark).take) as units:
         answered = sum(exchange.answer is not None for exchange in exchanges if exchange.request is not None)
-        if session.out.as_json:
-            session.out.record({"port": units.port, "exchanges": answered})
-        else:
-            session.out.say(units.port)
-            remark(f"{answered} answers of {file} at {units.port}. Ctrl-C ends it.")
         with suppress(KeyboardInterrupt):
+            if session.out.as_json:
+                session.out.record({"port": units.port, "exchanges": answered})
+            else:
+                session.out.say(units.port)
+                remark(f"{answered} answers of {file} at {units.port}. Ctrl-C ends it.")
             units.wait(duration)
     unknown = sorted(units.unknown)
     if unknown:

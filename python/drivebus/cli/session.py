@@ -30,6 +30,7 @@ __all__ = [
     "ask_once",
     "exit_code",
     "force_option",
+    "is_another",
     "may_turn",
     "parse_format",
     "pass_session",
@@ -172,7 +173,7 @@ class Session:
                 do(drive)
             except drivebus.DrivebusError as error:
                 failure = error
-            if not _is_another(drive):
+            if not is_another(drive):
                 if failure is not None:
                     raise failure
                 return drive
@@ -203,6 +204,12 @@ class Session:
         if self.profile is None and not self.unverified and _is_told_by_code(drive.profile):
             remember(str(self.port), self.unit, drive.profile.name)
         return drive
+
+    def keep_found(self, found: drivebus.Found) -> None:
+        """Keeps what a unit of this line surely is, as a scan *found* it."""
+        family = found.profile if found.certainty == "certain" else None
+        if family is not None and _is_told_by_code(drivebus.Profile.find(family)):
+            remember(str(self.port), found.unit, family)
 
     def will_write(self) -> None:
         """Refuses a command that writes where only looking was asked for, before anything is opened."""
@@ -317,7 +324,7 @@ def ask_once(texts: Sequence[str], yes: bool) -> None:
         raise Declined("Cancelled. Nothing was written.")
 
 
-def _is_another(drive: drivebus.Drive) -> bool:
+def is_another(drive: drivebus.Drive) -> bool:
     """Whether *drive* says that it is of another family than it was taken for."""
     try:
         return drive.contradiction() is not None

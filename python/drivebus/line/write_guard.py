@@ -26,8 +26,14 @@ class KnownUnits:
 
     def add(self, unit: int, profile: Profile) -> None:
         """From now on *unit* is known as what *profile* describes."""
-        self._profiles.setdefault(unit, {})[profile.name] = profile
+        known = self._profiles.setdefault(unit, {})
+        known.pop(profile.name, None)  # what was asked for last stands last
+        known[profile.name] = profile
         _command_registers()  # now, so that no stop has to wait for it
+
+    def latest(self) -> dict[int, Profile]:
+        """The profile under which each unit was asked for last."""
+        return {unit: list(known.values())[-1] for unit, known in tuple(self._profiles.items())}
 
     def only(self, unit: int) -> Profile | None:
         """The profile of *unit*, where it is known as one and no other."""

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.operations import setpoints, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
-__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "confirm", "give", "send_once"]
+__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Proof", "confirm", "explained", "give", "send_once"]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
@@ -68,25 +68,30 @@ async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence
         else:
             await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
     except LINE_ERRORS as error:
-        if error.started is None:
-            if not urgent:
-                raise
-            raise type(error)(
-                f"{name} could not be sent to unit {unit.address} ({error}); {_MAY[name]}",
-                unit=unit.address,
-                request=error.request,
-                ended=error.ended,
-            ) from error
-        unit.memory.halts += urgent
-        raise Unconfirmed(
-            f"{name} was sent to unit {unit.address} and not confirmed ({error}); {_MAY[name]}. "
-            f"{await _state_afterwards(unit, urgent)}. It was not repeated",
+        if error.started is None and not urgent:
+            raise
+        unit.memory.halts += urgent and error.started is not None
+        raise await explained(unit, name, error) from error
+
+
+async def explained(unit: Unit, name: str, error: NoAnswer | BadAnswer | PortError) -> DrivebusError:
+    """What became of the command *name*, which the line failed with *error*: the error for who gave it."""
+    if error.started is None:
+        return type(error)(
+            f"{name} could not be sent to unit {unit.address} ({error}); {_MAY[name]}",
             unit=unit.address,
             request=error.request,
-            raw=error.raw,
-            started=error.started,
             ended=error.ended,
-        ) from error
+        )
+    return Unconfirmed(
+        f"{name} was sent to unit {unit.address} and not confirmed ({error}); {_MAY[name]}. "
+        f"{await _state_afterwards(unit, name in HALTS)}. It was not repeated",
+        unit=unit.address,
+        request=error.request,
+        raw=error.raw,
+        started=error.started,
+        ended=error.ended,
+    )
 
 
 async def _state_afterwards(unit: Unit, urgent: bool) -> str:
@@ -100,14 +105,53 @@ async def confirm(
     unit: Unit, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float, fall: Fall | None = None
 ) -> None:
     """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
-    if within == 0 or state.planned(unit).plan is None:
-        return
-    deadline = unit.bus.now() + within
-    while True:
+    proof = Proof(unit, command, shows, within, fall)
+    while not await proof.look():
+        await unit.bus.sleep(POLL_INTERVAL)
+
+
+class Proof:
+    """The looks at one drive until it shows a command that was sent.
+
+    Args:
+        unit: The drive.
+        command: What was sent.
+        shows: Whether what is seen proves it.
+        within: Seconds for which it is looked at; 0 does not look.
+        fall: What is seen of its frequency: as long as that is worth a look, it is looked at in any case.
+    """
+
+    def __init__(
+        self,
+        unit: Unit,
+        command: str,
+        shows: Callable[[Seen], Awaitable[bool]],
+        within: float,
+        fall: Fall | None = None,
+    ) -> None:
+        self._unit, self._command, self._shows, self._fall = unit, command, shows, fall
+        self._asked = within > 0 and state.planned(unit).plan is not None
+        self._deadline = unit.bus.now() + within
+
+    def wait(self, seconds: float) -> None:
+        """For *seconds* others were looked at: they do not count."""
+        self._deadline += seconds
+        if self._fall is not None:
+            self._fall.until += seconds
+
+    async def look(self) -> bool:
+        """Looks once. Whether nothing is left to be proved.
+
+        Raises:
+            Unconfirmed: It is not proved, and not worth another look.
+        """
+        if not self._asked:
+            return True
+        unit, command, fall = self._unit, self._command, self._fall
         try:
-            seen = await state.glance(unit, urgent=command in HALTS and unit.bus.now() <= deadline)
-            if await shows(seen):
-                return
+            seen = await state.glance(unit, urgent=command in HALTS and unit.bus.now() <= self._deadline)
+            if await self._shows(seen):
+                return True
             last = f"state seen last: {seen}"
             if fall is not None and fall.frequency is not None:
                 last += f", at {fall.frequency:g} Hz"
@@ -115,22 +159,21 @@ async def confirm(
             if source not in (ControlSource.COMMUNICATION, None):
                 last += f", with commands from the {source}"
             # A motor that was told to stop is looked at: some drives run on in a fault.
-            if seen.fault is not None and command not in (*HALTS, "reset_fault"):
-                break
+            is_over = seen.fault is not None and command not in (*HALTS, "reset_fault")
         except (NoAnswer, BadAnswer, Refused) as error:
             # A refusal here is one of a read: it says nothing about the command.
             last = f"its last answer: {error}; {state.seen_last(unit)}"
+            is_over = False
         except PortError as error:
             raise Unconfirmed(
                 f"{command} was sent to unit {unit.address}; the port was lost before its state showed it ({error}): "
                 f"{_MAY[command]}; {state.seen_last(unit)}. It was not repeated",
                 unit=unit.address,
             ) from error
-        if unit.bus.now() >= (deadline if fall is None else fall.until):
-            break
-        await unit.bus.sleep(POLL_INTERVAL)
-    raise Unconfirmed(
-        f"{command} was sent to unit {unit.address}, and its state does not show it: {_MAY[command]}; {last}. "
-        "It was not repeated",
-        unit=unit.address,
-    )
+        if not is_over and unit.bus.now() < (self._deadline if fall is None else fall.until):
+            return False
+        raise Unconfirmed(
+            f"{command} was sent to unit {unit.address}, and its state does not show it: {_MAY[command]}; {last}. "
+            "It was not repeated",
+            unit=unit.address,
+        )

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Coroutine
+import weakref
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus.line.blocking import at_once
+from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import registers
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import Description, Value
 
-__all__ = ["DriveFace", "awaited", "blocking", "documented_by", "unit_of"]
+__all__ = ["DriveFace", "LivingDrives", "awaited", "blocking", "documented_by", "unit_of"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -69,6 +71,32 @@ class DriveFace:
 def unit_of(drive: DriveFace) -> Unit:
     """The view of its unit on which a drive's methods work."""
     return drive._unit
+
+
+class LivingDrives:
+    """The drives that a bus gave out: how far each is trusted, and what is remembered of those that somebody has."""
+
+    def __init__(self) -> None:
+        self._drives: weakref.WeakSet[DriveFace] = weakref.WeakSet()
+        self._trusted: set[tuple[int, str]] = set()
+
+    def add(self, drive: DriveFace) -> None:
+        """From now on *drive* is known."""
+        self._drives.add(drive)
+        if drive.unverified:
+            self._trusted.add((drive.unit, drive.profile.name))
+
+    def views(self, bus: AwaitableBus, profiles: Mapping[int, Profile]) -> list[Unit]:
+        """The units of *profiles* on *bus*: each as who started it last sees it, and trusted as far as it ever was."""
+        return [self._view(bus, address, profile) for address, profile in profiles.items()]
+
+    def _view(self, bus: AwaitableBus, address: int, profile: Profile) -> Unit:
+        held = [unit_of(drive) for drive in self._drives if drive.unit == address]
+        same = [unit for unit in held if unit.profile.name == profile.name]
+        trusted = (address, profile.name) in self._trusted or any(unit.memory.started_unverified for unit in same)
+        if not same:
+            return Unit.at(bus, address, profile, None, unverified=trusted, trust_profile=False)
+        return max(same, key=lambda unit: unit.memory.starts).trusting(trusted)
 
 
 def blocking(

@@ -15,7 +15,18 @@ from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource, State
 
-__all__ = ["coast", "end_jog", "has_jog_stop", "jog", "jog_stop", "reset_fault", "run", "stop"]
+__all__ = [
+    "coast",
+    "end_jog",
+    "halting",
+    "has_jog_stop",
+    "jog",
+    "jog_stop",
+    "proof_of_halt",
+    "reset_fault",
+    "run",
+    "stop",
+]
 
 
 async def run(
@@ -141,7 +152,7 @@ async def end_jog(unit: Unit, *, unverified: bool = False) -> None:
 
 def has_jog_stop(unit: Unit) -> bool:
     """Whether the family has a command that ends a jog alone, and it may be given."""
-    return _halting(unit, "jog_stop").evidence.unusable("jog_stop") is None
+    return halting(unit, "jog_stop").evidence.unusable("jog_stop") is None
 
 
 async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
@@ -196,13 +207,22 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
 
 async def _halt(unit: Unit, command: str, confirm: float) -> None:
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-    unit = _halting(unit, command)
+    unit = halting(unit, command)
     unit.evidence.commands(command)
     sent = unit.bus.now()
     await commands.give(unit, command)
-    if unit.evidence.without_state() is not None:
-        return  # its confirmation is all there is
-    fall = Fall(sent, unit.bus.now(), confirm)
+    proof = proof_of_halt(unit, command, sent, unit.bus.now(), confirm)
+    while not await proof.look():
+        await unit.bus.sleep(commands.POLL_INTERVAL)
+
+
+def proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
+    """The looks that prove a *command* that halts, *sent* and *confirmed* at these times of the line's clock.
+
+    Where the family has no state that may be used, the confirmation is all there is: nothing is left to be proved.
+    """
+    # From here on; what it was looked at before does not count.
+    fall = Fall(sent, confirmed, unit.bus.now() - confirmed + within)
     # What coasts has no ramp, and what jogs is not at its setpoint.
     by_ramp = command == "stop"
     ramp: speed.Ramp | None = None
@@ -229,7 +249,8 @@ async def _halt(unit: Unit, command: str, confirm: float) -> None:
             return False
         return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
 
-    await commands.confirm(unit, command, shows, confirm, fall)
+    told = unit.evidence.without_state() is None
+    return commands.Proof(unit, command, shows, within if told else 0.0, fall)
 
 
 def _turns_as_started(unit: Unit, seen: State) -> bool:
@@ -237,6 +258,6 @@ def _turns_as_started(unit: Unit, seen: State) -> bool:
     return unit.memory.started_as in (None, seen)
 
 
-def _halting(unit: Unit, command: str) -> Unit:
+def halting(unit: Unit, command: str) -> Unit:
     """The same unit; where a start was forced on what is not verified, as *command* is, with the same trust."""
     return unit.trusting(unit.memory.started_unverified and unit.evidence.unusable(command) is not None)

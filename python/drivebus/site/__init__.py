@@ -6,17 +6,27 @@ from drivebus.later import later
 
 if TYPE_CHECKING:
     from drivebus.site.config import FILE, Site, SiteDrive, SiteLine
-    from drivebus.site.known_families import forget, known_family, remember
+    from drivebus.site.known_families import families_on, forget, known_family, remember
     from drivebus.site.state_folder import state_file
 
-__all__ = ["FILE", "Site", "SiteDrive", "SiteLine", "forget", "known_family", "remember", "state_file"]
+__all__ = [
+    "FILE",
+    "Site",
+    "SiteDrive",
+    "SiteLine",
+    "families_on",
+    "forget",
+    "known_family",
+    "remember",
+    "state_file",
+]
 
 if not TYPE_CHECKING:
     __getattr__ = later(
         __name__,
         {
             "config": ("FILE", "Site", "SiteDrive", "SiteLine"),
-            "known_families": ("forget", "known_family", "remember"),
+            "known_families": ("families_on", "forget", "known_family", "remember"),
             "state_folder": ("state_file",),
         },
     )

@@ -15,7 +15,7 @@ from contextlib import suppress
 
 from drivebus.site.state_folder import state_file
 
-__all__ = ["forget", "known_family", "remember"]
+__all__ = ["families_on", "forget", "known_family", "remember"]
 
 _MOST = 1000
 """Units that are kept; then those that were known longest give way."""
@@ -27,6 +27,16 @@ def known_family(port: str, unit: int) -> str | None:
     """The family that *unit* on *port* was when it was surely known last, or None."""
     key = _key(port, unit)
     return None if key is None else _read().get(key)
+
+
+def families_on(port: str) -> dict[int, str]:
+    """The families of the units on *port* that were surely known last."""
+    key = _key(port, 0)
+    if key is None:
+        return {}
+    line = key.removesuffix("0")
+    kept = {place.removeprefix(line): family for place, family in _read().items() if place.startswith(line)}
+    return {int(unit): family for unit, family in kept.items() if unit.isdecimal() and 1 <= int(unit) <= 247}
 
 
 def remember(port: str, unit: int, family: str) -> None:
