@@ -26,8 +26,8 @@ def test_the_corpus_is_there() -> None:
     assert len(FILES) >= 10
 
 
-async def _proved_by_nothing(*_: object, **__: object) -> None:
-    return
+async def _proved_by_nothing(_: commands.Proof) -> bool:
+    return True
 
 
 def _sent_twice(send: Callable[..., object]) -> Callable[..., object]:
@@ -62,7 +62,7 @@ def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(commands, "give", _sent_by_nobody(commands.give))
-    monkeypatch.setattr(commands, "confirm", _proved_by_nothing)
+    monkeypatch.setattr(commands.Proof, "look", _proved_by_nothing)
     assert any("it was not halted" in said for said in found())
 
 
