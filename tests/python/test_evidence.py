@@ -152,9 +152,25 @@ class TestCommands:
             assert simulator.drive(1).writes() == []
 
 
+@pytest.fixture
+def printed(tmp_path: Path) -> Path:
+    """A VFD500 as if a page printed where its commands go: commands that may be used, and states that may not."""
+    folder = tmp_path / "vfd500"
+    shutil.copytree(PROFILES / "vfd500", folder)
+    file = folder / "registers.csv"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    row = next(place for place, line in enumerate(lines) if line.startswith("0x7000,"))
+    assert ",wo,no," in lines[row]
+    lines[row] = lines[row].replace(",wo,no,", ",wo,yes,")
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder
+
+
 class TestStates:
-    def test_a_start_is_proved_by_its_answer_and_the_fault_number(self, bus: Bus, simulator: Simulator) -> None:
-        drive = bus.drive(VFD500, "vfd500", variants={"speed_unit": "Hz"})
+    def test_a_start_is_proved_by_its_answer_and_the_fault_number(
+        self, bus: Bus, simulator: Simulator, printed: Path
+    ) -> None:
+        drive = bus.drive(VFD500, printed, variants={"speed_unit": "Hz"})
         simulator.drive(VFD500).take_writes()
         before = len(frames(simulator, VFD500))
         drive.run(10.0)
@@ -192,8 +208,8 @@ class TestStates:
         with pytest.raises(drivebus.Unconfirmed, match="its state does not show it"):
             asyncio.run(main())
 
-    def test_a_fault_is_seen_before_and_after(self, bus: Bus, simulator: Simulator) -> None:
-        drive = bus.drive(VFD500, "vfd500", variants={"speed_unit": "Hz"})
+    def test_a_fault_is_seen_before_and_after(self, bus: Bus, simulator: Simulator, printed: Path) -> None:
+        drive = bus.drive(VFD500, printed, variants={"speed_unit": "Hz"})
         simulator.drive(VFD500).trip(18)
         with pytest.raises(NotAllowed, match=r"in fault 18: Earth fault"):
             drive.run(10.0)
@@ -281,16 +297,16 @@ class TestRules:
             assert [word[1:] for word in simulator.drive(1).writes()] == [(0x000B, 30), (0x800B, 40)]
 
     def test_a_unit_that_a_parameter_decides(
-        self, bus: Bus, simulator: Simulator, refuses: Callable[..., None]
+        self, bus: Bus, simulator: Simulator, refuses: Callable[..., None], printed: Path
     ) -> None:
         """VFD500, P30.14: percent, Hz or rpm; the three are printed, their numbers are not."""
-        drive = bus.drive(VFD500, "vfd500")
+        drive = bus.drive(VFD500, printed)
         calls: list[Callable[[], None]] = [lambda: drive.run(10.0), lambda: drive.write("speed_reference", 10.0)]
         for call in calls:
             with pytest.raises(NotAllowed, match=rf"P30\.14.*variants=.*'Hz'.*{HOW}"):
                 call()
         assert simulator.drive(VFD500).writes() == []
-        fixed = bus.drive(VFD500, "vfd500", variants={"speed_unit": "%"})
+        fixed = bus.drive(VFD500, printed, variants={"speed_unit": "%"})
         bus.write(VFD500, 0x1E0E, 0)
         fixed.write("speed_reference", -50.0)
         assert simulator.drive(VFD500).writes()[-1][1:] == (0x7001, 0x10000 - 5000)

@@ -262,7 +262,7 @@ class TestAfterThePortWasOpenedAgain:
         simulator.line.replug()
 
     def test_the_same_one_is_written_to(self, simulator: Simulator, bus: Bus) -> None:
-        drive = bus.drive(3, "vfd500")
+        drive = bus.drive(3, "vfd500", unverified=True)
         drive.torque = 10.0
         self.reopen(simulator, bus)
         drive.torque = 20.0
@@ -272,7 +272,7 @@ class TestAfterThePortWasOpenedAgain:
     def test_another_one_is_not(
         self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, word: int, says: str
     ) -> None:
-        drive = bus.drive(3, "vfd500")
+        drive = bus.drive(3, "vfd500", unverified=True)
         drive.torque = 10.0
         self.reopen(simulator, bus)
         read = bus.read

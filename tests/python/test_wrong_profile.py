@@ -241,7 +241,7 @@ class TestWhatTellsNothing:
         simulator, bus = vfd500
         read = bus.read
         monkeypatch.setattr(bus, "read", lambda *what, **how: [3] if what[1] == CODE else read(*what, **how))
-        bus.drive(1, "vfd500").torque = 10.0
+        bus.drive(1, "vfd500", unverified=True).torque = 10.0
         assert len(written(simulator)) == 1
 
     @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05, 0x06, 0x09])
@@ -275,7 +275,7 @@ class TestWhatTellsNothing:
     def test_a_damaged_request_is_not_the_last_word_of_a_vfd500(self, vfd500: tuple[Simulator, Bus]) -> None:
         """03H is a frame error there. VFD500 manual, p. 133."""
         simulator, bus = vfd500
-        drive = bus.drive(1, "vfd500")
+        drive = bus.drive(1, "vfd500", unverified=True)
         refuse(simulator, 0x03)
         drive.torque = 10.0
         before = len(asked(simulator))
@@ -285,7 +285,7 @@ class TestWhatTellsNothing:
     def test_what_was_said_before_silence_counts(self, gd300: tuple[Simulator, Bus]) -> None:
         """It refuses r25.00, which each VFD500 has, and falls silent on the next question."""
         simulator, bus = gd300
-        drive = bus.drive(1, "vfd500")
+        drive = bus.drive(1, "vfd500", unverified=True)
         simulator.line.script([(2, "silence")])
         with pytest.raises(NotAllowed, match="refuses 1900H"):
             drive.torque = 10.0
@@ -296,7 +296,7 @@ class TestWhatTellsNothing:
         """05H: reading is refused, as a parameter may be. VFD500 manual, p. 133."""
         simulator, bus = vfd500
         refuse(simulator, exception)
-        bus.drive(1, "vfd500").torque = 10.0
+        bus.drive(1, "vfd500", unverified=True).torque = 10.0
         assert len(written(simulator)) == 1
 
     def test_silence(self, gd300: tuple[Simulator, Bus]) -> None:
@@ -350,7 +350,7 @@ class TestWhatTells:
         self, vfd500: tuple[Simulator, Bus], monkeypatch: pytest.MonkeyPatch, address: int
     ) -> None:
         simulator, bus = vfd500
-        drive = bus.drive(1, "vfd500")
+        drive = bus.drive(1, "vfd500", unverified=True)
         read = bus.read
 
         def other(unit: int, place: int, *rest: int, **how: bool) -> list[int]:
