@@ -31,6 +31,8 @@ RAMP = 2.0
 STOPPED = "drivebus.panel unit 1: stop confirmed: "
 BETWEEN = 2
 """Requests that may lie between the key and the stop: one that was under way, and one that had its turn."""
+TRIES = 3
+"""A machine that is busy elsewhere may hold the program up between the key and its order: not each time."""
 
 
 def prepared(simulator: Simulator) -> None:
@@ -110,28 +112,47 @@ def test_space_stops_in_every_view_and_dialog(simulator: Simulator, tmp_path: Pa
         terminal.until("2 drives", "stopped")
         requests: dict[str, int] = {}
         for name, (there, back) in VIEWS.items():
-            # Somebody else started it, of whom the panel knows nothing.
-            drive.run(hz=5.0)
-            for key, shown in there:
-                terminal.press(key)
-                terminal.until(shown)
-            known = len(terminal.record())
-            terminal.press(" ")
-            wait_until(lambda: told(simulator)[-1] == STOP)
-            wait_until(partial(says, terminal, known, STOPPED))
-            requests[name] = between(terminal.record()[known:])
-            for shown in back:
-                terminal.press("\x1b")
-                terminal.until(shown)
-            terminal.until(HOME)
+            for _ in range(TRIES):
+                # Somebody else started it, of whom the panel knows nothing.
+                drive.run(hz=5.0)
+                for key, shown in there:
+                    terminal.press(key)
+                    terminal.until(shown)
+                known = len(terminal.record())
+                terminal.press(" ")
+                wait_until(lambda: told(simulator)[-1] == STOP)
+                wait_until(partial(says, terminal, known, STOPPED))
+                requests[name] = between(terminal.record()[known:])
+                for shown in back:
+                    terminal.press("\x1b")
+                    terminal.until(shown)
+                terminal.until(HOME)
+                if requests[name] <= BETWEEN:
+                    break
         terminal.press("q")
         assert terminal.ends() == 0
     assert told(simulator, 2) == [], "the other drive was let alone"
-    # A machine that is busy elsewhere may hold the program up between the key and its order. Two cycles of this line
-    # are four requests.
-    late = {name: count for name, count in requests.items() if count > BETWEEN}
-    assert len(late) <= 1, late
-    assert max(requests.values()) <= 4, late
+    assert max(requests.values()) <= BETWEEN, requests
+
+
+def test_a_view_that_is_left_while_it_reads_takes_nothing_with_it(simulator: Simulator, tmp_path: Path) -> None:
+    """The answer comes when nobody looks any more."""
+    with on_a_terminal(["--port", simulator.port, "--unit", "1,2", "panel"], tmp_path / "record") as terminal:
+        terminal.until("2 drives", "stopped")
+        terminal.press("p")
+        terminal.until(PARAMETERS)
+        # In the middle of the reads of the group that comes next.
+        simulator.line.delay_answers(0.2)
+        known = len(terminal.record())
+        terminal.press("\x1b[C")
+        wait_until(lambda: any(" -> 01 03 01 " in line for line in terminal.record()[known:]))
+        terminal.press("\x1b")
+        terminal.until(HOME)
+        simulator.line.delay_answers(0.0)
+        known = len(terminal.record())
+        wait_until(lambda: sum(" <- 02 03 " in line for line in terminal.record()[known:]) > 2)
+        terminal.press("q")
+        assert terminal.ends() == 0, terminal.text
 
 
 def between(record: list[str]) -> int:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import DataTable
@@ -138,10 +139,12 @@ class Parameters(Screen[None]):
             table.add_row(*(Text(printable(cell)) for cell in cells), key=_key(row))
         wanted = [row for row in rows if _key(row) not in self._values]
         if wanted:
-            threading.Thread(target=self._read, args=(wanted, self._turn), name="panel parameters", daemon=True).start()
+            # A view that was left has no app any more, and its thread may still be at work.
+            look = partial(self._read, self.app, wanted, self._turn)
+            threading.Thread(target=look, name="panel parameters", daemon=True).start()
         self._show_detail()
 
-    def _read(self, rows: Sequence[drivebus.Description], turn: int) -> None:
+    def _read(self, app: App[object], rows: Sequence[drivebus.Description], turn: int) -> None:
         """Reads *rows*, as long as they are looked at. In a thread of its own."""
         for row in rows:
             if turn != self._turn:
@@ -154,7 +157,7 @@ class Parameters(Screen[None]):
                 self._journal.fail(f"{self._member.called}: read {_key(row)}", error)
                 shown = f"not read: {error}"
             self._values[_key(row)] = shown
-            self.app.call_later(self._put, _key(row), turn)
+            app.call_later(self._put, _key(row), turn)
 
     def _put(self, key: str, turn: int) -> None:
         if turn != self._turn or not self.is_attached:
@@ -209,20 +212,20 @@ class Parameters(Screen[None]):
         text = f"{self._member.what}: {what}. A motor that turns may change its speed. Is the machine clear?"
         answers = {"y": "yes, to RAM: lost with power", "e": "yes, to EEPROM: kept"}
 
-        since = self._member.motor.stops
+        app, since = self.app, self._member.motor.stops
 
         def answered(key: str | None) -> None:
             if key:
-                self._member.motor.later(what, lambda: self._write(row, value, key == "e"), since)
+                self._member.motor.later(what, lambda: self._write(app, row, value, key == "e"), since)
 
         self.app.push_screen(Ask(text, answers), answered)
 
-    def _write(self, row: drivebus.Description, value: object, store: bool) -> None:
+    def _write(self, app: App[object], row: drivebus.Description, value: object, store: bool) -> None:
         """Writes, and reads what is there now. In a thread of its own."""
         key = _key(row)
         self._drive.write(key, value, store)
         self._values.pop(key, None)
-        self._read([row], self._turn)
+        self._read(app, [row], self._turn)
 
     def action_compare(self) -> None:
         """Asks for a backup, and shows how the drive differs from it."""
@@ -232,9 +235,9 @@ class Parameters(Screen[None]):
     def _compare(self, file: str | None) -> None:
         if file:
             self._journal.say(f"{self._member.called}: compare with {file}")
-            threading.Thread(target=self._diff, args=(file,), name="panel diff", daemon=True).start()
+            threading.Thread(target=self._diff, args=(self.app, file), name="panel diff", daemon=True).start()
 
-    def _diff(self, file: str) -> None:
+    def _diff(self, app: App[object], file: str) -> None:
         """Reads the whole drive. In a thread of its own."""
         try:
             kept = None if file == "factory" else drivebus.Backup.load(file, self._drive.profile)
@@ -245,7 +248,7 @@ class Parameters(Screen[None]):
         rest = f" {len(found.uncompared)} were not compared." if found.uncompared else ""
         told = Text(printable(f"{file} -> the drive: {len(found)} of {found.compared} parameters differ.{rest}\n\n"))
         told.append("\n".join(printable(str(each)) for each in found))
-        self.app.call_later(self.app.push_screen, Show(told))
+        app.call_later(app.push_screen, Show(told))
 
 
 _ACCESS = {"ro": "read-only", "rw": "writable", "run": "writable at any time", "stop": "writable while stopped"}
