@@ -268,6 +268,12 @@ HINT = "No proved register of this family has the frequency; --unverified shows 
 class TestSureness:
     """Each family says what it is as far as its manuals go, and no command falls over what is not known of it."""
 
+    def test_a_status_without_a_state_says_how_to_see_one(self) -> None:
+        hint = "`--unverified` also shows what no document of this family proves."
+        for words, told_so in (([], True), (["--unverified"], False)):
+            result = at("vfd500", "--profile", "vfd500", *words, "status")
+            assert (hint in result.stdout) == told_so
+
     @pytest.mark.parametrize("family", drivebus.profiles())
     @pytest.mark.parametrize("command", [["info"], ["status"], ["faults"], ["monitor", "--count", "1"], ["scan"]])
     def test_every_command_that_looks(self, family: str, command: list[str]) -> None:

@@ -226,6 +226,12 @@ def capture(tmp_path: Path) -> Path:
     )  # fmt: skip
 
 
+def test_a_capture_that_breaks_off_does_not_blame_the_unit(tmp_path: Path) -> None:
+    path = kept(tmp_path / "cut.pcapng", ">01 03 21 00 00 01", "<01 03 02 00 03", ">01 03 21 00 00 01")
+    done = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(path)])
+    assert done.stdout.splitlines()[-1].endswith("-> did not answer before the end")
+
+
 def test_the_commands_show_a_capture(capture: Path) -> None:
     done = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(capture)])
     assert done.exit_code == 0, done.output

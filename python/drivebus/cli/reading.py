@@ -211,6 +211,8 @@ def status(session: Session) -> None:
     if now.missing:
         out.say("Missing:")
         out.facts(now.missing)
+        if "state" in now.missing and drive.profile.state_reason() is not None and not drive.unverified:
+            out.say("`--unverified` also shows what no document of this family proves.")
 
 
 _MEASURED = ("output_current", "output_voltage", "bus_voltage", "rotation_speed")

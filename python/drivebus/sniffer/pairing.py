@@ -60,13 +60,13 @@ class Pairing:
         """The exchanges in *pieces* that were told apart elsewhere."""
         yield from self._told(pieces)
         if self._open is not None:
-            yield self._unheard(self._open)
+            yield self._unheard(self._open, is_last=True)
 
     def finish(self) -> Iterator[Exchange]:
         """The rest: nothing more will come."""
         yield from self._told(self._sniffer.finish())
         if self._open is not None:
-            yield self._unheard(self._open)
+            yield self._unheard(self._open, is_last=True)
 
     def _told(self, pieces: Iterable[_Piece]) -> Iterator[Exchange]:
         for piece in pieces:
@@ -111,8 +111,8 @@ class Pairing:
             lump=self._lump,
         )
 
-    def _unheard(self, asked: _Piece) -> Exchange:
-        """The exchange of a request that nobody has surely answered."""
+    def _unheard(self, asked: _Piece, is_last: bool = False) -> Exchange:
+        """The exchange of a request that nobody has surely answered; *is_last* if nothing at all came behind it."""
         request = asked[1]
         who = f"unit {request[0]}"
         facts = _Facts(unit=request[0], request=request, started=asked[2] + self._ahead)
@@ -122,7 +122,8 @@ class Pairing:
         if self._noise:
             text = f"{who} was answered by {counted(len(self._noise), 'byte')} and no frame"
             return self._ended(asked, None, BadAnswer(text, raw=self._noise, **facts))
-        return self._ended(asked, None, NoAnswer(f"{who} did not answer", **facts))
+        until = " before the end" if is_last else ""
+        return self._ended(asked, None, NoAnswer(f"{who} did not answer{until}", **facts))
 
     def _refusal(self, request: bytes, answer: bytes) -> Refused | None:
         if answer[1] & 0x80 == 0:
