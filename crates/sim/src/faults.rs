@@ -15,6 +15,8 @@ pub use kind::FaultKind;
 use crate::random::Random;
 
 const KINDS: usize = FaultKind::ALL.len();
+/// All that the first byte of a frame can say.
+const ADDRESSES: usize = 256;
 /// Chance of faults must not depend on the chance of collisions, which has the plain seed.
 const OWN_CHANCE: u64 = 0xFA17;
 
@@ -74,6 +76,8 @@ pub(crate) struct Faults {
     /// Answers since the script began.
     answers: u64,
     counts: [u64; KINDS],
+    /// Addresses that have answered on this line.
+    present: [bool; ADDRESSES],
     pub(crate) times: Times,
     /// The silence that another's frame keeps to ours.
     pub(crate) silence: Duration,
@@ -89,6 +93,7 @@ impl Faults {
             instead: BTreeMap::new(),
             answers: 0,
             counts: [0; KINDS],
+            present: [false; ADDRESSES],
             times: Times::default(),
             silence,
         }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_rtu::function::{EXCEPTION_BIT, READ_HOLDING};
 use drivebus_rtu::{Frame, crc16};
 
-use super::{FaultKind, Faults, Hits};
+use super::{ADDRESSES, FaultKind, Faults, Hits};
 use crate::random::Random;
 
 /// Between the pieces of a split answer: the latency timer of common USB adapters.
@@ -36,6 +36,9 @@ pub(crate) struct Outgoing {
 impl Faults {
     /// What becomes of `outgoing`, hit by `hits`; `None` where nothing arrives.
     pub(crate) fn apply(&mut self, hits: Hits, outgoing: Outgoing) -> Option<Outgoing> {
+        if let [unit, ..] = outgoing.bytes[..] {
+            self.present[usize::from(unit)] = true;
+        }
         if hits.is_empty() {
             return Some(outgoing);
         }
@@ -44,7 +47,7 @@ impl Faults {
             return None;
         }
         let drawn = (0..DRAWS).find_map(|_| {
-            let drawn = Draw::new(&mut self.random, hits).damage(&outgoing.bytes, self.silence);
+            let drawn = Draw::new(&mut self.random, &self.present, hits).damage(&outgoing.bytes, self.silence);
             (!is_forged(&outgoing.bytes, &drawn.outgoing.bytes)).then_some(drawn)
         });
         let Drawn { outgoing: mut damaged, did } = drawn?;
@@ -93,13 +96,14 @@ struct Drawn {
 /// One try at damaging an answer.
 struct Draw<'a> {
     random: &'a mut Random,
+    present: &'a [bool; ADDRESSES],
     hits: Hits,
     did: Hits,
 }
 
 impl<'a> Draw<'a> {
-    fn new(random: &'a mut Random, hits: Hits) -> Self {
-        Self { random, hits, did: Hits::default() }
+    fn new(random: &'a mut Random, present: &'a [bool; ADDRESSES], hits: Hits) -> Self {
+        Self { random, present, hits, did: Hits::default() }
     }
 
     fn damage(mut self, answer: &[u8], silence: Duration) -> Drawn {
@@ -155,9 +159,11 @@ impl<'a> Draw<'a> {
     }
 
     fn foreign(&mut self, address: u8, function: u8, data: &[u8]) -> Vec<u8> {
-        // Any of the other 246 addresses.
-        let other = (usize::from(address) + self.random.below(246)) % 247 + 1;
-        self.look_alike(u8::try_from(other).unwrap_or(1), function, data)
+        // Any of the other 246 addresses, but none of this line: held back, its frame would be a forged answer of that unit.
+        let first = u8::try_from((usize::from(address) + self.random.below(246)) % 247 + 1).unwrap_or(1);
+        let from_first = (first..=247).chain(1..first);
+        let other = from_first.into_iter().find(|&other| !self.present[usize::from(other)]).unwrap_or(first);
+        self.look_alike(other, function, data)
     }
 
     /// A good frame that differs from the answer in its data, and in whatever else is said.

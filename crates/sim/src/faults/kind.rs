@@ -42,7 +42,8 @@ pub enum FaultKind {
     Deaf,
     /// The answer comes in two to four pieces with 16 ms between them, as adapters hand it over.
     Split,
-    /// A whole good frame of another unit, of the same function and length, then the silence, then the answer.
+    /// A whole good frame of another unit, of the same function and length, then the silence, then the answer. No unit that
+    /// has answered on the line has its address: nobody could tell such a frame from its answer.
     Foreign,
     /// A whole good frame of this unit for another function (04H for 03H), with other data: half of them before the answer,
     /// with the silence between, half of them instead of it.
