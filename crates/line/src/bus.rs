@@ -7,6 +7,7 @@
 //! | `call` | one call from its place in the queue to its end |
 //! | `workers` | the threads that carry out errands |
 //! | `listen` | hearing the line without asking |
+//! | `openings` | how often the line was opened again |
 //! | `sharing` | whether the port is this program's, or another's through which it is used |
 //! | `host` | serving other programs |
 //! | `through` | being served by one |
@@ -17,6 +18,7 @@ pub(crate) mod errand;
 #[cfg(all(unix, feature = "share"))]
 mod host;
 mod listen;
+mod openings;
 mod shared;
 #[cfg_attr(not(all(unix, feature = "share")), path = "bus/unshared.rs")]
 mod sharing;

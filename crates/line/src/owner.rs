@@ -179,7 +179,6 @@ impl Owner {
         if self.line.is_none() {
             let line = self.opener.open(give_up)?;
             self.take_line(line);
-            self.stats().reconnects += 1;
         }
         // Nothing is in flight, unless a caller's own code panicked while it was: then that is given up.
         self.master.abort(self.now());

@@ -11,6 +11,7 @@ use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
 use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
+use crate::bus::openings::Openings;
 use crate::bus::sharing::Sharing;
 use crate::error::{CallError, Failure};
 use crate::health::link::{Link, Links};
@@ -62,7 +63,8 @@ impl Shared {
     ) -> Result<Arc<Self>, Failure> {
         let (words, stats) = (Arc::new(FreshWords::new()), Arc::default());
         let given = key.as_ref().map(ToString::to_string).unwrap_or_default();
-        let (sharing, opener) = Sharing::around(key, &options, &stats, opener);
+        let openings = Openings::new(&stats);
+        let (sharing, opener) = Sharing::around(key, &options, &stats, &openings, openings.counting(opener));
         let mut owner = Owner::new(opener, options.format, options.echo, Arc::clone(&words), Arc::clone(&stats));
         match owner.open(give_up) {
             Err(failure) if !sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) => return Err(failure),

@@ -8,9 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use drivebus_rtu::SerialFormat;
-
 use crate::bus::host::{Guests, Host};
+use crate::bus::openings::Openings;
 use crate::bus::shared::Shared;
 use crate::health::stats::{Program, Stats};
 use crate::line::{Line, Opener, PortError, PortErrorKind};
@@ -40,8 +39,7 @@ pub(super) struct Sharing {
     /// The bus, once it is made.
     bus: OnceLock<Weak<Shared>>,
     stats: Arc<Mutex<Stats>>,
-    /// Whether the port was opened, here or there, before.
-    was_open: AtomicBool,
+    openings: Arc<Openings>,
     is_guest: AtomicBool,
     /// Whether the program through which the port was used is gone, and nobody opened it since.
     takes_over: AtomicBool,
@@ -65,22 +63,23 @@ impl Sharing {
         key: Option<PortKey>,
         options: &BusOptions,
         stats: &Arc<Mutex<Stats>>,
+        openings: &Arc<Openings>,
         opener: Opener,
     ) -> (Option<Arc<Self>>, Opener) {
         let Some(key) = key.filter(|_| options.share != Share::Never) else { return (None, opener) };
-        let sharing = Arc::new(Self::new(key, options.share, &options.format, Arc::clone(stats)));
+        let sharing = Arc::new(Self::new(key, options, stats, openings));
         let opener = sharing.opener(opener);
         (Some(sharing), opener)
     }
 
-    fn new(key: PortKey, share: Share, format: &SerialFormat, stats: Arc<Mutex<Stats>>) -> Self {
+    fn new(key: PortKey, options: &BusOptions, stats: &Arc<Mutex<Stats>>, openings: &Arc<Openings>) -> Self {
         Self {
             key,
-            share,
-            hello: Hello { program: own_name(), characters: Characters::of(format) },
+            share: options.share,
+            hello: Hello { program: own_name(), characters: Characters::of(&options.format) },
             bus: OnceLock::new(),
-            stats,
-            was_open: AtomicBool::new(false),
+            stats: Arc::clone(stats),
+            openings: Arc::clone(openings),
             is_guest: AtomicBool::new(false),
             takes_over: AtomicBool::new(false),
             guest: Mutex::default(),
@@ -121,7 +120,7 @@ impl Sharing {
                     Err(error) => return Err(error),
                 },
             };
-            match Guest::knock(&place, &self.hello, self.seen_so_far()) {
+            match Guest::knock(&place, &self.hello, self.openings.with_one_now()) {
                 Knocked::Open(guest) => {
                     self.comes_in(guest);
                     return Err(error);
@@ -148,22 +147,15 @@ impl Sharing {
         open()
     }
 
-    /// How often the port was opened again, if it is opened now.
-    fn seen_so_far(&self) -> u64 {
-        let reconnects = self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects;
-        reconnects + u64::from(self.was_open.load(Ordering::Acquire))
-    }
-
     fn comes_in(&self, guest: Guest) {
         self.serves_no_more();
-        self.was_open.store(true, Ordering::Release);
+        self.openings.open_elsewhere();
         self.takes_over.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(guest));
         self.is_guest.store(true, Ordering::Release);
     }
 
     fn has_opened(&self, place: Place) {
-        self.was_open.store(true, Ordering::Release);
         self.open_door(place);
         if self.takes_over.swap(false, Ordering::AcqRel) {
             thread::sleep(QUIET);

@@ -9,6 +9,7 @@ use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 use crate::ask::Done;
 use crate::bus::call::Call;
 use crate::bus::errand::Errand;
+use crate::bus::openings::Openings;
 use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
@@ -29,6 +30,7 @@ impl Sharing {
         _key: Option<PortKey>,
         _options: &BusOptions,
         _stats: &Arc<Mutex<Stats>>,
+        _openings: &Arc<Openings>,
         opener: Opener,
     ) -> (Option<Arc<Self>>, Opener) {
         (None, opener)
