@@ -125,6 +125,7 @@ OPERATIONS = [
     "variants",
     "registers",
     "state",
+    "sending",
     "parameters",
     "control",
     "setpoints",

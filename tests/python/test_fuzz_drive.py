@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from fuzz.drive import drive
 
-from drivebus.operations import commands, parameters
+from drivebus.operations import commands, sending
 from drivebus.operations.unit import Unit
 
 CORPUS = Path(__file__).parents[2] / "fuzz" / "corpus" / "drive"
@@ -67,11 +66,11 @@ def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_write_that_is_reported_done_and_was_not_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = parameters.write_one
+    write = sending.write
 
-    async def loses(unit: Unit, item: Any, store: bool) -> None:
-        if item.raw <= MOST_AT_FIRST:
-            await write(unit, item, store)
+    async def loses(unit: Unit, run: Sequence[sending.Planned], store: bool) -> None:
+        if all(item.raw <= MOST_AT_FIRST for item in run):
+            await write(unit, run, store)
 
-    monkeypatch.setattr(parameters, "write_one", loses)
+    monkeypatch.setattr(sending, "write", loses)
     assert any("was there" in said and "is;" in said for said in found())

@@ -75,6 +75,13 @@ fn every_mistake_names_file_line_and_reason() {
         // What profile.toml says by itself.
         ("profile.toml", "name = \"gd350\"", "name = \"GD 350\"", "GD 350"),
         ("profile.toml", "max_words = 16", "max_words = 0", "1 to 125"),
+        ("profile.toml", ", 0x10]\nmax_words = 16\n", "]\nmax_words = 16\n", "\"functions\" has no 0x10"),
+        (
+            "profile.toml",
+            "joined = \"GD350 operation manual, chapter 9.4 (INVT ebook 2645), section 9.4.8\"",
+            "joined = \"\"",
+            "\"joined\" is empty",
+        ),
         ("profile.toml", "bit = 15", "bit = 16", "8 to 15"),
         ("profile.toml", "format = \"8E1\"", "format = \"8X1\"", "8X1"),
         ("profile.toml", "unit = 1", "unit = 248", "1 to 247"),

@@ -20,7 +20,7 @@ from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
-from drivebus.operations import parameters, state
+from drivebus.operations import sending, state
 from drivebus.operations.unit import Unit
 
 __all__ = ["Restore"]
@@ -132,7 +132,7 @@ class Restore:
             if code in words.unread:
                 self._results[code] = ("missing", words.unread[code])
             elif words.raw[code] == self._backup.raw[code] and (
-                self._to_ram(code) or not parameters.is_in_ram(self._unit, code)
+                self._to_ram(code) or not sending.is_in_ram(self._unit, code)
             ):
                 self._results[code] = ("same", "")
 

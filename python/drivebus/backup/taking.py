@@ -13,7 +13,7 @@ from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.errors import NotAllowed, Refused
-from drivebus.operations import parameters, registers, words
+from drivebus.operations import registers, sending, words
 from drivebus.operations.unit import Unit
 
 __all__ = ["Progress", "origin_of", "take"]
@@ -93,7 +93,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     total, done, steps = len(codes), len(raw), 0
 
     def taken(complete: bool) -> Backup:
-        in_ram = [code for code in raw if code in were_in_ram or parameters.is_in_ram(unit, code)]
+        in_ram = [code for code in raw if code in were_in_ram or sending.is_in_ram(unit, code)]
         return Backup(origin, raw, unread, unit.profile, complete=complete, in_ram=in_ram)
 
     def keep() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivebus.errors import LINE_ERRORS, NotAllowed
-from drivebus.operations import parameters, words
+from drivebus.operations import sending, words
 from drivebus.operations.unit import Unit
 
 __all__ = ["place", "write"]
@@ -64,7 +64,7 @@ async def _put(unit: Unit, code: str, address: int, word: int, *, store: bool) -
     """Writes the word of a parameter, and remembers to which memory."""
     known = unit.profile.describe(code)
     if not store:
-        parameters.put_in_ram(unit, known)
+        sending.put_in_ram(unit, known)
     await words.write(unit, address, word)
     if store:
-        parameters.stored(unit, known)
+        sending.stored(unit, known)

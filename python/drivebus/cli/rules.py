@@ -81,6 +81,8 @@ def _line(profile: drivebus.Profile) -> list[str]:
     words = "1 word" if profile.max_words == 1 else f"{profile.max_words} words"
     requests = profile.requests()
     lines = [f"functions {functions}; {words} in one request at most{_doubt(requests['verified'], requests['note'])}"]
+    if requests["joined"]:
+        lines.append("one request may write several parameters")
     if not requests["across_groups"]:
         lines.append("no read leaves its group of parameters")
     serial = profile.serial()

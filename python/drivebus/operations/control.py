@@ -10,7 +10,7 @@ from typing import Any
 
 from drivebus import checks
 from drivebus.errors import NotAllowed, Unconfirmed
-from drivebus.operations import parameters, registers
+from drivebus.operations import parameters, registers, sending
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Control, ControlItem
@@ -56,7 +56,7 @@ async def prepare_control(
     wanted = wanted_for(unit, setpoint)
     needed = {}
     for item in await _check_items(unit, wanted):
-        if item.ok and not (store and parameters.is_in_ram(unit, item.code)):
+        if item.ok and not (store and sending.is_in_ram(unit, item.code)):
             continue
         if item.actual is None or not (item.verified or unit.unverified):
             what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"

@@ -7,30 +7,18 @@ them.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple, overload
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, StoreWarning, level_of_the_program
-from drivebus.operations import registers, state, variants, words
+from drivebus.errors import DrivebusError, NotAllowed
+from drivebus.operations import registers, sending, state, variants
+from drivebus.operations.sending import Planned
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import Description, Value
 
-__all__ = ["Planned", "check_now", "is_in_ram", "plan_write", "put_in_ram", "stored", "write", "write_one"]
-
-_STORES_BEFORE_WARNING = 5
-"""EEPROM writes of one parameter by one program that are taken for use; more look like a loop."""
-
-
-class Planned(NamedTuple):
-    """One write that is allowed, as far as the profile tells."""
-
-    known: Description
-    name: str
-    address: int
-    raw: int
+__all__ = ["check_now", "plan_write", "write"]
 
 
 class _Limit(NamedTuple):
@@ -52,7 +40,10 @@ async def write(
     *,
     unverified: bool = False,
 ) -> None:
-    """Writes one value, or several from a mapping, each by its own request.
+    """Writes one value, or several from a mapping.
+
+    Each goes out by a request of its own. Parameters with successive codes, in that order, share one (10H) where the
+    documents of the family print that they may: `Profile.requests()["joined"]` has the page.
 
     A confirmation that was lost is cleared up by reading the value. Only where the drive shows another one is the
     write repeated, as often as the bus repeats a read. What does something when it is written (P00.15 tunes the
@@ -78,7 +69,8 @@ async def write(
             was sent.
         NoAnswer, BadAnswer, PortError: The drive may have taken the value all the same, unless the error's
             `started` is None: then it was not sent.
-        Refused: The drive kept what it had.
+        Refused: The drive kept what it had. Of parameters that shared a request it may have taken some: the error's
+            note has what it shows.
         Unconfirmed: The drive shows another value, however often it was written.
 
     Where one of several fails, those before it were written; the error's note names them.
@@ -97,21 +89,68 @@ async def write(
     planned = [plan_write(unit, key, asked, store) for key, asked in wanted.items()]
     await check_now(unit, planned)
     done: list[str] = []
-    for item in planned:
+    for run in _runs(unit, planned):
         try:
-            await write_one(unit, item, store)
+            await sending.write(unit, run, store)
         except DrivebusError as error:
             if done and hasattr(error, "add_note"):
                 error.add_note(f"written before it: {', '.join(done)}")
             raise
-        done.append(item.name)
+        done += [item.name for item in run]
+
+
+def _runs(unit: Unit, planned: Sequence[Planned]) -> Iterator[list[Planned]]:
+    """The writes in their order; those that may share a request stand together."""
+    run: list[Planned] = []
+    for item in planned:
+        if run and not _may_follow(unit, run, item):
+            yield run
+            run = []
+        run.append(item)
+    if run:
+        yield run
+
+
+def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
+    """Whether *item* may be written by the request that writes *run*.
+
+    What narrows another one's range does not share its request: in which order a drive checks the words is not printed.
+    """
+    profile, last = unit.profile, run[-1]
+    if item.address != last.address + 1 or len(run) == profile.max_words or not profile.requests()["joined"]:
+        return False
+    alone = unit.evidence.once(_alone)
+    if not all(_is_plain(unit, each) and sending.key(each.known) not in alone for each in (last, item)):
+        return False
+    together = {sending.key(each.known) for each in (*run, item)}
+    narrows = any(sending.key(profile.describe(limit.other)) in together for limit in _limits(unit, item.known))
+    narrowed = any(
+        sending.key(profile.describe(limit.other)) == sending.key(item.known)
+        for each in run
+        for limit in _limits(unit, each.known)
+    )
+    return not narrows and not narrowed
+
+
+def _is_plain(unit: Unit, item: Planned) -> bool:
+    """Whether *item* is a parameter that is simply kept, while the drive runs too."""
+    return (
+        item.known.kind == "parameter" and item.known.access == "run" and unit.profile.read_back(item.name) is not None
+    )
+
+
+def _alone(evidence: Evidence) -> frozenset[str]:
+    """Parameters that decide who commands the drive, or how the line is set."""
+    profile = evidence.profile
+    names = [*profile.serial_parameters(), *(need["code"] for need in profile.control())]
+    return frozenset(sending.key(profile.describe(name)) for name in names)
 
 
 def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
     """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
     for variant, rule in variants.rules(unit).items():
-        parameter = _key(unit.profile.describe(rule["parameter"]))
-        name = next((name for name in wanted if _key(unit.profile.describe(name)) == parameter), None)
+        parameter = sending.key(unit.profile.describe(rule["parameter"]))
+        name = next((name for name in wanted if sending.key(unit.profile.describe(name)) == parameter), None)
         if name is None:
             continue
         depends = next((other for other in wanted if unit.profile.describe(other).variant == variant), None)
@@ -179,17 +218,17 @@ async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
                 f"runs ({now}); nothing was written",
                 unit=unit.address,
             )
-    in_force = {_key(unit.profile.describe(name)): values[name] for name in others}
+    in_force = {sending.key(unit.profile.describe(name)): values[name] for name in others}
     for item in planned:
         _check_range(unit, item, in_force)
-        in_force[_key(item.known)] = registers.value(unit, item.name, item.raw)
+        in_force[sending.key(item.known)] = registers.value(unit, item.name, item.raw)
 
 
 def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> None:
     value = registers.value(unit, item.name, item.raw)
     for other, low in _limits(unit, item.known):
         narrow = unit.profile.describe(other)
-        limit = in_force.get(_key(narrow))
+        limit = in_force.get(sending.key(narrow))
         if limit is None or (value >= limit if low else value <= limit):
             continue
         raise NotAllowed(
@@ -206,50 +245,10 @@ def _limits(unit: Unit, known: Description) -> list[_Limit]:
     limits = [_Limit(other, low) for other, low in named if other is not None]
     if known.kind == "parameter":
         have = {unit.profile.describe(limit.other).code for limit in limits}
-        limits += [limit for limit in unit.evidence.once(_narrowing).get(_key(known), ()) if limit.other not in have]
+        limits += [
+            limit for limit in unit.evidence.once(_narrowing).get(sending.key(known), ()) if limit.other not in have
+        ]
     return limits
-
-
-async def write_one(unit: Unit, item: Planned, store: bool) -> None:
-    """Sends one write, and remembers to which memory."""
-    read_back = unit.profile.read_back(item.name)
-    if item.known.kind != "parameter" or not store:
-        if item.known.kind == "parameter":
-            put_in_ram(unit, item.known)
-        await words.write(unit, item.address, item.raw, read_back=read_back)
-        return
-    # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-    [in_force] = await words.read_words(unit, unit.profile.address(item.name))
-    if in_force == item.raw and not is_in_ram(unit, item.name):
-        return
-    # Where it is in force already, from RAM, reading it does not tell whether EEPROM took it.
-    await words.write(unit, item.address, item.raw, read_back=None if in_force == item.raw else read_back)
-    stored(unit, item.known)
-
-
-def is_in_ram(unit: Unit, name: str) -> bool:
-    """Whether this program wrote *name* to RAM, and not to EEPROM since: what it reads as is then not stored."""
-    return _key(unit.profile.describe(name)) in unit.memory.in_ram
-
-
-def put_in_ram(unit: Unit, known: Description) -> None:
-    """Says that a parameter is about to be written to RAM: the drive may take it although its answer is lost."""
-    unit.memory.in_ram.add(_key(known))
-
-
-def stored(unit: Unit, known: Description) -> None:
-    """Says that a parameter was written to EEPROM, and warns of a program that does that in a loop."""
-    name = _key(known)
-    unit.memory.in_ram.discard(name)
-    unit.memory.stores[name] += 1
-    times = unit.memory.stores[name]
-    if times >= _STORES_BEFORE_WARNING:
-        warnings.warn(
-            f"{name} of unit {unit.address} was stored in EEPROM {times} times by this program; "
-            "its write life is limited: write to RAM (store=False) in a loop",
-            StoreWarning,
-            stacklevel=level_of_the_program(),
-        )
 
 
 def _narrowing(evidence: Evidence) -> Mapping[str, Sequence[_Limit]]:
@@ -260,10 +259,5 @@ def _narrowing(evidence: Evidence) -> Mapping[str, Sequence[_Limit]]:
         if other.kind == "parameter":
             for bound, low in ((other.low_from, False), (other.high_from, True)):
                 if bound is not None:
-                    found.setdefault(_key(profile.describe(bound)), []).append(_Limit(_key(other), low))
+                    found.setdefault(sending.key(profile.describe(bound)), []).append(_Limit(sending.key(other), low))
     return found
-
-
-def _key(known: Description) -> str:
-    """One name for a parameter that has two."""
-    return known.code or known.name

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
-from drivebus.operations import control, parameters, registers, variants, words
+from drivebus.operations import control, parameters, registers, sending, variants, words
 from drivebus.operations.unit import Unit
 from drivebus.values import Value
 
@@ -116,7 +116,7 @@ async def give(unit: Unit, setpoint: str, value: float, *, unverified: bool = Fa
     planned = parameters.plan_write(unit, register, checks.number(setpoint, value, -math.inf), False)
     await control.check_heeded(unit, setpoint, register)
     await parameters.check_now(unit, [planned])
-    await parameters.write_one(unit, planned, False)
+    await sending.write(unit, [planned], False)
 
 
 async def with_setpoint(unit: Unit, setpoint: str) -> Unit:

@@ -123,7 +123,10 @@ class Profile:
         return self._native.parameter_groups()
 
     def requests(self) -> dict[str, Any]:
-        """What else is known of requests: `across_groups`, `verified`, `note`, `source`."""
+        """What else is known of requests: `across_groups`, `verified`, `note`, `source`.
+
+        `joined` is where it is printed that one 10H request may write several parameters; None where it is not.
+        """
         return self._native.requests()
 
     def serial(self) -> dict[str, Any] | None:

@@ -188,6 +188,7 @@ fn read_requests(file: &File, requests: &manifest::Requests) -> Result<Requests,
     Ok(Requests {
         functions: requests.functions.clone(),
         max_words: facts::within(file, &requests.max_words, 1, 125, "max_words")?,
+        joined: requests.joined.as_ref().map(|source| source.get_ref().clone()),
         across_groups: requests.across_groups,
         verified: requests.verified,
         note: requests.note.clone(),

@@ -121,6 +121,8 @@ fn assume(base: &mut Profile, file: &File, extends: &Extends, problems: &mut Pro
     if !confirmed("requests") {
         let requests = &mut base.requests;
         (requests.verified, requests.note) = (false, joined(assumption, &requests.note));
+        // What a sister does not print, its drives get one by one.
+        requests.joined = None;
     }
     for variant in base.variants.values_mut().filter(|_| !confirmed("variants")) {
         (variant.verified, variant.note) = (false, joined(assumption, &variant.note));

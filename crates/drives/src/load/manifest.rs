@@ -119,6 +119,9 @@ pub(super) struct Requests {
     pub(super) functions: Vec<u8>,
     /// Most words in one request, 1 to 125.
     pub(super) max_words: Placed<u16>,
+    /// Where it is printed that one 10H request may write several parameters: document and page. Each is written by its own
+    /// request where this is left out.
+    pub(super) joined: Option<Placed<String>>,
     /// Whether a read may run from one parameter group into the next.
     #[serde(default = "yes")]
     pub(super) across_groups: bool,

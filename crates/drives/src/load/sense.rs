@@ -78,6 +78,21 @@ fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
     if let Some(requests) = manifest.requests.as_ref().filter(|requests| requests.functions.is_empty()) {
         problems.add(file, line(file, &requests.max_words), "\"functions\" is empty; 0x03 reads, 0x06 writes one word");
     }
+    if let Some((requests, source)) =
+        manifest.requests.as_ref().and_then(|requests| Some((requests, requests.joined.as_ref()?)))
+    {
+        if source.get_ref().trim().is_empty() {
+            problems.add(
+                file,
+                line(file, source),
+                "\"joined\" is empty; name the document and the page, or leave it out",
+            );
+        }
+        if !requests.functions.contains(&0x10) {
+            let reason = "\"joined\" says that one request may write several parameters, and \"functions\" has no 0x10";
+            problems.add(file, line(file, source), reason);
+        }
+    }
 }
 
 /// What moves a motor, and what tells whether it moves.

@@ -30,6 +30,8 @@ pub struct Requests {
     pub functions: Vec<u8>,
     /// Most words in one read or write, 1..=125.
     pub max_words: u16,
+    /// Where it is printed that one 10H request may write several parameters; `None` where it is not printed.
+    pub joined: Option<String>,
     /// Whether a read may run from one parameter group into the next.
     pub across_groups: bool,
     /// Whether documents of this family print all of this.
