@@ -451,6 +451,8 @@ class Profile:
     def commands(self) -> dict[str, int]: ...
     def command_codes(self) -> dict[int, str]:
         """Every code that the family defines at its command register."""
+    def command_registers(self) -> dict[int, dict[int, str]]:
+        """Every register that takes commands, with its codes."""
     @property
     def command_address(self) -> int | None: ...
     def stored_address(self, address: int, /) -> int | None:

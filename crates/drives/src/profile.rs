@@ -261,7 +261,8 @@ impl Profile {
 
     /// Address and word of a command, whether or not it is verified; `None` if the family has no such command.
     pub fn command(&self, command: Command) -> Option<(u16, u16)> {
-        Some((self.command_address?, self.commands.get(&command)?.code))
+        let known = self.commands.get(&command)?;
+        Some((known.elsewhere.or(self.command_address)?, known.code))
     }
 
     /// The commands of the family, with their words.
@@ -271,14 +272,28 @@ impl Profile {
 
     /// Every word that the family defines at its command register, and what it means.
     pub fn command_codes(&self) -> BTreeMap<u16, &str> {
-        let named = self.commands.iter().map(|(command, known)| (known.code, command.name()));
+        let here = self.commands.iter().filter(|(_, known)| known.elsewhere.is_none());
+        let named = here.map(|(command, known)| (known.code, command.name()));
         let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
         others.chain(named).collect()
     }
 
     /// The command that `raw` means at the command register.
     pub fn command_of(&self, raw: u16) -> Option<Command> {
-        self.commands.iter().find(|&(_, known)| known.code == raw).map(|(&command, _)| command)
+        let is_it = |known: &CommandCode| known.elsewhere.is_none() && known.code == raw;
+        self.commands.iter().find(|&(_, known)| is_it(known)).map(|(&command, _)| command)
+    }
+
+    /// Every register that takes commands, with the words that the family defines there and what they mean.
+    pub fn command_registers(&self) -> BTreeMap<u16, BTreeMap<u16, &str>> {
+        let mut registers: BTreeMap<u16, BTreeMap<u16, &str>> = BTreeMap::new();
+        registers.extend(self.command_address.map(|address| (address, self.command_codes())));
+        for (command, known) in &self.commands {
+            if let Some(address) = known.elsewhere {
+                registers.entry(address).or_default().insert(known.code, command.name());
+            }
+        }
+        registers
     }
 
     /// Where commands are written.

@@ -359,3 +359,76 @@ fn what_a_parameter_decides_in_one_family_is_not_verified_in_its_sister() {
     let unit = &profile.variants()["speed_unit"];
     assert!(!unit.verified && unit.note.starts_with("So it is said."), "{}", unit.note);
 }
+
+/// Some makers take the reset of a fault where neither run nor stop is written.
+#[test]
+fn a_command_can_stand_in_another_register() {
+    let files = |reset: &str, moves: &str, rest: &str| {
+        let manifest = format!(
+            r#"
+            name = "elsewhere"
+            source = "x"
+            title = "x"
+            kind = "inverter"
+            version = 1
+            [requests]
+            functions = [3, 6]
+            max_words = 1
+            source = "x"
+            [parameters]
+            address = "group.index"
+            source = "x"
+            [commands]
+            register = "control_command"
+            moves = [{moves}]
+            source = "x"
+            [commands.codes]
+            run_forward = 18
+            stop = 1
+            [commands.elsewhere]
+            reset_fault = {{ register = "{reset}", code = 2 }}
+            {rest}
+            "#
+        );
+        let registers = format!(
+            "{REGISTERS}0x2000,control_command,x,,1,no,,,,rw,yes,,x\n0x2002,fault_reset,x,,1,no,,3,,rw,yes,,x\n\
+             ,nowhere,x,,1,no,,,,rw,assumed,No page says where it is.,\n0x2103,output,x,,1,no,,,,ro,yes,,x\n"
+        );
+        let parameters =
+            "code,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n";
+        let name = format!("elsewhere-{}", moves.len() + reset.len() + rest.len());
+        Folder::new(
+            &name,
+            &[
+                ("profile.toml", manifest.as_str()),
+                ("registers.csv", &registers),
+                ("parameters.csv", parameters),
+                ("faults.csv", FAULTS),
+            ],
+        )
+    };
+    let both = r#""control_command", "fault_reset""#;
+    let profile = files("fault_reset", both, "").load().unwrap();
+    assert_eq!(profile.command(Command::Stop), Some((0x2000, 1)));
+    assert_eq!(profile.command(Command::ResetFault), Some((0x2002, 2)));
+    assert!(profile.is_command(0x2002));
+    // 2 means nothing at 2000H, and 1 nothing at 2002H.
+    assert_eq!((profile.command_of(1), profile.command_of(2)), (Some(Command::Stop), None));
+    let registers = profile.command_registers();
+    assert_eq!(registers.keys().copied().collect::<Vec<_>>(), [0x2000, 0x2002]);
+    assert_eq!(registers[&0x2000].keys().copied().collect::<Vec<_>>(), [1, 18]);
+    assert_eq!(registers[&0x2002], [(2, "reset_fault")].into());
+
+    let wrong = |reset: &str, moves: &str, rest: &str, says: &str| {
+        let reasons = files(reset, moves, rest).reasons();
+        assert!(reasons.len() == 1 && reasons[0].contains(says), "{says}: {reasons:?}");
+    };
+    wrong("fault_reset", r#""control_command""#, "", "\"moves\" must hold \"fault_reset\"");
+    wrong("control_command", both, "", "control_command is the command register");
+    wrong("nowhere", r#""control_command", "nowhere""#, "", "it needs an address");
+    wrong("output", r#""control_command", "output""#, "", "that can be written");
+    wrong("fault_reset", both, "coast = { register = \"fault_reset\", code = 2 }", "has the code of");
+    wrong("fault_reset", both, "coast = { register = \"fault_reset\", code = 4 }", "4");
+    wrong("fault_reset", both, "stop = { register = \"fault_reset\", code = 3 }", "stop is there twice");
+    wrong("fault_reset", both, "[setpoints.frequency]\nregister = \"fault_reset\"", "no setpoint can be there");
+}

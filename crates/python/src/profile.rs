@@ -285,6 +285,10 @@ impl Profile {
         self.0.command_codes()
     }
 
+    fn command_registers(&self) -> std::collections::BTreeMap<u16, std::collections::BTreeMap<u16, &str>> {
+        self.0.command_registers()
+    }
+
     #[getter]
     fn command_address(&self) -> Option<u16> {
         self.0.command_address()

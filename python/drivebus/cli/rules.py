@@ -38,6 +38,7 @@ def known(profile: drivebus.Profile) -> dict[str, Any]:
         "command_register": profile.command_address,
         "commands": profile.commands(),
         "command_codes": profile.command_codes(),
+        "command_registers": profile.command_registers(),
         "commands_not_usable": _reasons(profile),
         "states": _states(profile),
         "state_reason": profile.state_reason(),
@@ -119,11 +120,13 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     if profile.command_address is None or not codes:
         return ["none known: it cannot be started or stopped over the bus"]
     reasons = _reasons(profile)
-    by_code = {code: name for name, code in profile.commands().items()}
-    lines = [f"written to {profile.command_address:04X}H"]
-    for code, label in sorted(codes.items()):
-        doubt = " [unverified]" if by_code.get(code) in reasons else ""
-        lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
+    lines = []
+    registers = profile.command_registers()
+    for address in sorted(registers, key=lambda address: address != profile.command_address):
+        lines.append(f"written to {address:04X}H")
+        for code, label in sorted(registers[address].items()):
+            doubt = " [unverified]" if label in reasons else ""
+            lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
 

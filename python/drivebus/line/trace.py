@@ -194,8 +194,9 @@ def _each(first: int, words: list[int], profile: Profile | None) -> Iterator[str
 
 
 def _value(row: Description, words: list[int], profile: Profile) -> str:
-    if row.address == profile.command_address:
-        meant = profile.command_codes().get(words[0])
+    codes = None if row.address is None else profile.command_registers().get(row.address)
+    if codes is not None:
+        meant = codes.get(words[0])
         return f"{words[0]}" if meant is None else f"{words[0]} ({meant.replace('_', ' ')})"
     if row.bits:
         return f"{words[0]:04X}H"

@@ -7,7 +7,7 @@ address is held against the command register of the unit's family, and against t
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
@@ -60,16 +60,17 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
     """Raises `NotAllowed` if the words at *address* are a command that none of *families*, which *unit* may be, has."""
     known = list(families)
     for offset, word in enumerate([words] if isinstance(words, int) else words):
-        commanded = [family for family in known if _plain(family, address + offset) == family.command_address]
+        here = ((family, family.command_registers().get(_plain(family, address + offset))) for family in known)
+        commanded = [(family, codes) for family, codes in here if codes is not None]
         if commanded:
-            if not any(word in family.command_codes() for family in commanded):
-                raise _undefined(commanded[0], unit, address + offset, word)
+            if not any(word in codes for _, codes in commanded):
+                raise _undefined(*commanded[0], unit, address + offset, word)
         else:
             _check_foreign(known, unit, address + offset)
 
 
-def _undefined(family: Profile, unit: int, address: int, word: int) -> NotAllowed:
-    codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(family.command_codes().items()))
+def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
+    codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return NotAllowed(
         f"{word} at {address:04X}H is not a command of unit {unit}, which is known as {family.title}: its codes are "
         f"{codes or 'not known'}; {_HINT}",
@@ -105,6 +106,6 @@ def _command_registers() -> dict[int, str]:
     found: dict[int, list[str]] = {}
     for name in profiles():
         profile = Profile.builtin(name)
-        if profile.command_address is not None:
-            found.setdefault(profile.command_address, []).append(profile.title)
+        for address in profile.command_registers():
+            found.setdefault(address, []).append(profile.title)
     return {address: ", ".join(titles) for address, titles in found.items()}

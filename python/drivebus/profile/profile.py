@@ -259,6 +259,13 @@ class Profile:
         """Every code that the family defines at its command register, and what it means."""
         return self._native.command_codes()
 
+    def command_registers(self) -> dict[int, dict[int, str]]:
+        """Every register that takes commands, with the codes that the family defines there.
+
+        Most families have one; some take the reset of a fault in another.
+        """
+        return self._native.command_registers()
+
     @property
     def command_address(self) -> int | None:
         """Where commands are written, 0..0xFFFF; None where the family has none."""

@@ -44,7 +44,7 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
             problems.add(file, 1, reason);
         }
     };
-    if let Some(address) = profile.command_address {
+    for &address in profile.command_registers().keys() {
         one_word("the command register", profile.entry_at(address), Access::Ro);
     }
     for setpoint in profile.setpoints.values() {
@@ -58,8 +58,8 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
     for word in profile.status_words() {
         one_word("a status word", Some(word), Access::Wo);
     }
-    let covered = profile.command_address.filter(|&address| profile.entry_at(address).is_none());
-    if let Some(address) = covered {
+    let registers = profile.command_registers();
+    for address in registers.into_keys().filter(|&address| profile.entry_at(address).is_none()) {
         problems.add(file, 1, format!("another row lies over the command register, {address:04X}H"));
     }
 }
@@ -69,7 +69,8 @@ fn setpoints(file: &File, profile: &Profile, problems: &mut Problems) {
     for (setpoint, role) in &profile.setpoints {
         let moves = matches!(setpoint, Setpoint::VirtualInputs | Setpoint::VirtualOutputs | Setpoint::SpecialControl);
         let address = profile.entry(&role.register).and_then(|entry| entry.address);
-        let taken = |address: u16| profile.command_address == Some(address) || (!moves && profile.is_command(address));
+        let commands = profile.command_registers();
+        let taken = |address: u16| commands.contains_key(&address) || (!moves && profile.is_command(address));
         if let Some(address) = address.filter(|&address| taken(address)) {
             let reason = format!("{} is at {address:04X}H, where a word can start a motor", role.register);
             problems.add(file, 1, format!("{reason}: no setpoint can be there"));

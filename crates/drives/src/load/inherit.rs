@@ -58,6 +58,7 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
             base.commands.clear();
             base.other_commands.clear();
         }
+        base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != gone.address));
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {

@@ -3,7 +3,7 @@
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
-use super::manifest::{Manifest, States, line};
+use super::manifest::{Elsewhere, Manifest, States, line};
 use super::placed::Placed;
 use super::problems::Problems;
 use crate::entry::names;
@@ -51,7 +51,7 @@ pub(super) fn commands(
         if let Some(other) = choices.insert(code, command.name().to_owned()) {
             problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
         }
-        if profile.commands.insert(command, CommandCode { code, verified }).is_some() {
+        if profile.commands.insert(command, CommandCode { code, verified, elsewhere: None }).is_some() {
             problems.add(file, line(file, spanned), format!("{} is there twice", command.name()));
         }
     }
@@ -67,8 +67,52 @@ pub(super) fn commands(
         profile.other_commands.insert(code, label.clone());
     }
     register.quantity.choices = choices;
+    for (&command, other) in &table.elsewhere {
+        elsewhere(file, command, other, profile, entries, problems);
+    }
     let moves = entries.names(file, &table.moves, problems);
     profile.moving = moves.iter().filter_map(|name| entries.find(name)?.address).collect();
+}
+
+/// A command in a register of its own.
+fn elsewhere(
+    file: &File,
+    command: Command,
+    table: &Elsewhere,
+    profile: &mut Profile,
+    entries: &mut Entries,
+    problems: &mut Problems,
+) {
+    let (place, code) = (line(file, &table.register), *table.code.get_ref());
+    let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
+    if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
+        problems.add(file, place, format!("a rectifier feeds no motor: it has no {}", command.name()));
+    }
+    // Without an address of its own it would go to the command register, where the word means something else.
+    let Some(address) = register.address else {
+        problems.add(file, place, format!("{} takes {}, so it needs an address", register.name, command.name()));
+        return;
+    };
+    if profile.command_address == Some(address) {
+        let reason =
+            format!("{} is the command register: give {} with [commands.codes]", register.name, command.name());
+        problems.add(file, place, reason);
+        return;
+    }
+    let word = check(file, line(file, &table.code), &register.quantity, &register.name, code.into());
+    if problems.keep(word).is_none() {
+        return;
+    }
+    let same = profile.commands.iter().find(|(_, known)| known.elsewhere == Some(address) && known.code == code);
+    if let Some((other, _)) = same {
+        let reason = format!("{} has the code of {}", command.name(), other.name());
+        problems.add(file, line(file, &table.code), reason);
+    }
+    register.quantity.choices.insert(code, command.name().to_owned());
+    let known = CommandCode { code, verified: true, elsewhere: Some(address) };
+    if profile.commands.insert(command, known).is_some() {
+        problems.add(file, place, format!("{} is there twice", command.name()));
+    }
 }
 
 /// Whether a unit without a motor can have `command`.

@@ -98,12 +98,15 @@ fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
 /// What moves a motor, and what tells whether it moves.
 fn motion(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
     if let Some(commands) = &manifest.commands {
-        let register = entries.find(commands.register.get_ref());
-        let is_it = |name: &Placed<String>| entries.find(name.get_ref()) == register;
-        if register.is_some() && !commands.moves.iter().any(is_it) {
-            let register = commands.register.get_ref();
-            let reason = format!("\"moves\" must hold \"{register}\": what is written there can start a motor");
-            problems.add(file, line(file, &commands.register), reason);
+        let others = commands.elsewhere.values().map(|other| &other.register);
+        for named in std::iter::once(&commands.register).chain(others) {
+            let register = entries.find(named.get_ref());
+            let is_it = |name: &Placed<String>| entries.find(name.get_ref()) == register;
+            if register.is_some() && !commands.moves.iter().any(is_it) {
+                let register = named.get_ref();
+                let reason = format!("\"moves\" must hold \"{register}\": what is written there can start a motor");
+                problems.add(file, line(file, named), reason);
+            }
         }
     }
     for when in manifest.state.iter().flat_map(|state| &state.get_ref().when) {

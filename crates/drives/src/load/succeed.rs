@@ -42,6 +42,12 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
     let follow = |address: u16| places.get(&address).copied().unwrap_or(Some(address));
     base.moving = base.moving.iter().filter_map(|&address| follow(address)).collect();
     base.command_address = base.command_address.and_then(follow);
+    base.commands.retain(|_, known| {
+        known.elsewhere.is_none_or(|address| {
+            known.elsewhere = follow(address);
+            known.elsewhere.is_some()
+        })
+    });
 }
 
 /// Which of `inherited` is succeeded by which of `rows`, by index.

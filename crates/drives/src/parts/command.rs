@@ -62,6 +62,8 @@ pub struct CommandCode {
     pub code: u16,
     /// Whether a document of the family prints it.
     pub verified: bool,
+    /// The register that takes it, where that is not the command register.
+    pub elsewhere: Option<u16>,
 }
 
 impl std::str::FromStr for Command {

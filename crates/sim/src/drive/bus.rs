@@ -176,7 +176,7 @@ impl Drive {
         let family = self.family();
         let fits = match target {
             Word::Parameter(parameter) => parameter.bounds.allows(word, |bound| self.parameter(bound)),
-            Word::Register(_) if family.command == Some(address) => family.command_of(word).is_some(),
+            Word::Register(_) if family.takes_commands(address) => family.command_at(address, word).is_some(),
             Word::Register(register) => match register.range {
                 Range::Words(low, high) => (low..=high).contains(&word),
                 Range::UpTo(high, bound) => word <= high.min(self.parameter(bound)),
@@ -218,9 +218,8 @@ impl Drive {
         }
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
-        if self.family().command == Some(address)
-            && self.obeys_bus()
-            && let Some(command) = self.family().command_of(word)
+        if self.obeys_bus()
+            && let Some(command) = self.family().command_at(address, word)
         {
             self.machine.command(command, &self.settings);
         }

@@ -88,8 +88,8 @@ def check_commands(request: Request) -> None:
     first, words = write
     families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
     for address, word in enumerate(words, first):
-        there = [family for family in families if family.command_address == address]
-        if there and not any(word in family.command_codes() for family in there):
+        there = [family for family in families if address in family.command_registers()]
+        if there and not any(word in family.command_registers()[address] for family in there):
             raise drivebus.NotAllowed(
                 f"{word} at {address:04X}H is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "

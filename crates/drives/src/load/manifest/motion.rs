@@ -23,12 +23,27 @@ pub(in crate::load) struct Commands {
     #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, u16>"))]
     pub(in crate::load) codes: BTreeMap<Command, Placed<u16>>,
     pub(in crate::load) assumed: Option<AssumedCommands>,
+    /// Commands that another register takes.
+    #[serde(default)]
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Elsewhere>"))]
+    pub(in crate::load) elsewhere: BTreeMap<Command, Elsewhere>,
     /// Words that mean something else: `"9" = "immediate stop"`.
     #[serde(default)]
     pub(in crate::load) other: BTreeMap<Placed<String>, String>,
     /// Where it is printed: document and page.
     #[serde(rename = "source")]
     _source: String,
+}
+
+/// A command in a register of its own.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Elsewhere {
+    /// Where it is written; it must stand in `moves` too.
+    pub(in crate::load) register: Placed<String>,
+    /// The word.
+    pub(in crate::load) code: Placed<u16>,
 }
 
 /// Commands that no document of the family prints.

@@ -40,6 +40,7 @@ pub(crate) fn chv100() -> Family {
         registers: gd350::MONITOR.to_vec(),
         parameters: Vec::new(),
         factory: &[],
+        elsewhere: Vec::new(),
         capped: &[],
         roles: Roles::NONE,
         delay: USUAL_DELAY,

@@ -35,6 +35,7 @@ pub(crate) fn gd350() -> Family {
         parameters: Vec::new(),
         factory: FACTORY,
         // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
+        elsewhere: Vec::new(),
         capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
         roles: Roles {
             // Assumption: 0 in P00.02 is Modbus; the digit is not printed.

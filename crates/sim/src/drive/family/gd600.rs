@@ -62,6 +62,7 @@ pub(crate) fn gd600() -> Family {
             Parameter::new(0x0A01, 0, 1, 0),
         ],
         factory: &[],
+        elsewhere: Vec::new(),
         capped: &[],
         roles: Roles {
             obeys: vec![(RUN_CHANNEL, 2)],

@@ -82,6 +82,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
         factory: &[],
+        elsewhere: own.elsewhere(),
         capped: &[],
         roles,
         delay: delay.unwrap_or(USUAL_DELAY),
@@ -132,6 +133,12 @@ impl Own<'_> {
         }
         let others = self.profile.command_codes();
         others.keys().map(|&code| (code, self.profile.command_of(code).map_or(Command::Nothing, done))).collect()
+    }
+
+    /// The commands that stand in registers of their own.
+    fn elsewhere(&self) -> Vec<(u16, u16, Command)> {
+        let known = self.profile.commands().iter();
+        known.filter_map(|(&told, known)| Some((known.elsewhere?, known.code, done(told)))).collect()
     }
 
     /// The words for forward, reverse, stopped and fault. One that nothing asks for is that of a stopped motor.
