@@ -120,7 +120,8 @@ fn check_profile(profile: &Profile) {
     }
     for command in Command::ALL {
         if let Some((address, code)) = profile.command(command) {
-            assert_eq!(profile.command_of(code), Some(command));
+            let registers = profile.command_registers();
+            assert_eq!(registers[&address].get(&code), Some(&command.name()), "{address:04X}H");
             assert!(profile.entry_at(address).is_some());
         }
     }
