@@ -159,7 +159,10 @@ class Slave:
             with self._lock:
                 wait = self._send_due()
                 watched = [self._wake, *([self._ends[0]] if self._ends else [])]
-            ready, _, _ = select.select(watched, [], [], wait)
+            try:
+                ready, _, _ = select.select(watched, [], [], wait)
+            except OSError:  # `vanish` closed the port since the list was made
+                continue
             if self._wake in ready:
                 os.read(self._wake, 64)
                 received.clear()

@@ -6,6 +6,10 @@ And once more through another program that has the port.
 from __future__ import annotations
 
 import os
+import select
+import threading
+from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +20,7 @@ from . import wire
 from .faults import ALL, spoilt
 from .play import play
 from .rows import ROWS, Row
+from .slave import Slave
 
 # Longer than for the published table: on a busy machine a right answer shall not come too late, nor a call look hung.
 TIMEOUT = 0.4
@@ -31,6 +36,33 @@ UNIT = pytest.mark.parametrize(
 
 def test_the_judge_knows_the_check_value_of_crc_16_modbus() -> None:
     assert wire.crc(b"123456789") == bytes.fromhex("37 4B")
+
+
+def test_the_slave_outlives_a_port_that_goes_just_before_it_is_watched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = threading.Event()
+    watch = select.select
+
+    def goes_first(read: Sequence[int], write: Sequence[int], rare: Sequence[int], timeout: float | None) -> object:
+        if len(read) > 1 and not gone.is_set():
+            gone.set()
+            slave.vanish()
+        return watch(read, write, rare, timeout)
+
+    with Slave(tmp_path) as slave, monkeypatch.context() as patch:
+        patch.setattr(select, "select", goes_first)
+        slave.vanish()
+        slave.appear()
+        assert gone.wait(10.0)
+        patch.undo()
+        slave.appear()
+        master = os.open(slave.port, os.O_RDWR | os.O_NOCTTY)
+        os.write(master, wire.frame(1, bytes.fromhex("03 00 05 00 01")))
+        ready, _, _ = select.select([master], [], [], 10.0)
+        assert ready
+        assert os.read(master, 64) == wire.read_reply(1, [5])
+        os.close(master)
 
 
 @UNIT
