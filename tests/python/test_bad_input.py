@@ -259,7 +259,7 @@ class TestProfileFolders:
 @pytest.mark.parametrize(
     ("code", "says"),
     [
-        (0x010B, "a gd100, a family without a profile yet; it reports 010BH"),
+        (0x0180, "a sd1, a family without a profile yet; it reports 0180H"),
         (0x4242, "4242H, which is not a known code"),
     ],
 )

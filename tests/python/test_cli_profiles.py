@@ -292,6 +292,11 @@ class TestSureness:
             ("gd35", "0x0108", "certain"),
             ("gd35-h1", "0x0109", "certain"),
             ("gd300", "0x010a", "shared"),
+            # GD10 manual, p. 90; GD20 manual, p. 140; GD200A manual V2.6, p. 147.
+            ("gd10", "0x010d", "certain"),
+            ("gd20", "0x0106", "certain"),
+            ("gd100", "0x010b", "certain"),
+            ("gd200a", "0x0107", "certain"),
             ("vfd500", None, "by answers"),
             ("gd600", None, "unknown"),
         ],

@@ -68,33 +68,42 @@ def test_how_sure_it_is(
 
 
 def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = {**codes.listed()[0x0107][0], "verified": False, "source": "a program"}
-    monkeypatch.setattr(codes, "listed", lambda: {0x0107: [row]})
+    row = {**codes.listed()[0x0180][0], "verified": False, "source": "a program"}
+    monkeypatch.setattr(codes, "listed", lambda: {0x0180: [row]})
     bus.read(1, CODE)  # first contact is over
-    answer(simulator, 1, 0x0107)
+    answer(simulator, 1, 0x0180)
     found = bus.identify(1)
-    assert (found.certainty, found.family, found.candidates) == ("unverified", "gd200a", ("gd200a",))
+    assert (found.certainty, found.family, found.candidates) == ("unverified", "sd1", ("sd1",))
 
 
 def test_a_family_without_a_profile(simulator: Simulator, bus: Bus) -> None:
     bus.read(1, CODE)  # first contact is over
-    answer(simulator, 1, 0x0107)
+    answer(simulator, 1, 0x0180)
     found = bus.identify(1)
-    assert (found.certainty, found.family, found.candidates) == ("certain", "gd200a", ("gd200a",))
-    answer(simulator, 1, 0x0107)
-    with pytest.raises(NotAllowed, match=r"a gd200a, a family without a profile yet; it reports 0107H"):
+    assert (found.certainty, found.family, found.candidates) == ("certain", "sd1", ("sd1",))
+    answer(simulator, 1, 0x0180)
+    with pytest.raises(NotAllowed, match=r"a sd1, a family without a profile yet; it reports 0180H"):
         bus.drive(1, unverified=True)
 
 
 @pytest.mark.parametrize(
-    ("code", "family"), [(0x0106, "gd20"), (0x010B, "gd100"), (0x010C, "gd200"), (0x010D, "gd10"), (0x0180, "sd1")]
+    ("code", "family"), [(0x0106, "gd20"), (0x0107, "gd200a"), (0x010B, "gd100"), (0x010D, "gd10"), (0x0180, "sd1")]
 )
-def test_a_code_of_a_family_without_a_profile(simulator: Simulator, bus: Bus, code: int, family: str) -> None:
-    """GD300-LIFT manual, p. 131; GD310-UL manual, p. 211; GD20 manual, p. 140; IMO SD1 manual, p. 137."""
+def test_a_code_of_a_sister(simulator: Simulator, bus: Bus, code: int, family: str) -> None:
+    """GD300-LIFT manual, p. 131; GD310-UL manual, p. 211; GD20 manual, p. 140; IMO SD1 manual, p. 137; GD200A, p. 147."""
     bus.read(1, CODE)  # first contact is over
     answer(simulator, 1, code)
     found = bus.identify(1)
     assert (found.certainty, found.family) == ("certain", family)
+
+
+def test_010ch_is_a_gd200a_or_one_of_two_without_a_profile(simulator: Simulator, bus: Bus) -> None:
+    """GD200A manual (manualshive 2085746), p. 134; GD200L manual, p. 158; GD200: GD310-UL manual, p. 211."""
+    bus.read(1, CODE)  # first contact is over
+    answer(simulator, 1, 0x010C)
+    found = bus.identify(1)
+    assert (found.certainty, found.family) == ("shared", None)
+    assert found.candidates == ("gd200a", "Goodrive200", "Goodrive200L")
 
 
 def test_a_code_that_nobody_knows_does_not_fall_to_another_family(simulator: Simulator, bus: Bus) -> None:

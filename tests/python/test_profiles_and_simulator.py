@@ -15,7 +15,7 @@ import drivebus
 from drivebus import Bus, NotAllowed, Profile, Refused, Simulator
 
 FAMILIES = drivebus.profiles()
-RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd600", "gd3000", "vfd500"]
+RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
 PASSWORD = "P07.00"

@@ -25,6 +25,10 @@ FAMILIES = {
     9: "vfd500",
     10: "chf100a",
     11: "chv100",
+    12: "gd10",
+    13: "gd20",
+    14: "gd100",
+    15: "gd200a",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -32,8 +36,9 @@ GOODRIVE = {"P00.01": (0x0001, 2), "P00.02": (0x0002, 0), "P00.06": (0x0006, 8)}
 """What makes a Goodrive350 obey the bus."""
 
 OBEYS = {
-    **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300"), tuple(GOODRIVE.values())),
-    **dict.fromkeys(("gd600", "gd3000"), (GOODRIVE["P00.01"], GOODRIVE["P00.06"])),
+    **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd100", "gd200a"), tuple(GOODRIVE.values())),
+    # The GD20 manual, p. 140, asks for P00.01 alone.
+    **dict.fromkeys(("gd600", "gd3000", "gd20"), (GOODRIVE["P00.01"], GOODRIVE["P00.06"])),
     "vfd500": ((0x0002, 2),),
 }
 COMMAND = {family: 0x7000 if family == "vfd500" else 0x2000 for family in OBEYS}
@@ -100,6 +105,8 @@ def test_each_is_what_it_was_asked_for(simulator: Simulator) -> None:
 
 def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
     codes = {"gd350": 0x01A0, "gd35": 0x0108, "gd35-h1": 0x0109, "gd300": 0x010A}
+    # GD10 manual, p. 90; GD20 manual, p. 140; GD200A manual V2.6, p. 147.
+    codes |= {"gd10": 0x010D, "gd20": 0x0106, "gd100": 0x010B, "gd200a": 0x0107}
     for family in FAMILIES.values():
         if family in codes:
             assert read(bus, family, 0x2103) == [codes[family]]
@@ -115,8 +122,40 @@ def test_bit_0_of_2101h_is_the_other_way_round_on_a_goodrive35(simulator: Simula
         assert read(bus, family, 0x2101) == [faulty], family
 
 
+def test_bit_0_of_2101h_is_the_bus_voltage_in_the_older_class(simulator: Simulator, bus: Bus) -> None:
+    """GD10 manual, p. 88; GD200A manual, p. 147: a fault does not take the voltage away."""
+    for family in ("gd10", "gd200a"):
+        assert read(bus, family, 0x2101) == [1], family
+        simulator.drive(UNIT[family]).trip(4)
+        assert read(bus, family, 0x2101) == [1], family
+
+
+def test_a_goodrive10_has_nothing_from_2004h_to_2009h(bus: Bus) -> None:
+    """GD10 manual, pp. 88 and 90: neither there nor at 200CH, 200EH; 300EH to 3011H and 3013H are reserved."""
+    for address in (*range(0x2004, 0x200A), 0x200C, 0x200E):
+        assert refusal(bus, "gd10", pdu(0x06, address, 0)) == 0x02, f"{address:04X}"
+    for address in (*range(0x300E, 0x3012), 0x3013):
+        assert refusal(bus, "gd10", pdu(0x03, address, 1)) == 0x02, f"{address:04X}"
+    assert refusal(bus, "gd20", pdu(0x03, 0x3011, 1)) == 0x02  # reserved: GD20 manual, p. 140
+
+
+def test_what_a_goodrive200a_takes_in_2009h(bus: Bus) -> None:
+    """GD200A manual, p. 147: bits 0 to 2."""
+    write(bus, "gd200a", 0x2009, 7)
+    assert refusal(bus, "gd200a", pdu(0x06, 0x2009, 8)) == 0x04
+
+
+def test_a_goodrive100_does_not_show_its_last_command(bus: Bus) -> None:
+    """GD100 manual, p. 167: 2000H is to be written."""
+    assert refusal(bus, "gd100", pdu(0x03, 0x2000, 1)) == 0x02
+    assert read(bus, "gd20", 0x2000)
+
+
 def test_200ah_takes_ten_bits_on_a_goodrive350_and_nine_on_its_sisters(bus: Bus) -> None:
-    for family, highest in [("gd350", 0x3FF), ("gd35", 0x1FF), ("gd35-h1", 0x1FF), ("gd300", 0x1FF)]:
+    for family, highest in [
+        ("gd350", 0x3FF),
+        *((sister, 0x1FF) for sister in ("gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a")),
+    ]:
         write(bus, family, 0x200A, highest)
         assert refusal(bus, family, pdu(0x06, 0x200A, highest + 1)) == 0x04, family
 
@@ -182,7 +221,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):
         assert refusal(bus, family, write_many) == 0x01, family
-    for family in ("gd350", "gd35", "gd35-h1", "gd300", "gd600"):
+    for family in ("gd350", "gd35", "gd35-h1", "gd300", "gd600", "gd10", "gd20", "gd100", "gd200a"):
         assert bus.transact(UNIT[family], write_many) == bytes.fromhex("10 2000 0001")
 
 
@@ -206,6 +245,13 @@ def test_vfd500_refuses_with_its_five_codes(bus: Bus) -> None:
         ("gd350", 0x800B, False),
         ("gd35", 0x000B, True),
         ("gd300", 0x800B, False),
+        ("gd10", 0x800B, False),
+        ("gd20", 0x000B, True),
+        ("gd20", 0x800B, False),
+        ("gd100", 0x000B, True),
+        ("gd100", 0x800B, False),
+        ("gd200a", 0x000B, True),
+        ("gd200a", 0x800B, False),
         ("gd600", 0x0114, True),
         ("gd3000", 0x0114, True),
         ("gd3000-rectifier", 0x0B04, True),
@@ -237,6 +283,7 @@ def test_where_no_page_tells_of_ram_no_address_leads_there(bus: Bus, family: str
 
 def test_faults_are_those_of_the_family(simulator: Simulator, bus: Bus) -> None:
     where = {"gd350": 0x2102, "gd300": 0x2102, "gd600": 0x2102, "gd3000": 0x2102, "vfd500": 0x1900, "chf100a": 0x5000}
+    where |= dict.fromkeys(("gd10", "gd20", "gd100", "gd200a"), 0x2102)
     for family, address in where.items():
         simulator.drive(UNIT[family]).trip(11)
         assert read(bus, family, address) == [11], family

@@ -1,7 +1,8 @@
 """A profile was named, and the unit says that it is something else: nothing is written to it.
 
-What each family says at 2103H: GD350 manual, chapter 9.4.5 (GD350 01A0H, GD35 0108H, GD35-H1 0109H, GD300 010AH). Of no
-other family is a page with a code at hand; their simulated drives refuse 2103H with 02H.
+What each family says at 2103H: GD350 manual, chapter 9.4.5 (GD350 01A0H, GD35 0108H, GD35-H1 0109H, GD300 010AH); GD10
+manual, p. 90 (GD10 010DH, GD100 010BH); GD20 manual, p. 140 (0106H); GD200A manual V2.6, p. 147 (0107H). Of no other family
+is a page with a code at hand; their simulated drives refuse 2103H with 02H.
 """
 
 from __future__ import annotations
@@ -33,6 +34,10 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd35": ["gd35"],
     "gd35-h1": ["gd35-h1"],
     "gd300": ["gd300"],
+    "gd10": ["gd10"],
+    "gd20": ["gd20"],
+    "gd100": ["gd100"],
+    "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
     # Of these nothing is known that they must say; only a code gives another one away.
@@ -45,7 +50,16 @@ TAKEN_FOR: dict[str, list[str]] = {
 }
 """What each profile may be named for without being contradicted."""
 
-SAYS = {"gd350": "01A0H", "gd35": "0108H", "gd35-h1": "0109H", "gd300": "010AH"}
+SAYS = {
+    "gd350": "01A0H",
+    "gd35": "0108H",
+    "gd35-h1": "0109H",
+    "gd300": "010AH",
+    "gd10": "010DH",
+    "gd20": "0106H",
+    "gd100": "010BH",
+    "gd200a": "0107H",
+}
 
 PAIRS = [(named, unit) for named in TAKEN_FOR for unit in TAKEN_FOR]
 
@@ -95,7 +109,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 121
+    assert len(PAIRS) == 225
 
 
 @every_pair
@@ -316,9 +330,11 @@ class TestWhatTells:
         ("word", "said"),
         [
             (0x01A0, r"01A0H, the code of Goodrive350 \(gd350\).*profile=\"gd350\""),
-            # From a GD200L manual, and from programs: a family without a profile.
-            (0x010C, r"010CH, the code of Goodrive200, 200A or 200L \(gd200\).*no profile of it"),
-            (0x010D, r"010DH, the code of Goodrive10 mini \(gd10\).*no profile of it"),
+            # From its manual: a family without a profile.
+            (0x0180, r"0180H, the code of IMO SD1 \(sd1\).*no profile of it"),
+            (0x010D, r"010DH, the code of Goodrive10 mini \(gd10\).*profile=\"gd10\""),
+            # Shared by three series, one of which has a profile.
+            (0x010C, r"010CH, the code of Goodrive200A, older \(gd200a\).*profile=\"gd200a\""),
         ],
     )
     @pytest.mark.parametrize("named", ["gd35", "gd600", "vfd500"])
@@ -404,18 +420,18 @@ class TestProfilesOfOnesOwn:
     def test_one_for_units_of_which_none_is_shipped_says_how_they_are_let_in(
         self, tmp_path: Path, gd300: tuple[Simulator, Bus], options: tuple[str, str]
     ) -> None:
-        """0106H is a Goodrive20, whose manual nobody has made a profile from yet."""
+        """0180H is an IMO SD1, whose manual nobody has made a profile from yet."""
         simulator, bus = gd300
         folder = self.new(tmp_path / "ours", *options)
-        answer(simulator, 0x0106)
+        answer(simulator, 0x0180)
         told = str(bus.drive(1, folder).contradiction())
         assert "there is no profile of it yet. If ours is meant for such units, list that code under" in told
         with (folder / "profile.toml").open("a", encoding="utf-8") as file:
             file.write(
-                f'\n[[identification.codes]]\ncode = 0x0106\nfamily = "{Profile.load(folder).family}"\n'
+                f'\n[[identification.codes]]\ncode = 0x0180\nfamily = "{Profile.load(folder).family}"\n'
                 'title = "Ours"\nverified = true\nsource = "Our manual"\n'
             )
-        answer(simulator, 0x0106)
+        answer(simulator, 0x0180)
         assert bus.drive(1, folder).contradiction() is None
 
     def test_an_overlay_on_one_without_a_code_has_its_signature(self, tmp_path: Path) -> None:

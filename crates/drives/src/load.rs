@@ -138,11 +138,15 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 11] = [
+static BUILTINS: [Builtin; 15] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
     builtin!("gd300": "registers.csv" "parameters.csv"),
+    builtin!("gd10": "registers.csv" "faults.csv"),
+    builtin!("gd20": "registers.csv" "parameters.csv"),
+    builtin!("gd100": "registers.csv" "parameters.csv"),
+    builtin!("gd200a": "registers.csv" "parameters.csv"),
     builtin!("gd600": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd600-rectifier": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd3000": "registers.csv" "parameters.csv" "faults.csv"),

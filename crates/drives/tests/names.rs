@@ -51,7 +51,7 @@ fn what_is_not_found_is_explained() {
 #[test]
 fn builtin_profiles_go_by_name() {
     let names: Vec<&str> = Profile::builtin_names().collect();
-    assert_eq!(names[..4], ["gd350", "gd35", "gd35-h1", "gd300"]);
+    assert_eq!(names[..8], ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"]);
     assert_eq!(Profile::builtin("GD350").unwrap().title(), "INVT Goodrive350");
     let unknown = ProfileError::Unknown { name: "gd305".to_owned(), closest: "gd35".to_owned() };
     assert_eq!(Profile::builtin("gd305").unwrap_err(), unknown);

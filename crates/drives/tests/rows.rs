@@ -47,6 +47,11 @@ fn rows(family: &str) -> BTreeMap<u16, Row> {
         all.map(|row| (place(&row).1, row)).collect()
     };
     let mut rows = if manifest.contains("\n[extends]\n") { own("gd350") } else { BTreeMap::new() };
+    let manifest: toml::Table = manifest.parse().unwrap();
+    if let Some(dropped) = manifest.get("drop") {
+        let dropped: Vec<&str> = dropped.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+        rows.retain(|_, row| !dropped.contains(&cell(row, "code")) && !dropped.contains(&cell(row, "name")));
+    }
     rows.extend(own(family));
     rows
 }
@@ -158,6 +163,10 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
     let expected = [
         ("chf100a", 27),
         ("chv100", 24),
+        ("gd10", 81),
+        ("gd100", 94),
+        ("gd20", 92),
+        ("gd200a", 94),
         ("gd300", 97),
         ("gd3000", 19),
         ("gd3000-rectifier", 6),

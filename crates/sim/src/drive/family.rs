@@ -10,6 +10,7 @@
 //! What the manuals at hand leave open is marked "Assumption:" where it is decided.
 
 mod chf100a;
+mod gd200a;
 mod gd300;
 mod gd3000;
 mod gd350;
@@ -120,11 +121,15 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 11] = [
+const FAMILIES: [fn() -> Family; 15] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
     gd300::gd300,
+    gd200a::gd10,
+    gd200a::gd20,
+    gd200a::gd100,
+    gd200a::gd200a,
     gd600::gd600,
     gd600::rectifier,
     gd3000::gd3000,

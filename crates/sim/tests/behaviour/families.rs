@@ -18,11 +18,16 @@ const GOODRIVE350: &[(u16, u16)] = &[(0x0001, 2), (0x0002, 0), (0x0006, 8)];
 
 const GOODRIVE600: &[(u16, u16)] = &[(0x0001, 2), (0x0006, 8)];
 
-const WAYS: [Way; 7] = [
+const WAYS: [Way; 11] = [
     Way { family: "gd350", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
     Way { family: "gd35", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
     Way { family: "gd35-h1", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
     Way { family: "gd300", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd10", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    // P00.01 and no P00.02: GD20 manual, p. 140.
+    Way { family: "gd20", control: GOODRIVE600, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd100", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
+    Way { family: "gd200a", control: GOODRIVE350, command: 0x2000, speed: 0x2001 },
     Way { family: "gd600", control: GOODRIVE600, command: 0x2000, speed: 0x2001 },
     Way { family: "gd3000", control: GOODRIVE600, command: 0x2000, speed: 0x2001 },
     Way { family: "vfd500", control: &[(0x0002, 2)], command: 0x7000, speed: 0x7001 },
@@ -159,7 +164,17 @@ fn commands_for_another_family_reach_nothing() {
 
 #[test]
 fn each_family_is_known_by_its_code_or_by_having_none() {
-    for (family, code) in [("gd350", 0x01A0), ("gd35", 0x0108), ("gd35-h1", 0x0109), ("gd300", 0x010A)] {
+    for (family, code) in [
+        ("gd350", 0x01A0),
+        ("gd35", 0x0108),
+        ("gd35-h1", 0x0109),
+        ("gd300", 0x010A),
+        // GD10 manual, p. 90, and for GD100; GD20 manual, p. 140; GD200A manual V2.6, p. 147.
+        ("gd10", 0x010D),
+        ("gd20", 0x0106),
+        ("gd100", 0x010B),
+        ("gd200a", 0x0107),
+    ] {
         let mut bench = Bench::of(family);
         assert_eq!((bench.read::<1>(0x2103), bench.read::<1>(0x3016)), ([code], [code]), "{family}");
     }
@@ -189,6 +204,10 @@ fn bit_15_means_what_the_family_says() {
         ("gd350", 0x000B, true, Some(false)),
         ("gd35", 0x000B, true, Some(false)),
         ("gd300", 0x000B, true, Some(false)),
+        ("gd10", 0x000B, true, Some(false)),
+        ("gd20", 0x000B, true, Some(false)),
+        ("gd100", 0x000B, true, Some(false)),
+        ("gd200a", 0x000B, true, Some(false)),
         ("gd600", 0x000A, true, None),
         ("gd3000", 0x0114, true, None),
         ("vfd500", 0x0007, false, Some(true)),
@@ -244,6 +263,10 @@ fn a_silent_bus_has_the_number_of_the_family() {
     for (family, control, timeout, fault) in [
         ("gd350", GOODRIVE350, 0x0E04, 18),
         ("gd300", GOODRIVE350, 0x0E04, 18),
+        ("gd10", GOODRIVE350, 0x0E04, 18),
+        ("gd20", GOODRIVE600, 0x0E04, 18),
+        ("gd100", GOODRIVE350, 0x0E04, 18),
+        ("gd200a", GOODRIVE350, 0x0E04, 18),
         ("gd3000", GOODRIVE600, 0x0E04, 18),
         ("vfd500", way("vfd500").control, 0x1E05, 34),
     ] {
