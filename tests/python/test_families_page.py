@@ -107,6 +107,45 @@ def test_counts_are_those_of_the_files(family: str) -> None:
         assert [int(number) for number in numbers.groups()] == list(oracle[kind].values())
 
 
+def test_the_list_says_how_much_of_each_is_printed() -> None:
+    """Verified is what is neither unverified nor assumed, of all rows."""
+    said = CliRunner().invoke(cli, ["--json", "profiles"])
+    listed = {row["name"]: row for row in map(json.loads, said.stdout.splitlines())}
+    text = CliRunner().invoke(cli, ["profiles"]).stdout
+    assert sorted(listed) == FAMILIES
+    for family in FAMILIES:
+        oracle = {kind: counted(rows) for kind, rows in rows_of(family).items()}
+        assert {kind: listed[family][kind] for kind in KINDS} == {kind: oracle[kind]["total"] for kind in KINDS}
+        total = sum(counts["total"] for counts in oracle.values())
+        proved = total - sum(counts["unverified"] + counts["assumed"] for counts in oracle.values())
+        share = listed[family]["verified"]
+        assert share == (pytest.approx(proved / total, abs=0.0005) if total else None), family
+        line = re.search(rf"^{family} .*?(\d+)(?: +(\d+) %)?$", text, re.MULTILINE)
+        assert line is not None, text
+        percents = {100 * proved // total, -(-100 * proved // total)} if total else {None}
+        assert int(line[1]) == total
+        assert (None if line[2] is None else int(line[2])) in percents
+
+
+DOCUMENTS = re.compile(r"(?:manualshive|manualslib|INVT ebook) (\d+)|easymanua\.ls (?:danfoss )?([a-z0-9-]+)")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_page_names_the_documents_of_each_family(family: str) -> None:
+    """Each document that the head of a profile names stands in the section of the family, by what it is found by."""
+    manifest = tomllib.loads((PROFILES / family / "profile.toml").read_text(encoding="utf-8"))
+    page = (ROOT / "docs/families.md").read_text(encoding="utf-8")
+    sections = [
+        text for text in re.split(r"^## ", page, flags=re.MULTILINE) if re.match(rf"(.* and )?{family}\b[: ]", text)
+    ]
+    assert len(sections) == 1, family
+    documents = {number or name for number, name in DOCUMENTS.findall(manifest["source"])}
+    assert documents
+    # One that the GD350 manual lends is named there.
+    missing = {document for document in documents if document not in sections[0]} - {"2645"}
+    assert missing == set()
+
+
 def test_the_page_has_the_counts() -> None:
     lines = [
         "| family | rows | total | with a source | without | unverified | assumed |",

@@ -90,7 +90,7 @@ def test_a_family_without_a_profile(simulator: Simulator, bus: Bus) -> None:
     ("code", "family"), [(0x0106, "gd20"), (0x0107, "gd200a"), (0x010B, "gd100"), (0x010D, "gd10"), (0x0180, "sd1")]
 )
 def test_a_code_of_a_sister(simulator: Simulator, bus: Bus, code: int, family: str) -> None:
-    """GD300-LIFT manual, p. 131; GD310-UL manual, p. 211; GD20 manual, p. 140; IMO SD1 manual, p. 137; GD200A, p. 147."""
+    """GD300-LIFT manual, p. 131; GD310-UL, p. 211; GD20, p. 140; GD200A V2.6, p. 147; IMO SD1, p. 137."""
     bus.read(1, CODE)  # first contact is over
     answer(simulator, 1, code)
     found = bus.identify(1)

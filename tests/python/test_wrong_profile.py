@@ -1,8 +1,8 @@
 """A profile was named, and the unit says that it is something else: nothing is written to it.
 
 What each family says at 2103H: GD350 manual, chapter 9.4.5 (GD350 01A0H, GD35 0108H, GD35-H1 0109H, GD300 010AH); GD10
-manual, p. 90 (GD10 010DH, GD100 010BH); GD20 manual, p. 140 (0106H); GD200A manual V2.6, p. 147 (0107H). Of no other family
-is a page with a code at hand; their simulated drives refuse 2103H with 02H.
+manual, p. 90 (GD10 010DH, GD100 010BH); GD20 manual, p. 140 (0106H); GD200A manual V2.6, p. 147 (0107H). Of no other
+family is a page with a code at hand; their simulated drives refuse 2103H with 02H.
 """
 
 from __future__ import annotations
