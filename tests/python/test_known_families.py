@@ -84,6 +84,27 @@ def test_a_stop_asks_for_the_family_once_and_then_no_more(simulator: drivebus.Si
     assert first == drivebus.rtu.encode_write(1, 0x2000, 5), "the stop comes first"
 
 
+@pytest.mark.parametrize("family", ["gd10", "gd20", "gd100"])
+def test_an_older_goodrive_is_kept_by_its_code(family: str) -> None:
+    """010DH, 0106H and 010BH are each one family's: the next stop goes out first. 5 stops: GD10 manual, p. 88."""
+    with drivebus.Simulator({1: family}, transport="pty") as simulator:
+        assert run(simulator, "scan", "--units", "1").exit_code == 0
+        assert known_family(simulator.port, 1) == family
+        before = len(simulator.line.trace())
+        run(simulator, "stop")
+        first = next(data for data in sent(simulator, before) if data[1] != 0x08)
+        assert first == drivebus.rtu.encode_write(1, 0x2000, 5)
+
+
+def test_a_family_with_a_code_that_others_report_too_is_asked_each_time() -> None:
+    """010CH is a GD200's and a GD200L's as well: GD200L manual, p. 158."""
+    with drivebus.Simulator({1: "gd200a"}, transport="pty") as simulator:
+        assert run(simulator, "status").exit_code == 0
+        assert known_family(simulator.port, 1) is None
+        assert run(simulator, "stop").exit_code == 0
+        assert drivebus.rtu.encode_write(1, 0x2000, 5) in sent(simulator, 0)
+
+
 def test_a_stop_over_a_line_on_which_nothing_is_understood_is_sent(simulator: drivebus.Simulator) -> None:
     remember(simulator.port, 1, "gd350")
     simulator.line.drop_answers(1000)
