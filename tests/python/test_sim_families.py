@@ -131,7 +131,7 @@ def test_bit_0_of_2101h_is_the_bus_voltage_in_the_older_class(simulator: Simulat
 
 
 def test_a_goodrive10_has_nothing_from_2004h_to_2009h(bus: Bus) -> None:
-    """GD10 manual, pp. 88 and 90: neither there nor at 200CH, 200EH; 300EH to 3011H and 3013H are reserved."""
+    """GD10 manual (manualshive 1058543), pp. 88 and 90, and (2085734), p. 101: what is left out or reserved."""
     for address in (*range(0x2004, 0x200A), 0x200C, 0x200E):
         assert refusal(bus, "gd10", pdu(0x06, address, 0)) == 0x02, f"{address:04X}"
     for address in (*range(0x300E, 0x3012), 0x3013):
