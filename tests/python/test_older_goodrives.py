@@ -14,10 +14,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 import drivebus
 import drivebus.aio
 from drivebus import Bus, NotAllowed, Profile, Simulator, State
+from drivebus.cli import cli
 
 UNITS = {"gd10": 10, "gd20": 20, "gd100": 100, "gd200a": 200}
 FAMILIES = list(UNITS)
@@ -253,6 +255,9 @@ def test_the_immediate_stop_of_a_vfd500_has_a_name() -> None:
     profile = Profile.builtin("vfd500")
     assert profile.command_codes()[7] == "immediate stop"
     assert "immediate stop" in str(profile.describe("control_command").choices)
+    data = pdu("04 06 7000 0007")
+    told = CliRunner().invoke(cli, ["--profile", "vfd500", "decode", (data + crc(data)).hex()])
+    assert "unit 4: write control_command = 7 (immediate stop)" in told.stdout
 
 
 def test_the_delay_of_a_vfd500_is_no_proved_factory_value() -> None:
