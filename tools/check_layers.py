@@ -80,7 +80,7 @@ ROOMS: list[set[str]] = [
     {"drive"},
     {"bus"},
     {"searching"},
-    {"aio", "doctor", "sniffer", "record", "trial"},
+    {"aio", "doctor", "hal", "sniffer", "record", "trial"},
     {"plot"},
     {"__init__"},
 ]
@@ -105,7 +105,7 @@ ON_THE_CORE = {
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "later", "line", "plot", "record", "rtu", "sim", "site", "sniffer", "trial"},
+    "cli": {"capture", "drivebus", "hal", "later", "line", "plot", "record", "rtu", "sim", "site", "sniffer", "trial"},
     "__main__": {"cli"},
 }
 

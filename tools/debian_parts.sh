@@ -1,6 +1,6 @@
 #!/bin/sh
-# Brings mbpoll and libmodbus, which the interop tests talk to, tshark, which reads captures, and valgrind, which counts
-# instructions, into .tools/ without touching the system.
+# Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, and
+# valgrind, which counts instructions, into .tools/ without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -18,10 +18,15 @@ have_valgrind() {
         [ -x "$tools/usr/libexec/valgrind/callgrind-amd64-linux" ]
 }
 have_tshark() { command -v tshark >/dev/null 2>&1 || [ -x "$tools/usr/bin/tshark" ]; }
-have_all() { have_program && have_library && have_valgrind && have_tshark; }
+# LinuxCNC is for Linux alone.
+have_hal() {
+    [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/halrun" ]
+}
+have_all() { have_program && have_library && have_valgrind && have_tshark && have_hal; }
 lacking() {
-    echo "of mbpoll, libmodbus, tshark and valgrind some are missing ($1); the checks that need them will be skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind" >&2
+    echo "of mbpoll, libmodbus, tshark, valgrind and LinuxCNC some are missing ($1); the checks that need them will be" >&2
+    echo "skipped." >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind linuxcnc-uspace" >&2
     echo "    macOS:           brew install libmodbus wireshark, and mbpoll from its source" >&2
     exit 0
 }
@@ -48,11 +53,28 @@ if [ -n "$wants_tshark" ]; then
     [ -n "$found" ] || { apt-get $own update >/dev/null && found=$(with_libraries $own); }
     packages="$packages $found"
 fi
+wants_hal=
+have_hal || wants_hal=linuxcnc-uspace
+# halcmd reads its lines by libedit, which not every system has.
+[ -z "$wants_hal" ] || ldconfig -p 2>/dev/null | grep -q 'libedit\.so\.2' || packages="$packages libedit2 libbsd0 libmd0"
 # shellcheck disable=SC2086  # options, to be split
-apt-get $as_is download $packages ||
-    { apt-get $own update && apt-get $own download $packages; } ||
-    lacking "apt-get could not download them"
+fetch() { apt-get $as_is download "$@" || { apt-get $own update && apt-get $own download "$@"; }; }
+# shellcheck disable=SC2086  # names, to be split
+[ -z "$packages" ] || fetch $packages || lacking "apt-get could not download them"
+# What of LinuxCNC runs without its screens, a twentieth of it, beside the rest. Its scripts have folders written into
+# them and are told where they are; nothing here needs root, so its program is not given it.
+unpack_hal() {
+    hal=$tools/linuxcnc
+    mkdir -p "$hal" && dpkg-deb --fsys-tarfile "$1" | tar -x -C "$hal" --wildcards ./usr/bin/halrun ./usr/bin/halcmd ./usr/bin/rtapi_app \
+        './usr/lib/liblinuxcnc*' ./usr/lib/linuxcnc/realtime './usr/lib/python3/dist-packages/*hal.*' ./etc/linuxcnc &&
+        chmod u-s "$hal/usr/bin/rtapi_app" &&
+        sed -i "s|/usr/lib/linuxcnc|$hal&|; s|^PATH=/usr|PATH=$hal/usr|; s|sysconfdir=/etc|sysconfdir=$hal/etc|" \
+            "$hal/usr/bin/halrun" "$hal/usr/lib/linuxcnc/realtime" "$hal/etc/linuxcnc/rtapi.conf"
+}
+# Who cannot have LinuxCNC has the rest all the same.
+[ -z "$wants_hal" ] || { fetch "$wants_hal" && unpack_hal ./linuxcnc-uspace_*.deb; }
+rm -f ./linuxcnc-uspace_*.deb
 for deb in ./*.deb; do
-    dpkg -x "$deb" "$tools" || lacking "$deb could not be unpacked"
+    [ ! -e "$deb" ] || dpkg -x "$deb" "$tools" || lacking "$deb could not be unpacked"
 done
 have_all || lacking "the packages do not hold them"

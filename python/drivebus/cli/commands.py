@@ -28,6 +28,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
         "profiles": ("profiles",),
     },
     "Overhear": {"sniff": ("sniff",), "replay": ("replay",)},
+    "Machines": {"hal": ("hal",)},
     "Tools": {"raw": ("raw",), "frames": ("decode",), "simulation": ("sim",), "tools": ("completion", "demo")},
 }
 """The names of each file's `COMMANDS`, in the order of the help. A test compares the two."""

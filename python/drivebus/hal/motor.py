@@ -1,0 +1,183 @@
+"""The drive, told and looked at: what the core decided goes out once, and what was started is stopped by all means.
+
+From its start to its stop a motor is inside a block like that of `Drive.running`, so whatever ends the program ends the
+run: an error, a signal, the interpreter. The drive's own watchdog, set before the first start, is for kill -9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+
+from drivebus.drive import Drive
+from drivebus.errors import DrivebusError, NotAllowed
+from drivebus.hal.core import Action, Coast, Look, Reset, Run, Speed
+from drivebus.line.blocking import at_once
+from drivebus.operations import motion, setpoints
+from drivebus.operations.face import unit_of
+from drivebus.operations.motor_block import MotorBlock
+from drivebus.operations.unit import Unit
+from drivebus.watchdog import Watchdog
+
+__all__ = ["Motor"]
+
+_CURRENT = "output_current"
+
+_ACTIONS = ("stop", "coast", "trip")
+"""What the drive is to do by itself, the best first: a spindle that coasts turns for long."""
+
+
+class Motor:
+    """What one drive turns.
+
+    Args:
+        drive: The drive.
+        watchdog: Seconds of silence after which the drive is to act by itself; None sets nothing.
+        say: Is told what people have to know.
+
+    Raises:
+        NotAllowed: The drive's watchdog is not verified for the family, or takes no such time. Nothing was sent.
+    """
+
+    def __init__(self, drive: Drive, watchdog: float | None, say: Callable[[str], None]) -> None:
+        self._drive = drive
+        self._say = say
+        self._silence = watchdog
+        self._action = None if watchdog is None else self._own_action()
+        self._watchdog: Watchdog | None = None
+        self._block: MotorBlock | None = None
+        self._leaving = False
+        self._has_current = _CURRENT in drive.profile.monitor_names() and self._is_readable(_CURRENT)
+
+    def counts(self) -> float:
+        """What the drive counts for one hertz of its setpoint. May ask it what its setpoint means.
+
+        Raises:
+            NotAllowed: It takes no setpoint in Hz over the bus.
+        """
+        unit = at_once(setpoints.with_setpoint(unit_of(self._drive), "frequency"))
+        register = setpoints.register_of(unit, "frequency")
+        described = unit.profile.describe(register)
+        if described.unit != "Hz":
+            raise NotAllowed(
+                f"the setpoint of unit {unit.address} is in {described.unit or 'a unit that is not known'}, and a "
+                "spindle needs one in Hz",
+                unit=unit.address,
+            )
+        return float(described.scale)
+
+    def look(self) -> Look:
+        """What the drive shows, read now."""
+        status = self._drive.status()
+        current = float(self._drive.read(_CURRENT)) if self._has_current else None
+        link = self._drive.bus.link(self._drive.unit)
+        return Look(
+            self._drive.bus.now(),
+            status.state,
+            status.frequency,
+            0 if status.fault is None else status.fault.code,
+            status.fault is not None or str(status.state) == "fault",
+            status.ready,
+            current,
+            link.good / link.asked if link.asked else 1.0,
+        )
+
+    def carry_out(self, action: Action, counts: float) -> None:
+        """Tells the drive, once. Raises what came of it; a start of which nothing is known was then stopped."""
+        if isinstance(action, Run):
+            self._run(action.course.word / counts, action.course.reverse)
+        elif isinstance(action, Speed):
+            self._drive.setpoint = action.word / counts
+        elif isinstance(action, Reset):
+            self._drive.reset_fault()
+        elif isinstance(action, Coast):
+            self._drive.coast()
+        else:
+            self._stop()
+
+    def forget_watchdog(self) -> None:
+        """The drive may have been switched off, and have forgotten its settings: the next start sets them again."""
+        if self._watchdog is not None and self._block is None:
+            watchdog, self._watchdog = self._watchdog, None
+            watchdog.close()
+
+    def give_back(self) -> None:
+        """Waits for a motor that slows down, and gives the drive back the time-out that it had."""
+        if self._watchdog is not None:
+            self._watchdog.close()
+
+    def __enter__(self) -> Motor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stops what was started here, and proves it."""
+        self._leaving = True
+        block, self._block = self._block, None
+        if block is not None:
+            at_once(block.finish() if error is None else block.fail(error))
+
+    def _run(self, hz: float, reverse: bool) -> None:
+        if self._block is not None:
+            self._drive.run(hz, reverse)
+            return
+        self._arm()
+
+        async def start() -> None:
+            await motion.run(unit, hz, reverse)
+
+        unit = unit_of(self._drive)
+        self._block = MotorBlock(unit, start, self._end)
+        try:
+            at_once(self._block.begin())
+        except DrivebusError as reason:
+            block, self._block = self._block, None
+            at_once(block.fail(reason))
+            raise
+
+    def _stop(self) -> None:
+        block, self._block = self._block, None
+        if block is None:
+            self._drive.stop(confirm=0)
+        else:
+            at_once(block.finish())
+
+    async def _end(self, unit: Unit) -> None:
+        """While the program goes on, its own looks prove the stop: the pins are not to wait for that."""
+        await (motion.stop(unit) if self._leaving else motion.stop(unit, confirm=0.0))
+
+    def _own_action(self) -> str | None:
+        """What the drive will do by itself; None where its family has no watchdog that can be set."""
+        settings, profile = self._drive.profile.watchdog, self._drive.profile
+        if settings is None or profile.memory() is None:
+            self._say(
+                f"{profile.title} has no communication time-out that can be set from here: if this program is killed, "
+                "its motor turns on. An emergency stop is a wire"
+            )
+            return None
+        if not (settings.verified or self._drive.unverified):
+            raise NotAllowed(
+                f"the communication time-out of {profile.title} ({settings.timeout}) is not verified: {settings.note} "
+                "Use it all the same with --unverified, or do without with --no-watchdog. Nothing was sent",
+                unit=self._drive.unit,
+            )
+        action = next(each for each in _ACTIONS if each in settings.choices)
+        if action == "trip":
+            self._say(
+                f"{profile.title} trips when it hears nothing for {self._silence:g} s; whether its motor then stops is "
+                "set in the drive"
+            )
+        profile.encode(settings.timeout, self._silence or 0.0)
+        return action
+
+    def _arm(self) -> None:
+        if self._watchdog is None and self._silence is not None and self._action is not None:
+            self._watchdog = self._drive.watchdog(self._silence, self._action)
+
+    def _is_readable(self, name: str) -> bool:
+        try:
+            self._drive.readable(name)
+        except NotAllowed:
+            return False
+        return True
