@@ -124,6 +124,7 @@ class Spindle:
         self._reset_due = False
         self._rests_since: float | None = None
         self._over = ""
+        self._is_fresh = False
         self._not_heard = False
         self._falling: tuple[float, float] | None = None
 
@@ -141,6 +142,7 @@ class Spindle:
 
     def done(self, action: Action, now: float) -> None:
         """The drive took *action*."""
+        self._is_fresh = False
         if isinstance(action, Run):
             self.told, self.trouble, self._over = action.course, "", ""
             self._refused = self._falling = None
@@ -154,6 +156,7 @@ class Spindle:
     def failed(self, action: Action, why: str, *, final: bool = False, sent: bool = False) -> None:
         """The drive did not take *action*; *final*: nor would it later. *sent*: it may have, for all that is known."""
         self.errors += 1
+        self._is_fresh = False
         if isinstance(action, Speed):
             self._refused = action.word if final else None
             return
@@ -167,6 +170,7 @@ class Spindle:
     def saw(self, look: Look) -> None:
         """The drive showed *look*."""
         before, self._look = self._look, look
+        self._is_fresh = True
         if before is not None and before.state.running and look.time - before.time <= self._patience:
             self.hours += (look.time - before.time) / 3600.0
         if not look.state.at_rest:
@@ -244,18 +248,17 @@ class Spindle:
         if not self.linked(now):
             return f"the drive has not answered for {self._patience:g} s: it was told to stop"
         tripped = self._look is not None and self._look.tripped
-        rests = 0.0 if self._rests_since is None else now - self._rests_since
-        if rests >= ENDED_BY_ITSELF and not tripped:
+        if self._rests(now) >= ENDED_BY_ITSELF and not tripped:
             return "the drive stopped, and nobody here told it to"
         return ""
 
     def _while_off(self, now: float) -> Action | None:
         look = self._look if self.linked(now) else None
-        if look is not None and self._not_heard:
+        if look is not None and self._is_fresh and self._not_heard:
             if look.state.running:
                 return Stop()
-            self._not_heard = look.state is State.UNKNOWN
-        if look is not None and self._is_deaf(look):
+            self._not_heard = self._rests(now) < ENDED_BY_ITSELF
+        if look is not None and self._is_fresh and self._is_deaf(look):
             self.trouble = "the drive was told to stop and did not slow down: its voltage was taken off"
             self._falling = None
             return Coast()
@@ -274,6 +277,10 @@ class Spindle:
             self.trouble = "the spindle was switched on, and the drive is in fault: it was not started"
             return None
         return Run(self._wanted)
+
+    def _rests(self, now: float) -> float:
+        """For how many seconds the drive has shown itself at rest."""
+        return 0.0 if self._rests_since is None else now - self._rests_since
 
     def _is_deaf(self, look: Look) -> bool:
         """Whether the motor turns on as if nobody had told it to stop."""

@@ -123,7 +123,7 @@ class Alive:
         except OSError:
             return False
         name, _, rest = told.partition("(")[2].rpartition(")")
-        return name == _REALTIME and not rest.split()[:1] == ["Z"]
+        return name == _REALTIME and rest.split()[:1] != ["Z"]
 
     def _attached(self) -> int | None:
         """How many processes have HAL's memory; None where there is none that the system tells of."""
