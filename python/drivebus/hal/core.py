@@ -204,13 +204,18 @@ class Spindle:
             "fault": look.tripped or bool(self.trouble),
             "fault-code": look.fault,
             "current": look.current or 0.0,
-            "ready": linked and look.ready is not False and not look.tripped and not self.trouble,
+            "ready": linked and look.ready is not False and not look.tripped and not self.trouble and self._may_start,
             "link-ok": linked,
             "link-quality": look.quality if linked else 0.0,
             "hours": self.hours,
             "error-count": self.errors,
             "initialized": self._look is not None,
         }
+
+    @property
+    def _may_start(self) -> bool:
+        """Whether it runs, or would where `spindle-on` came: not while that stays on after a run that ended."""
+        return self.told is not None or self._seen_off
 
     def _request(self, asked: Asked) -> Course | None:
         """How the pins want the motor to turn; None: not at all."""
