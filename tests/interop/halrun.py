@@ -12,9 +12,10 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 DEADLINE = 30.0
@@ -34,7 +35,7 @@ class Linuxcnc:
         made_for = next(iter(self.module.glob("_hal.cpython-*.so"))).name.split("-")[1]
         ours = sys.implementation.cache_tag.removeprefix("cpython-") == made_for
         self.python = sys.executable if ours else shutil.which(f"python{made_for[0]}.{made_for[1:]}")
-        libraries = [str(root / "usr/lib"), *map(str, root.parent.glob("usr/lib/*"))]
+        libraries = [str(root / "usr/lib"), *map(str, root.parent.glob("usr/lib/*-linux-gnu"))]
         self.env = {
             **os.environ,
             "PATH": os.pathsep.join([str(root / "usr/bin"), os.environ.get("PATH", "")]),
@@ -115,10 +116,15 @@ class Session:
         children = Path(f"/proc/{self._halrun.pid}/task/{self._halrun.pid}/children").read_text().split()
         return [self._halrun.pid, *map(int, children)]
 
+    def is_up(self) -> bool:
+        """Whether the prompt is there."""
+        return any(Path(f"/proc/{each}/comm").read_text() == "halcmd\n" for each in self.processes()[1:])
+
     def end(self) -> None:
         """Ends the prompt, as `exit` does: `halrun` unloads what is there."""
         assert self._halrun.stdin is not None
-        self._halrun.stdin.close()
+        with suppress(BrokenPipeError):
+            self._halrun.stdin.close()
         self._halrun.wait(DEADLINE)
 
     def close(self) -> None:
@@ -143,6 +149,7 @@ def wait_until(reached: Callable[[], object], told: Callable[[], object]) -> Non
     deadline = time.monotonic() + DEADLINE
     while not reached():
         assert time.monotonic() < deadline, told()
+        threading.Event().wait(0.005)
 
 
 def is_running(process: int) -> bool:

@@ -26,6 +26,7 @@ WRITING = [
     ["write", "P00.11=5.0", "--yes"],
     ["write", "6300H=1", "--force", "--yes"],
     ["restore", "{file}", "--yes"],
+    ["hal", "--rpm-per-hz", "60"],
     ["raw", "01 06 00 0B 00 14", "--yes", "--force"],
     ["raw", "01 10 00 0B 00 01 02 00 14", "--yes"],
     ["raw", "01 05 00 00 FF 00", "--yes"],

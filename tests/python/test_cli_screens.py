@@ -99,6 +99,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "decode a capture": (["decode", "line.pcapng"], 0),
     "sniff": (["--port", ONE, "sniff", "--for", "1"], 0),
     "replay": (["replay", "line.pcapng"], 0),
+    "hal": (["--port", ONE, "hal", "--rpm-per-hz", "60", "--hal-path", "."], 2),
     "completion": (["completion", "bash"], 0),
     "nobody answers": (["--port", ONE, "--unit", "9", "status"], 3),
     "no such port": (["--port", "/dev/nowhere", "status"], 5),

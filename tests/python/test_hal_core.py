@@ -206,8 +206,8 @@ def test_a_drive_that_is_silent_for_longer_than_the_patience_is_told_to_stop() -
     machine.answers = False
     before, after = machine.cycles(ON, 9), machine.cycles(ON, 9)
     assert (before, after) == ([], [Stop()])
-    told = {name: machine.shown(name) for name in ("link-ok", "at-speed", "stopped", "brake", "ready", "fault")}
-    assert told == {"link-ok": False, "at-speed": False, "stopped": False, "brake": False, "ready": False, "fault": True}
+    assert not any(machine.shown(name) for name in ("link-ok", "at-speed", "stopped", "brake", "ready"))
+    assert machine.shown("fault") is True
     machine.answers = True
     assert machine.cycles(ON, 5) == []
 
@@ -315,6 +315,7 @@ def test_the_pins_of_a_spindle_in_reverse() -> None:
     assert shown.pop("hours") == pytest.approx(0.1 / 3600)
     assert shown == {
         "speed-feedback": -600.0,
+        "speed-feedback-rps": -10.0,
         "frequency-out": 10.0,
         "at-speed": True,
         "stopped": False,

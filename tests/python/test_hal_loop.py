@@ -14,6 +14,7 @@ import pytest
 import drivebus
 from drivebus import Bus, Drive, Simulator
 from drivebus.hal import PINS, Alive, HalGone, Loop, Motor, Pins, Scale, Spindle, module
+from drivebus.hal.core import Action
 
 COMMAND, SETPOINT = 0x2000, 0x2001
 FORWARD, REVERSE, STOP, COAST, RESET = 1, 2, 5, 6, 7
@@ -112,11 +113,15 @@ def test_a_trip_is_told_and_reset(cell: Cell) -> None:
     "error", [KeyboardInterrupt(), HalGone("gone"), SystemExit(143), ValueError("a mistake of ours")]
 )
 def test_whatever_ends_it_stops_the_motor_once(cell: Cell, error: BaseException) -> None:
-    with pytest.raises(type(error)), cell.motor:
-        cell.on(1200.0)
-        cell.until(cell.shows(at_speed=True))
-        cell.taken()
-        raise error
+    def work() -> None:
+        with cell.motor:
+            cell.on(1200.0)
+            cell.until(cell.shows(at_speed=True))
+            cell.taken()
+            raise error
+
+    with pytest.raises(type(error)):
+        work()
     assert cell.taken() == [(COMMAND, STOP)]
 
 
@@ -159,12 +164,15 @@ def test_a_silent_drive_is_told_to_stop_and_the_pins_say_so(cell: Cell, virtual:
         assert cell.taken() == []
 
 
-def test_the_drives_own_watchdog_is_set_before_the_first_start_and_given_back(
-    virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive
-) -> None:
-    drive = virtual_bus.drive(1, unverified=True)
-    # So long that the thread, which keeps real time, never wakes up.
-    cell = Cell(virtual, drive, watchdog=40.0)
+@pytest.fixture
+def watched(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> Cell:
+    """With a watchdog that takes so long that its thread, which keeps real time, never wakes up."""
+    assert virtual_drive.check_control()
+    return Cell(virtual, virtual_bus.drive(1, unverified=True), watchdog=40.0)
+
+
+def test_the_drives_own_watchdog_is_set_before_the_first_start_and_given_back(watched: Cell) -> None:
+    cell = watched
     with cell.motor:
         assert cell.taken() == []
         cell.on(1200.0)
@@ -181,7 +189,54 @@ def test_the_drives_own_watchdog_is_set_before_the_first_start_and_given_back(
     assert (cell.machine.register(TIMEOUT), cell.machine.register(ACTION)) == (0, 0)
 
 
-def test_a_watchdog_that_is_not_verified_is_for_who_starts_it_to_decide(virtual: Simulator, virtual_drive: Drive) -> None:
+def test_a_drive_that_was_away_has_its_watchdog_set_again(watched: Cell, virtual_drive: Drive) -> None:
+    cell = watched
+    with cell.motor:
+        cell.on(1200.0)
+        cell.until(cell.shows(forward=True))
+        # Switched off and on: what was in its RAM is lost, also that it obeys the bus.
+        cell.machine.power_cycle()
+        cell.simulator.line.drop_answers(10_000)
+        cell.until(cell.shows(link_ok=False))
+        cell.loop.cycle()
+        cell.simulator.line.drop_answers(0)
+        cell.pins["spindle-on"] = False
+        cell.until(cell.shows(stopped=True))
+        virtual_drive.prepare_control()
+        assert cell.machine.register(TIMEOUT) == 0
+        cell.on(1200.0)
+        cell.until(cell.shows(forward=True))
+        assert (cell.machine.register(TIMEOUT), cell.machine.register(ACTION)) == (400, 3)
+    cell.motor.give_back()
+
+
+def test_the_brake_opens_before_the_motor_starts(cell: Cell) -> None:
+    at_the_start: list[object] = []
+    carry_out = cell.motor.carry_out
+
+    def told(action: Action, counts: float) -> None:
+        at_the_start.append((cell.pins["brake"], cell.machine.state))
+        carry_out(action, counts)
+
+    assert cell.pins["brake"] is True
+    cell.motor.carry_out = told  # type: ignore[method-assign]
+    with cell.motor:
+        cell.on(1200.0)
+        cell.loop.cycle()
+    assert at_the_start == [(False, "stopped")]
+
+
+def test_a_drive_that_is_switched_on_later(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual.line.drop_answers(10_000)
+    cell = Cell(virtual, virtual_drive)
+    assert (cell.pins["initialized"], cell.pins["link-ok"], cell.pins["brake"]) == (False, False, False)
+    virtual.line.drop_answers(0)
+    cell.until(cell.shows(initialized=True, link_ok=True, ready=True, brake=True))
+
+
+def test_a_watchdog_that_is_not_verified_is_for_who_starts_it_to_decide(
+    virtual: Simulator, virtual_drive: Drive
+) -> None:
     with pytest.raises(drivebus.NotAllowed, match=r"P14\.04.*--unverified.*--no-watchdog"):
         Cell(virtual, virtual_drive, watchdog=2.0)
 
@@ -197,9 +252,9 @@ def test_what_no_watchdog_can_do_is_said(family: str, says: str) -> None:
 
 
 def test_a_family_without_a_setpoint_in_hertz_is_no_spindle() -> None:
-    with Simulator({1: "gd600-rectifier"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
-        with pytest.raises(drivebus.NotAllowed, match="setpoint"):
-            Cell(simulator, bus.drive(1, "gd600-rectifier", unverified=True))
+    rectifier = Simulator({1: "gd600-rectifier"}, transport="process", clock="virtual")
+    with rectifier, Bus(rectifier) as bus, pytest.raises(drivebus.NotAllowed, match="setpoint"):
+        Cell(rectifier, bus.drive(1, "gd600-rectifier", unverified=True))
 
 
 def proc(folder: Path, processes: dict[int, tuple[str, str]], attached: int | None) -> Path:

@@ -78,26 +78,31 @@ def hal(
     def say(text: str) -> None:
         remark(f"drivebus hal {name}: {text}")
 
-    try:
-        with ExitStack() as ends:
-            bus = ends.enter_context(session.bus(retries=_RETRIES))
-            drive = session.drive_on(bus)
-            motor = Motor(drive, seconds, say)
-            known = component(linuxcnc, name)
-            # The last goes first: the stop, then HAL, then what waits until the motor stands.
-            ends.callback(motor.give_back)
-            ends.callback(known.exit)
-            ends.enter_context(motor)
-            spindle = Spindle(scale, max(_LOST, seconds or 0.0))
-            loop = Loop(Pins(known), spindle, motor, drive, say, Alive())
-            loop.cycle()
-            known.ready()
-            loop.forever()
-    except HalGone as gone:
-        say(f"{gone}; what it ran was stopped")
-        raise click.exceptions.Exit(1) from gone
-    except KeyboardInterrupt:
-        return  # HAL's `unload`, and Ctrl-C: how it is meant to end
+    with session.bus(retries=_RETRIES) as bus:
+        drive = session.drive_on(bus)
+        motor = Motor(drive, seconds, say)
+        known = component(linuxcnc, name)
+        gone = False
+        try:
+            with ExitStack() as ends:
+                # The last goes first: the stop, then HAL, then what waits until the motor stands.
+                ends.callback(motor.give_back)
+                ends.callback(known.exit)
+                ends.enter_context(motor)
+                spindle = Spindle(scale, max(_LOST, seconds or 0.0))
+                loop = Loop(Pins(known), spindle, motor, drive, say, Alive())
+                loop.cycle()
+                known.ready()
+                loop.forever()
+        except HalGone as error:
+            gone = True
+            say(f"{error}: no pin changes any more, and this program has ended")
+        except KeyboardInterrupt:
+            pass  # HAL's `unload`, and Ctrl-C: how it is meant to end
+        if motor.unstopped:
+            say(f"at the end: {motor.unstopped}")
+        if gone or motor.unstopped:
+            raise click.exceptions.Exit(7 if motor.unstopped else 1)
 
 
 COMMANDS = [hal]

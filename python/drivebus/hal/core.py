@@ -191,10 +191,11 @@ class Spindle:
         linked = self.linked(now)
         look = self._look or Look(now)
         frequency = abs(look.frequency or 0.0)
-        sign = -1.0 if look.state is State.REVERSE else 1.0
+        speed = math.copysign(frequency, -1.0 if look.state is State.REVERSE else 1.0) * self._scale.rpm_per_hz
         stopped = linked and look.stands
         return {
-            "speed-feedback": sign * frequency * self._scale.rpm_per_hz,
+            "speed-feedback": speed,
+            "speed-feedback-rps": speed / 60.0,
             "frequency-out": frequency,
             "at-speed": linked and self._is_at_speed(look),
             "stopped": stopped,

@@ -22,6 +22,7 @@ _REALTIME = "rtapi_app"
 """The program that holds the real-time side of HAL, without which no thread changes a pin."""
 
 _LOOK_EVERY = 0.25
+_SEARCH_EVERY = 2.0
 _ALONE = 2.0
 """Seconds alone on HAL's memory, with the motor turning, after which nobody is taken to come back."""
 
@@ -89,7 +90,7 @@ class Alive:
         self._proc = proc
         self._realtime: set[int] = set()
         self._had_memory = False
-        self._next = 0.0
+        self._next = self._next_search = 0.0
         self._alone_since: float | None = None
 
     def gone(self, now: float, *, turning: bool) -> str:
@@ -99,7 +100,9 @@ class Alive:
         self._next = now + _LOOK_EVERY
         if self._realtime and not any(self._is_realtime(process) for process in self._realtime):
             return f"HAL's real-time side ({_REALTIME}) has ended"
-        self._realtime = self._realtime or self._find()
+        if not self._realtime and now >= self._next_search:
+            self._next_search = now + _SEARCH_EVERY
+            self._realtime = self._find()
         attached = self._attached()
         if attached is None:
             return "HAL's memory was removed" if self._had_memory else ""

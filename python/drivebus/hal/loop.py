@@ -49,7 +49,7 @@ class Loop:
         self._say = say
         self._watch = watch
         self._known = False
-        self._was_linked = False
+        self._may_have_forgotten = False
         self._trouble = ""
 
     def forever(self) -> None:
@@ -78,8 +78,9 @@ class Loop:
             self._carry_out(action)
         self._look()
         now = self._bus.now()
-        self._keep_watchdog(spindle.linked(now))
-        self._pins.show(spindle.shown(now))
+        shown = spindle.shown(now)
+        self._pins.show(shown)
+        self._keep_watchdog(bool(shown["link-ok"]), bool(shown["stopped"]))
         if spindle.trouble != self._trouble:
             self._trouble = spindle.trouble
             if self._trouble:
@@ -112,7 +113,9 @@ class Loop:
         else:
             self._spindle.saw(look)
 
-    def _keep_watchdog(self, linked: bool) -> None:
-        if self._was_linked and not linked:
+    def _keep_watchdog(self, linked: bool, stopped: bool) -> None:
+        """A drive that was away may have been switched off: what it had in RAM is set again, at rest."""
+        self._may_have_forgotten |= not linked
+        if self._may_have_forgotten and stopped and self._spindle.told is None:
             self._motor.forget_watchdog()
-        self._was_linked = linked
+            self._may_have_forgotten = False

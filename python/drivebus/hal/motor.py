@@ -35,6 +35,9 @@ class Motor:
         watchdog: Seconds of silence after which the drive is to act by itself; None sets nothing.
         say: Is told what people have to know.
 
+    Attributes:
+        unstopped: Why the last stop was not confirmed, after which the drive was told to coast; empty where it was.
+
     Raises:
         NotAllowed: The drive's watchdog is not verified for the family, or takes no such time. Nothing was sent.
     """
@@ -47,6 +50,7 @@ class Motor:
         self._watchdog: Watchdog | None = None
         self._block: MotorBlock | None = None
         self._leaving = False
+        self.unstopped = ""
         self._has_current = _CURRENT in drive.profile.monitor_names() and self._is_readable(_CURRENT)
 
     def counts(self) -> float:
@@ -96,8 +100,8 @@ class Motor:
             self._stop()
 
     def forget_watchdog(self) -> None:
-        """The drive may have been switched off, and have forgotten its settings: the next start sets them again."""
-        if self._watchdog is not None and self._block is None:
+        """Takes the drive's time-out for forgotten, as it is by one that was switched off: the next start sets it."""
+        if self._watchdog is not None:
             watchdog, self._watchdog = self._watchdog, None
             watchdog.close()
 
@@ -145,7 +149,12 @@ class Motor:
 
     async def _end(self, unit: Unit) -> None:
         """While the program goes on, its own looks prove the stop: the pins are not to wait for that."""
-        await (motion.stop(unit) if self._leaving else motion.stop(unit, confirm=0.0))
+        try:
+            await (motion.stop(unit) if self._leaving else motion.stop(unit, confirm=0.0))
+        except DrivebusError as error:
+            self.unstopped = str(error)
+            raise
+        self.unstopped = ""
 
     def _own_action(self) -> str | None:
         """What the drive will do by itself; None where its family has no watchdog that can be set."""

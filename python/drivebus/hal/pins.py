@@ -18,6 +18,7 @@ PINS: dict[str, tuple[str, str]] = {
     "enable": ("BIT", "IN"),
     "reset": ("BIT", "IN"),
     "speed-feedback": ("FLOAT", "OUT"),
+    "speed-feedback-rps": ("FLOAT", "OUT"),
     "frequency-out": ("FLOAT", "OUT"),
     "at-speed": ("BIT", "OUT"),
     "stopped": ("BIT", "OUT"),
