@@ -164,6 +164,20 @@ def test_a_silent_drive_is_told_to_stop_and_the_pins_say_so(cell: Cell, virtual:
         assert cell.taken() == []
 
 
+def test_a_stop_that_was_not_confirmed_is_sent_once_more_at_the_end(cell: Cell, virtual: Simulator) -> None:
+    with cell.motor:
+        cell.on(1200.0)
+        cell.until(cell.shows(at_speed=True))
+        virtual.line.drop_answers(10_000)
+        cell.pins["spindle-on"] = False
+        cell.loop.cycle()
+        assert cell.taken() == [(COMMAND, STOP)] * 3 + [(COMMAND, COAST)]
+        assert cell.pins["fault"] is True
+        virtual.line.drop_answers(0)
+    assert cell.taken() == [(COMMAND, STOP)]
+    assert cell.motor.unstopped == ""
+
+
 @pytest.fixture
 def watched(virtual: Simulator, virtual_bus: Bus, virtual_drive: Drive) -> Cell:
     """With a watchdog that takes so long that its thread, which keeps real time, never wakes up."""

@@ -9,7 +9,7 @@ import click
 
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, pass_session
-from drivebus.cli.types import Seconds
+from drivebus.cli.types import Place, Rpm, Seconds, Share
 from drivebus.hal import Alive, HalGone, Loop, Motor, Pins, Scale, Spindle, component, module
 
 __all__ = ["COMMANDS"]
@@ -25,15 +25,15 @@ _LOST = 1.0
 @click.option("--name", default="drivebus", show_default=True, help="What the component is called, and its pins.")
 @click.option(
     "--rpm-per-hz",
-    type=click.FloatRange(0, min_open=True),
+    type=Rpm(0.001),
     required=True,
     metavar="RPM",
     help="Turns of the spindle per minute for each hertz: 60 for a motor with 2 poles, 30 for one with 4.",
 )
-@click.option("--max-rpm", type=click.FloatRange(0, min_open=True), metavar="RPM", help="The highest speed given.")
+@click.option("--max-rpm", type=Rpm(0.001), metavar="RPM", help="The highest speed given.")
 @click.option(
     "--at-speed",
-    type=click.FloatRange(0, 1),
+    type=Share(0, 1),
     default=0.02,
     show_default=True,
     metavar="SHARE",
@@ -50,7 +50,7 @@ _LOST = 1.0
 @click.option("--no-watchdog", is_flag=True, help="Leave the drive's own time-out as it is.")
 @click.option(
     "--hal-path",
-    type=click.Path(exists=True, file_okay=False),
+    type=Place(exists=True, file_okay=False),
     metavar="FOLDER",
     help="Where LinuxCNC's hal.py is, if not where Debian has it.",
 )

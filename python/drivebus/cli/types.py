@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import click
 
-__all__ = ["Amperes", "Hertz", "Place", "Seconds", "Size", "Whole", "with_a_point"]
+__all__ = ["Amperes", "Hertz", "Place", "Rpm", "Seconds", "Share", "Size", "Whole", "with_a_point"]
 
 
 class Number(click.FloatRange):
@@ -40,6 +40,18 @@ class Hertz(Number):
     """A frequency in Hz."""
 
     what = "Hz"
+
+
+class Rpm(Number):
+    """A speed in turns per minute."""
+
+    what = "turns per minute"
+
+
+class Share(Number):
+    """A part of a whole, 1 being all of it."""
+
+    what = "shares"
 
 
 class Amperes(Number):

@@ -17,6 +17,7 @@ from drivebus.operations import motion, setpoints
 from drivebus.operations.face import unit_of
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.unit import Unit
+from drivebus.values import State
 from drivebus.watchdog import Watchdog
 
 __all__ = ["Motor"]
@@ -80,7 +81,7 @@ class Motor:
             status.state,
             status.frequency,
             0 if status.fault is None else status.fault.code,
-            status.fault is not None or str(status.state) == "fault",
+            status.fault is not None or status.state is State.FAULT,
             status.ready,
             current,
             link.good / link.asked if link.asked else 1.0,
@@ -116,11 +117,14 @@ class Motor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stops what was started here, and proves it."""
+        """Stops what was started here, and proves it; also what was told to stop before and did not confirm it."""
         self._leaving = True
         block, self._block = self._block, None
+        unstopped, self.unstopped = self.unstopped, ""
         if block is not None:
             at_once(block.finish() if error is None else block.fail(error))
+        elif unstopped:
+            at_once(self._end(unit_of(self._drive)))
 
     def _run(self, hz: float, reverse: bool) -> None:
         if self._block is not None:
