@@ -168,6 +168,7 @@ def test_a_stop_that_was_not_confirmed_is_sent_once_more_at_the_end(cell: Cell, 
     with cell.motor:
         cell.on(1200.0)
         cell.until(cell.shows(at_speed=True))
+        cell.taken()
         virtual.line.drop_answers(10_000)
         cell.pins["spindle-on"] = False
         cell.loop.cycle()
