@@ -465,6 +465,8 @@ class Profile:
         """State word 1 as `forward`, `reverse`, `stopped`, `fault`, `power_off`, `pre_exciting` or `unknown`."""
     def is_in_fault(self, raw: int, /) -> bool:
         """Whether state word 1 says that the drive is in fault, which it may run in."""
+    def state_tells_fault(self) -> bool:
+        """Whether the state word can say that the drive is in fault."""
     def state_reason(self) -> str | None:
         """Why the states are not verified."""
     def control(self) -> list[dict[str, Any]]:
@@ -487,6 +489,8 @@ class Profile:
         Keys: `timeout` and `action` (parameter codes), `actions` (the value of `"coast"` and of `"stop"`, where the
         family has them), `verified`, `note`, `source`.
         """
+    def fault_number(self, raw: int, /) -> int:
+        """The number in the word of the present fault."""
     def fault(self, code: int, /) -> dict[str, Any]:
         """One fault: `code`, `mnemonic`, `label`, `cause`, `remedy`, `verified`, `evidence`, `note`, `source`.
 

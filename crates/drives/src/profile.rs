@@ -322,6 +322,11 @@ impl Profile {
         self.state.as_ref().is_some_and(|word| word.is_in_fault(raw))
     }
 
+    /// Whether the state word can say that the drive is in fault. Where it cannot, the fault number alone does.
+    pub fn state_tells_fault(&self) -> bool {
+        self.state.as_ref().is_some_and(StateWord::tells_fault)
+    }
+
     /// What must be set before the drive obeys the bus, in order.
     pub fn control(&self) -> &[Control] {
         &self.control

@@ -320,6 +320,11 @@ impl Profile {
         Ok(self.0.is_in_fault(one_word("raw", raw)?))
     }
 
+    /// Whether the state word can say that the drive is in fault.
+    fn state_tells_fault(&self) -> bool {
+        self.0.state_tells_fault()
+    }
+
     /// Why the states are not verified; `None` where they are, or where there are none.
     fn state_reason(&self) -> Option<&str> {
         self.0.state_reason()
@@ -372,6 +377,11 @@ impl Profile {
     #[pyo3(signature = (code, /))]
     fn fault<'py>(&self, code: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
         tables::fault(code.py(), &self.0.fault(one_word("code", code)?))
+    }
+
+    #[pyo3(signature = (raw, /))]
+    fn fault_number(&self, raw: &Bound<'_, PyAny>) -> PyResult<u16> {
+        Ok(self.0.fault_number(one_word("raw", raw)?))
     }
 
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {

@@ -78,7 +78,8 @@ class Watched:
         if self.state is not None and self.state in self.now:
             state = self.profile.state(int(self.now[self.state]))
             told.append(state.replace("_", " "), _STYLES.get(state, ""))
-        code = int(self.now[self.fault]) if self.fault is not None and self.fault in self.now else 0
+        word = int(self.now[self.fault]) if self.fault is not None and self.fault in self.now else 0
+        code = self.profile.fault_number(word)
         if code:
             told.append(f"{', ' if told else ''}{printable(str(self.profile.fault(code)))}", "bold red")
         return told

@@ -46,7 +46,8 @@ class Seen(NamedTuple):
     time: float
     missing: Mapping[str, str]
     in_fault: bool
-    """Whether the state word says that the drive is in fault. It may run all the same."""
+    """Whether the state word says that the drive is in fault, or where it cannot, the fault number. It may run all the
+    same."""
 
     @property
     def source(self) -> ControlSource | None:
@@ -107,14 +108,17 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     fields: dict[str, str] = {}
     for word in plan.words:
         fields.update(unit.profile.fields(word, values[word]))
-    number = values[plan.fault] if plan.fault is not None else 0
+    number = unit.profile.fault_number(values[plan.fault]) if plan.fault is not None else 0
+    in_fault = plan.state is not None and (
+        unit.profile.is_in_fault(values[plan.state]) or (number != 0 and not unit.profile.state_tells_fault())
+    )
     seen = Seen(
         State.UNKNOWN if plan.state is None else state_of(unit, values[plan.state]),
         fields,
         unit.profile.fault(number) if number else None,
         first,
         plan.missing,
-        plan.state is not None and unit.profile.is_in_fault(values[plan.state]),
+        in_fault,
     )
     remember(unit, str(seen))
     return seen

@@ -291,6 +291,10 @@ class Profile:
         """Whether the state word says that the drive is in fault, which it may run in."""
         return self._native.is_in_fault(raw)
 
+    def state_tells_fault(self) -> bool:
+        """Whether the state word can say that the drive is in fault. Where it cannot, the fault number alone does."""
+        return self._native.state_tells_fault()
+
     def state_reason(self) -> str | None:
         """Why the states are not verified; None where they are, or where the family has no state word."""
         return self._native.state_reason()
@@ -327,6 +331,10 @@ class Profile:
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus, in the order in which to set it."""
         return self._native.control()
+
+    def fault_number(self, raw: int, /) -> int:
+        """The number in the word of the present fault: its bit field `fault`, where it shares its word with others."""
+        return self._native.fault_number(raw)
 
     def fault(self, code: int, /) -> Fault:
         """One fault by its number; an unknown number says so in its label."""

@@ -60,7 +60,8 @@ class Witness:
             self._gap = None
             samples = "1 sample was" if lost == 1 else f"{lost} samples were"
             yield Row(sample.time, label, "back", f"{samples} missing in {sample.time - began:.3f} s")
-        fault = 0 if self._drive.fault is None else int(sample[self._drive.fault])
+        word = 0 if self._drive.fault is None else int(sample[self._drive.fault])
+        fault = self._drive.profile.fault_number(word)
         if fault != self._fault:
             self._fault = fault
             told = str(self._drive.profile.fault(fault)) if fault else ""

@@ -100,6 +100,11 @@ impl StateWord {
         self.rules.iter().any(|rule| rule.state == State::Fault && rule.fits(raw))
     }
 
+    /// Whether some word of it says that the drive is in fault.
+    pub fn tells_fault(&self) -> bool {
+        self.rules.iter().any(|rule| rule.state == State::Fault)
+    }
+
     /// Whether `raw`, of which `rule` says that the motor rests, has the bits by which a running motor is told
     /// from a stopped one. Bits of the rule itself do not count: where it fits, they mean what it says.
     fn may_run(&self, raw: u16, rule: StateRule) -> bool {

@@ -70,6 +70,13 @@ impl Profile {
         self.entry(name?)
     }
 
+    /// The number in the word `raw` of the present fault: its bit field `fault`, where it shares its word with something
+    /// else, such as a warning.
+    pub fn fault_number(&self, raw: u16) -> u16 {
+        let shared = self.role("fault").and_then(|entry| entry.bits().iter().find(|field| field.name() == "fault"));
+        shared.map_or(raw, |field| field.extract(raw))
+    }
+
     /// The words whose bit fields tell more of the state than the state itself.
     pub fn status_words(&self) -> impl Iterator<Item = &Entry> {
         self.roles.status_words.iter().filter_map(|name| self.entry(name))

@@ -111,7 +111,9 @@ def turns(member: Member) -> bool:
 def tripped(member: Member) -> bool:
     """Whether it is in fault, as far as it tells."""
     watched = member.watched
-    return watched is not None and watched.now is not None and bool(watched.now.get(watched.fault or ""))
+    if watched is None or watched.now is None:
+        return False
+    return watched.profile.fault_number(int(watched.now.get(watched.fault or "") or 0)) != 0
 
 
 def _beside(member: Member) -> Text:
@@ -284,7 +286,7 @@ def fault(member: Member) -> Text:
         return Text(printable(f"{_nothing(member)}, trying again: {member.why}"), "yellow")
     if watched is None or watched.now is None or watched.fault is None or watched.fault not in watched.now:
         return Text("")
-    code = int(watched.now[watched.fault])
+    code = watched.profile.fault_number(int(watched.now[watched.fault]))
     if not code:
         return Text("")
     present = watched.profile.fault(code)
