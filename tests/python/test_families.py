@@ -28,6 +28,13 @@ COMMANDS = [
     "jog_stop",
 ]
 
+
+def place_of(family: dict[str, Any], command: str) -> int | None:
+    """Where a command goes: most have one register for all."""
+    elsewhere: dict[str, int] = family["commands"].get("elsewhere", {})
+    return elsewhere.get(command, given(family["commands"]["register"]))
+
+
 every_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family["name"])
 
 
@@ -44,7 +51,7 @@ def words(section: dict[str, Any]) -> dict[int, str]:
 
 def test_the_table_has_every_family() -> None:
     assert {family["name"] for family in FAMILIES} == set(drivebus.profiles())
-    assert len(FAMILIES) == 15
+    assert len(FAMILIES) == 16
 
 
 @every_family
@@ -57,7 +64,7 @@ def test_a_command_is_that_of_the_table(family: dict[str, Any], command: str) ->
             profile.command(command)
         assert command not in profile.commands()
         return
-    assert profile.command(command) == (table["register"], code)
+    assert profile.command(command) == (place_of(family, command), code)
     assert profile.commands()[command] == code
     assert (profile.command_reason(command) is not None) == (command in table["needs_unverified"])
 
@@ -65,11 +72,17 @@ def test_a_command_is_that_of_the_table(family: dict[str, Any], command: str) ->
 @every_family
 def test_no_other_code_is_defined(family: dict[str, Any]) -> None:
     profile, table = Profile.builtin(family["name"]), family["commands"]
-    codes: dict[int | None, str] = {given(table[command]): command for command in COMMANDS}
+    here = [command for command in COMMANDS if command not in table.get("elsewhere", {})]
+    codes: dict[int | None, str] = {given(table[command]): command for command in here}
     codes.pop(None, None)
     codes.update({int(code): label for code, label in table["other"].items()})
     assert profile.command_codes() == codes
     assert profile.command_address == given(table["register"])
+    others: dict[int, dict[int, str]] = {}
+    for command, address in table.get("elsewhere", {}).items():
+        others.setdefault(address, {})[table[command]] = command
+    assert {place: words for place, words in profile.command_registers().items() if place in others} == others
+    assert set(profile.command_registers()) == {*others, given(table["register"])} - {None}
     assert [address for address in range(0x8000) if profile.is_command(address)] == table["moves"]
     assert profile.kind == family["kind"]
 

@@ -13,7 +13,7 @@ import pytest
 
 from drivebus import Bus, Drive, NotAllowed, Simulator
 
-from .test_families import COMMANDS, FAMILIES, given
+from .test_families import COMMANDS, FAMILIES, given, place_of
 
 STARTS = {"run_forward", "run_reverse", "jog_forward", "jog_reverse"}
 
@@ -31,7 +31,7 @@ BEFORE = {"stop": "run_forward", "coast": "run_forward", "jog_stop": "jog_forwar
 """What must go on for a command to have something to end."""
 
 EVERY = [(family, command) for family in FAMILIES for command in COMMANDS]
-REGISTERS = {given(family["commands"]["register"]) for family in FAMILIES} - {None}
+REGISTERS = {place_of(family, command) for family, command in EVERY} - {None}
 KNOWN = [(family, command) for family, command in EVERY if given(family["commands"][command]) is not None]
 
 
@@ -80,7 +80,7 @@ def test_the_code_on_the_line_is_the_familys_own(
 ) -> None:
     simulator, bus = line
     table = family["commands"]
-    register, code = given(table["register"]), given(table[command])
+    register, code = place_of(family, command), given(table[command])
     drive = drive_of(bus, family["name"], unverified=True)
     if register is not None:
         prepare(drive)
@@ -92,7 +92,7 @@ def test_the_code_on_the_line_is_the_familys_own(
     expected = []
     if command in BEFORE:
         DO[BEFORE[command]](drive)
-        expected.append((register, given(table[BEFORE[command]])))
+        expected.append((place_of(family, BEFORE[command]), given(table[BEFORE[command]])))
     elif command == "reset_fault":
         simulator.drive(1).trip(1)
     DO[command](drive)
@@ -118,7 +118,7 @@ def test_what_no_document_prints_is_not_sent_unasked(
         assert commanded(simulator) == []
     else:
         DO[command](plain)
-        assert commanded(simulator) == [(table["register"], table[command])]
+        assert commanded(simulator) == [(place_of(family, command), table[command])]
 
 
 def test_what_a_vfd500_may_take_for_disable_is_sent_only_if_it_is_forced() -> None:

@@ -29,6 +29,7 @@ FAMILIES = {
     13: "gd20",
     14: "gd100",
     15: "gd200a",
+    16: "ms300",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -110,6 +111,8 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
     for family in FAMILIES.values():
         if family in codes:
             assert read(bus, family, 0x2103) == [codes[family]]
+        elif family == "ms300":  # its output frequency: manual, p. 799
+            assert read(bus, family, 0x2103) == [0]
         else:
             assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x02, family
 
@@ -213,7 +216,7 @@ def test_what_is_meant_for_another_family_reaches_nothing(simulator: Simulator, 
 
 def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
-        if family == "chf100a":  # its manual names 03H and 06H (p. 107)
+        if family in ("chf100a", "ms300"):  # their manuals name 03H and 06H (p. 107), and 10H too (p. 1020)
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == 0x01
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)

@@ -1,5 +1,8 @@
 """A profile was named, and the unit says that it is something else: nothing is written to it.
 
+A unit that answers strangely (a word where codes stand that is no code, no state of the family) is asked whether it
+answers and refuses what another family does: a Delta MS300 has its output frequency at 2103H, and 0 at 2100H (its manual, p. 799).
+
 What each family says at 2103H: GD350 manual, chapter 9.4.5 (GD350 01A0H, GD35 0108H, GD35-H1 0109H, GD300 010AH); GD10
 manual, p. 90 (GD10 010DH, GD100 010BH); GD20 manual, p. 140 (0106H); GD200A manual V2.6, p. 147 (0107H). Of no other
 family is a page with a code at hand; their simulated drives refuse 2103H with 02H.
@@ -28,6 +31,9 @@ CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
 SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"]
 """The families whose units refuse 2103H."""
 
+NOT_A_VFD500 = [family for family in SILENT_ON_CODES if family != "vfd500"]
+"""Those of them that a family with a state or a fault word is taken for: a VFD500 has no such word there."""
+
 TAKEN_FOR: dict[str, list[str]] = {
     # These have a code: one that says another, or refuses to say one, is none of them.
     "gd350": ["gd350"],
@@ -40,13 +46,15 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
-    # Of these nothing is known that they must say; only a code gives another one away.
-    "gd600": SILENT_ON_CODES,
+    # And this one 2104H and 2106H.
+    "ms300": ["ms300"],
+    # Of these nothing is known that they must say; a code gives another one away, or strange words and a signature.
+    "gd600": NOT_A_VFD500,
     "gd600-rectifier": SILENT_ON_CODES,
-    "gd3000": SILENT_ON_CODES,
+    "gd3000": NOT_A_VFD500,
     "gd3000-rectifier": SILENT_ON_CODES,
-    "chf100a": SILENT_ON_CODES,
-    "chv100": SILENT_ON_CODES,
+    "chf100a": NOT_A_VFD500,
+    "chv100": NOT_A_VFD500,
 }
 """What each profile may be named for without being contradicted."""
 
@@ -60,6 +68,9 @@ SAYS = {
     "gd100": "010BH",
     "gd200a": "0107H",
 }
+
+ASKED_FOR_NO_CODE = ["ms300"]
+"""Families that have something else where others have a code: what stands there is not asked for, since it is none."""
 
 PAIRS = [(named, unit) for named in TAKEN_FOR for unit in TAKEN_FOR]
 
@@ -109,7 +120,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 225
+    assert len(PAIRS) == 256
 
 
 @every_pair
@@ -130,7 +141,9 @@ def test_what_is_contradicted_gets_nothing(named: str, unit: str) -> None:
         told = str(error.value)
         for said in (f"unit 1 was named {named}", "nothing was written", "trust_profile=True", "--trust-profile"):
             assert said in told
-        if unit in SAYS:
+        if named in ASKED_FOR_NO_CODE:
+            assert "it refuses " in told
+        elif unit in SAYS:
             assert f"it reports {SAYS[unit]}" in told
             assert f'profile="{unit}"' in told
             assert Profile.builtin(unit).title.removeprefix("INVT ") in told

@@ -16,14 +16,12 @@ from drivebus.identify.families import one_of, shipped
 from drivebus.identify.signatures import signature_of
 from drivebus.profile import Profile, profiles
 
-__all__ = ["contradiction"]
+__all__ = ["contradiction", "is_suspicious", "other_signature"]
 
 
 def contradiction(profile: Profile, unit: int, answers: Iterable[Answer]) -> str | None:
     """What among *answers* speaks against *profile*, and what to do about it; None if nothing does."""
-    known_by = profile.role("identification") or signature_of(profile) or shipped(profile.reports_as())
-    if not known_by:
-        # A profile of somebody's own that says nothing of how its units are known: they may be anything.
+    if not _is_known_by_something(profile):
         return None
     told = list(answers)
     # A code says most: what the unit is, and not only what it is not.
@@ -31,10 +29,61 @@ def contradiction(profile: Profile, unit: int, answers: Iterable[Answer]) -> str
     against = next(filter(None, found), None)
     if against is None:
         return None
+    return _told(profile, unit, against)
+
+
+def is_suspicious(profile: Profile, answers: Iterable[Answer]) -> bool:
+    """Whether a unit of *profile* would hardly give these *answers*, so that it is worth asking what else it may be.
+
+    It is not what speaks against the profile: firmwares differ, and so do editions of manuals.
+    """
+    if not _is_known_by_something(profile):
+        return False
+    signature = signature_of(profile)
+    refused = () if signature is None else tuple(signature["refuses"])
+    return any(_surprises(profile, answer, refused) for answer in answers)
+
+
+def other_signature(profile: Profile, unit: int, shown: Iterable[str]) -> str | None:
+    """What speaks against *profile* if a unit answers and refuses what those of the families *shown* do."""
+    names = list(shown)
+    if not names or set(names) & set(profile.reports_as()):
+        return None
+    titles = [f"{Profile.builtin(name).title} ({name})" for name in names]
+    then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in names)
+    return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: {then}")
+
+
+def _told(profile: Profile, unit: int, against: str) -> str:
     return (
         f"unit {unit} was named {profile.name} ({profile.title}), and {against}; or say trust_profile=True "
         "(`--trust-profile`) if it is meant"
     )
+
+
+def _is_known_by_something(profile: Profile) -> bool:
+    """Not so of a profile of somebody's own that says nothing of how its units are known: they may be anything."""
+    return bool(profile.role("identification") or signature_of(profile) or shipped(profile.reports_as()))
+
+
+def _surprises(profile: Profile, answer: Answer, refused: tuple[int, ...]) -> bool:
+    """Whether *answer* is not what a unit of *profile* says there; at *refused* it has nothing."""
+    if answer.word is None:
+        return (
+            answer.address not in refused
+            and profile.name_at(answer.address) is not None
+            and answer.exception is not None
+            and no_such_address(profile, answer.exception)
+        )
+    if answer.address in refused:
+        return True
+    if answer.address in codes.registers():
+        # A word that no list has for it: another maker keeps his speed there.
+        rows = codes.listed_for(profile, answer.address, answer.word)
+        return not set(codes.families_in(rows)) & set(profile.reports_as())
+    state = profile.role("state")
+    is_state = state is not None and profile.describe(state).address == answer.address
+    return is_state and profile.state(answer.word) == "unknown"
 
 
 def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:

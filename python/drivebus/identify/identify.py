@@ -5,7 +5,6 @@ Only reads are sent here. Whether what was found is enough to command a motor by
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
@@ -13,12 +12,10 @@ from drivebus.identify import codes, signatures
 from drivebus.identify.answers import LOCKED, UNREACHED, no_such_address
 from drivebus.identify.families import all_of, one_of, shipped
 from drivebus.identify.results import Identification
+from drivebus.identify.signatures import Read
 from drivebus.profile import Profile
 
 __all__ = ["Read", "identify"]
-
-Read = Callable[[int, int], Awaitable[list[int]]]
-"""Asks a unit for the word at an address."""
 
 _PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
 
@@ -47,7 +44,7 @@ async def identify(read: Read, unit: int) -> Identification:
         if rows:
             return await _as_it_behaves(read, _by_code(unit, code, rows), address)
         told.append(f"it reports {code:04X}H, which is not a known code")
-    candidates = await _by_answers(read, unit, answered)
+    candidates = await signatures.shown_by(read, unit, answered)
     if not candidates:
         reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
@@ -105,19 +102,3 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
         f"{place:04X}H may have another meaning"
     )
     return replace(found, certainty="unverified", reason=reason)
-
-
-async def _by_answers(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
-    """The families whose signature *unit* shows. What was asked stands in *answered*, and what is asked goes there."""
-    for signature in signatures.listed().values():
-        for address in (*signature["answers"], *signature["refuses"]):
-            if address not in answered:
-                try:
-                    await read(unit, address)
-                    answered[address] = True
-                except Refused:
-                    answered[address] = False
-                except (NoAnswer, BadAnswer):
-                    # Neither, then: no signature has it.
-                    continue
-    return tuple(name for name, signature in signatures.listed().items() if signatures.is_shown(signature, answered))

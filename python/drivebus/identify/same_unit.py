@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer, tells_nothing
-from drivebus.identify.contradiction import contradiction
-from drivebus.identify.signatures import signature_of
+from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
+from drivebus.identify.signatures import shown_by, signature_of
 from drivebus.line.protocols import AwaitableBus
 from drivebus.profile import Profile
 
@@ -58,7 +58,8 @@ class SameUnit:
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
         is one that refuses for the moment only, as where a password locks it or a gateway does not reach it. Whether it
-        contradicts its profile is looked at only where it is to be *judged*; where it does, it is asked each time.
+        contradicts its profile is looked at only where it is to be *judged*, or where it behaves as a unit of another
+        family; where it does, it is asked each time.
 
         Returns:
             The connection for which that holds: what is sent on it goes to the unit that was asked.
@@ -80,18 +81,22 @@ class SameUnit:
         except LINE_ERRORS as error:
             failure = error
         if anew or self._known is None:
-            self._judge(answers, failure is None, judged)
+            against = other = None
+            if not self._trusted:
+                against = contradiction(self._profile, self._unit, answers)
+                other = await self._other(bus, answers) if against is None and failure is None else None
+            # By the words of another maker even a reset may start the motor.
+            self._judge(answers, failure is None, judged or other is not None, against or other)
         else:
             self._compare(answers, failure, self._known)
         self._opened = opened
         return opened
 
-    def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool) -> None:
-        """Takes what a unit said that was not known, and raises where it contradicts its profile and is to be *judged*.
+    def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool, against: str | None) -> None:
+        """Takes what a unit said that was not known, and raises where that is *against* its profile and to be *judged*.
 
         What came before a failure of the line was said all the same, but is not *complete*: the unit stays unknown.
         """
-        against = None if self._trusted else contradiction(self._profile, self._unit, answers)
         self._contradicts = against is not None
         self._known = self._told(answers) if complete and not self._put_off(answers) else None
         if against is not None and judged:
@@ -120,7 +125,14 @@ class SameUnit:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
         answers: list[Answer] = []
         await self._ask(bus, answers)
-        return contradiction(self._profile, self._unit, answers)
+        return contradiction(self._profile, self._unit, answers) or await self._other(bus, answers)
+
+    async def _other(self, bus: AwaitableBus, answers: Sequence[Answer]) -> str | None:
+        """What speaks against the profile where *answers* are strange: the signature of another family."""
+        if self._put_off(answers) or not is_suspicious(self._profile, answers):
+            return None
+        answered = {answer.address: answer.word is not None for answer in answers}
+        return other_signature(self._profile, self._unit, await shown_by(bus.read, self._unit, answered))
 
     async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:
         """Adds the unit's answers to *answers* as they come, so that a failure of the line leaves the earlier ones."""

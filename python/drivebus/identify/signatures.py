@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable
 
+from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.profile import Profile, profiles
 
-__all__ = ["Signature", "is_shown", "listed", "signature_of"]
+__all__ = ["Read", "Signature", "listed", "shown_by", "signature_of"]
+
+Read = Callable[[int, int], Awaitable[list[int]]]
+"""Asks a unit for the word at an address."""
 
 Signature = dict[str, list[int]]
 """The addresses that a unit `answers`, and those that it `refuses`: see `Profile.signature`."""
@@ -25,8 +29,27 @@ def signature_of(profile: Profile) -> Signature | None:
     return profile.signature() or listed().get(profile.family)
 
 
-def is_shown(signature: Signature, answered: Mapping[int, bool]) -> bool:
-    """Whether a unit shows *signature*, by which addresses it *answered* (True) and which it refused (False)."""
-    return all(answered.get(address) is True for address in signature["answers"]) and all(
-        answered.get(address) is False for address in signature["refuses"]
-    )
+async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
+    """The families whose signature *unit* shows. What was asked stands in *answered*, and what is asked goes there.
+
+    Of a signature no more is asked once the unit does not show it, so that a unit of none of them is asked little.
+    """
+    shown = []
+    for name, signature in listed().items():
+        wanted = [(address, True) for address in signature["answers"]]
+        wanted += [(address, False) for address in signature["refuses"]]
+        for address, yes in wanted:
+            if address not in answered:
+                try:
+                    await read(unit, address)
+                    answered[address] = True
+                except Refused:
+                    answered[address] = False
+                except (NoAnswer, BadAnswer):
+                    # Neither, then: no signature has it.
+                    break
+            if answered[address] is not yes:
+                break
+        else:
+            shown.append(name)
+    return tuple(shown)

@@ -15,6 +15,7 @@ mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+mod ms300;
 pub(crate) mod own;
 mod register;
 mod roles;
@@ -121,7 +122,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 15] = [
+const FAMILIES: [fn() -> Family; 16] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -137,6 +138,7 @@ const FAMILIES: [fn() -> Family; 15] = [
     vfd500::vfd500,
     chf100a::chf100a,
     chf100a::chv100,
+    ms300::ms300,
 ];
 
 impl Family {

@@ -181,6 +181,8 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
     for family in ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }
+    // Its output frequency stands there.
+    assert_eq!(Bench::of("ms300").read::<1>(0x2103), [0]);
 }
 
 #[test]

@@ -1,0 +1,218 @@
+"""Families of other makers, through a whole job: their words typed here by hand, and looked for on the wire.
+
+Where each of them is printed stands in `tests/vectors/families.toml` and in the profiles. The drive is the simulated one, which is
+typed from the manuals apart from the profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import pytest
+
+import drivebus
+from drivebus import Bus, Drive, NotAllowed, Simulator
+
+
+@dataclass(frozen=True)
+class Maker:
+    """What goes over the wire in a job: requests in hex, without unit and CRC."""
+
+    family: str
+    forward: str
+    """Forward at 20 Hz, in one request or two."""
+    reverse: str
+    stop: str
+    reset: str
+    fault: int
+    """A number of its list, and what the keypad shows for it."""
+    shown: str
+    coast: str | None = None
+    prepare: tuple[str, ...] = ()
+    variants: dict[str, str] = field(default_factory=dict)
+    unverified: bool = True
+    """Whether the family has commands that only that lets through."""
+
+
+MAKERS = [
+    Maker(
+        "ms300",
+        prepare=("06 00 15 00 02", "06 00 14 00 01"),
+        forward="10 20 00 00 02 04 00 12 07 d0",
+        reverse="06 20 00 00 22",
+        stop="06 20 00 00 01",
+        reset="06 20 02 00 02",
+        fault=21,
+        shown="oL",
+    ),
+]
+
+each = pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.family)
+
+
+@pytest.fixture
+def line(maker: Maker) -> Iterator[Simulator]:
+    with Simulator({1: maker.family}, transport="process", clock="virtual") as line:
+        yield line
+
+
+@pytest.fixture
+def drive(line: Simulator, maker: Maker) -> Iterator[Drive]:
+    with Bus(line) as bus:
+        yield bus.drive(1, maker.family, unverified=maker.unverified, variants=maker.variants or None)
+
+
+def written(line: Simulator) -> list[str]:
+    """The writes so far, without unit and CRC."""
+    frames = [data for _, who, data in line.line.trace() if who == "master" and data[1] in (0x05, 0x06, 0x10)]
+    return [data[1:-2].hex(" ") for data in frames]
+
+
+@each
+def test_a_whole_job_is_these_bytes(line: Simulator, drive: Drive, maker: Maker) -> None:
+    machine = line.drive(1)
+    drive.prepare_control(store=drive.profile.memory() is None)
+    assert drive.check_control()
+    assert written(line) == [*maker.prepare]
+
+    drive.run(20.0)
+    drive.wait_for_speed(timeout=30.0)
+    assert machine.frequency == pytest.approx(20.0)
+    status = drive.status()
+    assert (status.state, status.fault) == (drivebus.State.FORWARD, None)
+    seen = drive.monitor()
+    assert seen["running_frequency"] == pytest.approx(20.0)
+    assert seen["output_current"] > 0.0
+    drive.run(reverse=True)
+    line.advance(10.0)
+    assert machine.frequency == pytest.approx(-20.0)
+    assert drive.status().state is drivebus.State.REVERSE
+    drive.stop()
+    drive.wait_until_stopped(timeout=30.0)
+    assert machine.speed == 0.0
+    assert written(line) == [*maker.prepare, maker.forward, maker.reverse, maker.stop]
+
+
+@each
+def test_a_fault_is_told_kept_from_starting_and_reset(line: Simulator, drive: Drive, maker: Maker) -> None:
+    drive.prepare_control(store=drive.profile.memory() is None)
+    line.drive(1).trip(maker.fault)
+    fault = drive.fault()
+    assert fault is not None
+    assert (fault.code, fault.mnemonic) == (maker.fault, maker.shown)
+    with pytest.raises(NotAllowed, match="is in fault"):
+        drive.run()
+    drive.reset_fault()
+    assert (drive.fault(), line.drive(1).fault) == (None, 0)
+    # A second time there is nothing to reset, and nothing is sent.
+    drive.reset_fault()
+    assert written(line) == [*maker.prepare, maker.reset]
+
+
+@each
+def test_it_coasts_where_a_word_for_that_is_known(line: Simulator, drive: Drive, maker: Maker) -> None:
+    drive.prepare_control(store=drive.profile.memory() is None)
+    drive.run(20.0)
+    line.advance(5.0)
+    before = written(line)
+    if maker.coast is None:
+        with pytest.raises(NotAllowed, match="no command coast"):
+            drive.coast()
+        assert written(line) == before
+        return
+    drive.coast()
+    assert (line.drive(1).frequency, line.drive(1).speed > 0.0) == (0.0, True)
+    assert written(line) == [*before, maker.coast]
+
+
+@each
+def test_nothing_goes_out_that_no_document_of_it_prints(line: Simulator, maker: Maker) -> None:
+    if not maker.unverified:
+        return
+    with Bus(line) as bus:
+        for write in (Drive.run, Drive.jog):
+            with pytest.raises(NotAllowed):
+                write(bus.drive(1, maker.family))
+    assert written(line) == []
+
+
+class TestDelta:
+    """MS300 manual (easymanua.ls delta vfd2a8ms21ansaa), p. 799; the bits of 2000H: CP2000 manual, p. 514."""
+
+    @pytest.fixture
+    def line(self) -> Iterator[Simulator]:
+        with Simulator({1: "ms300"}, transport="process", clock="virtual") as line:
+            yield line
+
+    @staticmethod
+    def turning(line: Simulator, bus: Bus, hertz: float) -> None:
+        drive = bus.drive(1, "ms300", unverified=True)
+        drive.prepare_control(store=True)
+        drive.run(hertz)
+        line.advance(10.0)
+
+    def test_it_is_known_by_its_answers(self, line: Simulator) -> None:
+        with Bus(line) as bus:
+            found = bus.identify(1)
+        assert (found.family, found.certainty) == ("ms300", "by answers")
+        asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
+        assert list(dict.fromkeys(asked)) == ["2103", "1900", "2104", "2106", "3000"]
+
+    @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])
+    def test_at_a_frequency_that_reads_as_a_code_it_is_not_surely_another(
+        self, line: Simulator, hertz: float, word: int
+    ) -> None:
+        with Bus(line) as bus:
+            self.turning(line, bus, hertz)
+            assert bus.read(1, 0x2103) == [word]
+            found = bus.identify(1)
+            assert found.certainty == "unverified"
+            assert "says 0 at 2100H" in found.reason
+            before = written(line)
+            with pytest.raises(NotAllowed, match="could not be identified for sure"):
+                bus.drive(1)
+        assert written(line) == before
+
+    @pytest.mark.parametrize("named", ["gd350", "gd35", "gd300", "gd600", "gd3000", "chf100a", "chv100"])
+    def test_named_as_another_it_gets_no_reset(self, line: Simulator, named: str) -> None:
+        """7 has the bits of "jog and run". 4 (GFF) at 2100H reads as the state "fault" of an INVT drive."""
+        line.drive(1).trip(4)
+        with Bus(line) as bus:
+            drive = bus.drive(1, named, unverified=True)
+            with pytest.raises((NotAllowed, drivebus.Refused)):
+                drive.reset_fault()
+            told = drive.contradiction()
+        assert told is not None
+        assert "it answers and refuses what a Delta MS300 (ms300) does" in told
+        assert written(line) == []
+
+    def test_what_coasts_a_goodrive_runs_it(self, line: Simulator) -> None:
+        """Why the right profile matters: `coast` asks nothing before it is sent."""
+        with Bus(line) as bus:
+            bus.drive(1, "ms300", unverified=True).prepare_control(store=True)
+            bus.write(1, 0x2001, 1000)
+            bus.write(1, 0x2000, 6, force=True)
+            line.advance(1.0)
+            assert line.drive(1).state == "forward"
+
+    @pytest.mark.parametrize(("word", "fault", "warning"), [(0x3500, 0, "53"), (0x3504, 4, "53"), (0x0015, 21, "0")])
+    def test_a_warning_is_no_fault(self, word: int, fault: int, warning: str) -> None:
+        profile = drivebus.Profile.builtin("ms300")
+        assert profile.fault_number(word) == fault
+        assert profile.fields("fault_code", word)["warning"] == warning
+
+    def test_a_warning_keeps_nobody_from_starting(self, line: Simulator, monkeypatch: pytest.MonkeyPatch) -> None:
+        with Bus(line) as bus:
+            drive = bus.drive(1, "ms300", unverified=True)
+            drive.prepare_control(store=True)
+            stamped = bus.read_stamped
+
+            def warned(unit: int, address: int, count: int = 1, /, **how: bool) -> tuple[list[int], float, float]:
+                words, sent, came = stamped(unit, address, count, **how)
+                return [word | 0x3500 if address + at == 0x2100 else word for at, word in enumerate(words)], sent, came
+
+            monkeypatch.setattr(bus, "read_stamped", warned)
+            drive.run(20.0)
+            assert drive.status().fault is None
+            assert drive.fault() is None
