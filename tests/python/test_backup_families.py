@@ -22,7 +22,13 @@ def parameters(family: str) -> list[str]:
     return [name for name in profile.names() if profile.describe(name).kind == "parameter"]
 
 
-WITH = [family for family in drivebus.profiles() if parameters(family)]
+def can_be_set(family: str) -> bool:
+    """Not so of an A1000: what is written to it takes an Enter command, which nobody gives here."""
+    profile = drivebus.Profile.builtin(family)
+    return any(profile.describe(name).writable for name in parameters(family))
+
+
+WITH = [family for family in drivebus.profiles() if can_be_set(family)]
 WITHOUT = [family for family in drivebus.profiles() if not parameters(family)]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from drivebus import Bus, Drive, NotAllowed, Simulator
+from drivebus import Bus, Drive, NotAllowed, Profile, Simulator
 
 from .test_families import COMMANDS, FAMILIES, given, place_of
 
@@ -50,8 +50,8 @@ def line(family: dict[str, Any]) -> Iterator[tuple[Simulator, Bus]]:
 
 
 def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
-    """Unit 1; a VFD500 is told what unit its speed has, as its manual does not print the numbers of P30.14."""
-    if family == "vfd500":
+    """Unit 1; one whose speed has a unit that a parameter decides is told which, as no page prints the numbers of that."""
+    if Profile.builtin(family).variants():
         return bus.drive(1, family, unverified=unverified, variants={"speed_unit": "Hz"})
     return bus.drive(1, family, unverified=unverified)
 
@@ -62,7 +62,10 @@ def prepare(drive: Drive) -> None:
 
 
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
-    """Address and word of all that was written where any family takes commands."""
+    """Address and word of all that was written where any family takes commands, and the unit itself has no parameter."""
+    profile = Profile.builtin(simulator.drive(1).profile)
+    rows = (profile.describe(name) for name in profile.names())
+    registers = REGISTERS - {row.address for row in rows if row.kind == "parameter"}
     found = []
     for _, sender, frame in simulator.line.trace():
         if sender != "master" or frame[1] not in (0x06, 0x10):
@@ -70,7 +73,7 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
         address = int.from_bytes(frame[2:4], "big")
         data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
         words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
-        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in REGISTERS]
+        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in registers]
     return found
 
 

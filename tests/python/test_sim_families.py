@@ -30,6 +30,7 @@ FAMILIES = {
     14: "gd100",
     15: "gd200a",
     16: "ms300",
+    17: "a1000",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

@@ -28,11 +28,11 @@ from drivebus.cli import cli
 
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
 
-SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"]
+SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100", "a1000"]
 """The families whose units refuse 2103H."""
 
-NOT_A_VFD500 = [family for family in SILENT_ON_CODES if family != "vfd500"]
-"""Those of them that a family with a state or a fault word is taken for: a VFD500 has no such word there."""
+NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in ("vfd500", "a1000")]
+"""Those of them that a family with a state or a fault word is taken for: who refuses that word and has a signature is told by it."""
 
 TAKEN_FOR: dict[str, list[str]] = {
     # These have a code: one that says another, or refuses to say one, is none of them.
@@ -48,13 +48,15 @@ TAKEN_FOR: dict[str, list[str]] = {
     "vfd500": ["vfd500"],
     # And this one 2104H and 2106H.
     "ms300": ["ms300"],
+    # And this one 004BH and 0034H.
+    "a1000": ["a1000"],
     # Of these nothing is known that they must say; a code gives another one away, or strange words and a signature.
-    "gd600": NOT_A_VFD500,
+    "gd600": NO_SIGNATURE,
     "gd600-rectifier": SILENT_ON_CODES,
-    "gd3000": NOT_A_VFD500,
+    "gd3000": NO_SIGNATURE,
     "gd3000-rectifier": SILENT_ON_CODES,
-    "chf100a": NOT_A_VFD500,
-    "chv100": NOT_A_VFD500,
+    "chf100a": NO_SIGNATURE,
+    "chv100": NO_SIGNATURE,
 }
 """What each profile may be named for without being contradicted."""
 
@@ -120,7 +122,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 256
+    assert len(PAIRS) == 289
 
 
 @every_pair

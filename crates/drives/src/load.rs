@@ -138,7 +138,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 16] = [
+static BUILTINS: [Builtin; 17] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -155,6 +155,7 @@ static BUILTINS: [Builtin; 16] = [
     builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("ms300": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

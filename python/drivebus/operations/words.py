@@ -13,6 +13,8 @@ from drivebus.values import State
 
 __all__ = ["explained", "read_words", "send", "write", "write_words"]
 
+_WRITE_ONE = 0x06
+
 _LOCKED = ("password_error", "password_protected")
 """What INVT's families call the exceptions that have to do with the user password."""
 
@@ -84,7 +86,12 @@ async def send(
     connection: int | None = None,
     force: bool = False,
 ) -> None:
-    """Writes to whatever unit answers at the address: for a stop, which asks nothing before."""
+    """Writes to whatever unit answers at the address: for a stop, which asks nothing before.
+
+    A drive that knows no 06H gets a single word by 10H.
+    """
+    if isinstance(value, int) and _WRITE_ONE not in unit.profile.functions:
+        value = [value]
     # What a bus of somebody's own must know is the rest: only a raw write is ever forced.
     forced = {"force": True} if force else {}
     with explained(unit):

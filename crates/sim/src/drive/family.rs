@@ -9,6 +9,7 @@
 //!
 //! What the manuals at hand leave open is marked "Assumption:" where it is decided.
 
+mod a1000;
 mod chf100a;
 mod gd200a;
 mod gd300;
@@ -122,7 +123,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 16] = [
+const FAMILIES: [fn() -> Family; 17] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -139,6 +140,7 @@ const FAMILIES: [fn() -> Family; 16] = [
     chf100a::chf100a,
     chf100a::chv100,
     ms300::ms300,
+    a1000::a1000,
 ];
 
 impl Family {
