@@ -50,7 +50,7 @@ def line(family: dict[str, Any]) -> Iterator[tuple[Simulator, Bus]]:
 
 
 def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
-    """Unit 1; one whose speed has a unit that a parameter decides is told which, as no page prints the numbers of that."""
+    """Unit 1; one whose speed has a unit that a parameter decides is told which: no page prints the numbers of that."""
     if Profile.builtin(family).variants():
         return bus.drive(1, family, unverified=unverified, variants={"speed_unit": "Hz"})
     return bus.drive(1, family, unverified=unverified)
@@ -62,7 +62,7 @@ def prepare(drive: Drive) -> None:
 
 
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
-    """Address and word of all that was written where any family takes commands, and the unit itself has no parameter."""
+    """Address and word of all that was written where a family takes commands and the unit itself has no parameter."""
     profile = Profile.builtin(simulator.drive(1).profile)
     rows = (profile.describe(name) for name in profile.names())
     registers = REGISTERS - {row.address for row in rows if row.kind == "parameter"}

@@ -1,7 +1,7 @@
 """Families of other makers, through a whole job: their words typed here by hand, and looked for on the wire.
 
-Where each of them is printed stands in `tests/vectors/families.toml` and in the profiles. The drive is the simulated one, which is
-typed from the manuals apart from the profile.
+Where each of them is printed stands in `tests/vectors/families.toml` and in the profiles. The drive is the simulated
+one, which is typed from the manuals apart from the profile.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class Maker:
     """What goes over the wire in a job: requests in hex, without unit and CRC."""
 
     family: str
-    forward: str
-    """Forward at 20 Hz, in one request or two."""
+    forward: tuple[str, ...]
+    """Forward at 20 Hz, in one request or two; or as its keypad has it, if no setpoint is known."""
     reverse: str
     stop: str
     reset: str
@@ -32,6 +32,10 @@ class Maker:
     prepare: tuple[str, ...] = ()
     forward_alone: str | None = None
     """Forward, as it was set."""
+    hertz: float | None = 20.0
+    """What it is set to; None where it turns at the 50 Hz of its keypad."""
+    jogs: tuple[str, str] | None = None
+    """A jog forward, and its end."""
     variants: dict[str, str] = field(default_factory=dict)
     unverified: bool = True
     """Whether something of the job needs that."""
@@ -43,7 +47,7 @@ MAKERS = [
     Maker(
         "ms300",
         prepare=("06 00 15 00 02", "06 00 14 00 01"),
-        forward="10 20 00 00 02 04 00 12 07 d0",
+        forward=("10 20 00 00 02 04 00 12 07 d0",),
         reverse="06 20 00 00 22",
         stop="06 20 00 00 01",
         reset="06 20 02 00 02",
@@ -53,7 +57,7 @@ MAKERS = [
     Maker(
         "a1000",
         variants={"speed_unit": "Hz"},
-        forward="10 00 01 00 02 04 00 01 07 d0",
+        forward=("10 00 01 00 02 04 00 01 07 d0",),
         reverse="10 00 01 00 01 02 00 02",
         stop="10 00 01 00 01 02 00 00",
         reset="10 00 01 00 01 02 00 08",
@@ -62,6 +66,50 @@ MAKERS = [
         unverified=True,
         sure=True,
         forward_alone="10 00 01 00 01 02 00 01",
+    ),
+    Maker(
+        "saj8000m",
+        hertz=None,
+        forward=("06 10 00 00 01",),
+        reverse="06 10 00 00 02",
+        stop="06 10 00 00 05",
+        coast="06 10 00 00 06",
+        jogs=("06 10 00 00 03", "06 10 00 00 08"),
+        reset="06 10 00 00 07",
+        fault=4,
+        shown="",
+        # Its frequency and current stand where those of a CHF100A do, which is assumed.
+        unverified=True,
+        sure=True,
+        forward_alone="06 10 00 00 01",
+    ),
+    Maker(
+        "eds300",
+        forward=("06 20 01 07 d0", "06 20 00 00 07"),
+        reverse="06 20 00 00 08",
+        stop="06 20 00 00 06",
+        jogs=("06 20 00 00 03", "06 20 00 00 02"),
+        reset="06 20 00 00 09",
+        fault=8,
+        shown="E008",
+        # The range of its setpoint is not printed.
+        unverified=True,
+        sure=True,
+        forward_alone="06 20 00 00 07",
+    ),
+    Maker(
+        "sunfar-e300",
+        forward=("10 10 01 00 02 04 00 01 00 c8",),
+        reverse="06 10 01 00 02",
+        stop="06 10 01 00 03",
+        jogs=("06 10 01 00 04", "06 10 01 00 06"),
+        reset="06 10 01 00 20",
+        fault=12,
+        shown="",
+        # The range of its setpoint is not printed.
+        unverified=True,
+        sure=True,
+        forward_alone="06 10 01 00 01",
     ),
 ]
 
@@ -86,6 +134,11 @@ def written(line: Simulator) -> list[str]:
     return [data[1:-2].hex(" ") for data in frames]
 
 
+def words_in(frames: list[str]) -> int:
+    """How many words these requests write."""
+    return sum(1 if frame.startswith("06") else int(frame[9:14].replace(" ", ""), 16) for frame in frames)
+
+
 @each
 def test_a_whole_job_is_these_bytes(line: Simulator, drive: Drive, maker: Maker) -> None:
     machine = line.drive(1)
@@ -93,22 +146,29 @@ def test_a_whole_job_is_these_bytes(line: Simulator, drive: Drive, maker: Maker)
     assert drive.check_control()
     assert written(line) == [*maker.prepare]
 
-    drive.run(20.0)
-    drive.wait_for_speed(timeout=30.0)
-    assert machine.frequency == pytest.approx(20.0)
+    turning = 50.0 if maker.hertz is None else maker.hertz
+    drive.run(maker.hertz)
+    drive.wait_for_speed(turning, timeout=30.0)
+    assert machine.frequency == pytest.approx(turning)
+    assert written(line) == [*maker.prepare, *maker.forward]
     status = drive.status()
     assert (status.state, status.fault) == (drivebus.State.FORWARD, None)
     seen = drive.monitor()
-    assert seen["running_frequency"] == pytest.approx(20.0)
+    assert seen["running_frequency"] == pytest.approx(turning)
     assert seen["output_current"] > 0.0
     drive.run(reverse=True)
-    line.advance(10.0)
-    assert machine.frequency == pytest.approx(-20.0)
+    line.advance(25.0)
+    assert machine.frequency == pytest.approx(-turning)
     assert drive.status().state is drivebus.State.REVERSE
     drive.stop()
     drive.wait_until_stopped(timeout=30.0)
     assert machine.speed == 0.0
-    assert written(line) == [*maker.prepare, maker.forward, maker.reverse, maker.stop]
+    # The line keeps the latest frames.
+    assert written(line)[-2:] == [maker.reverse, maker.stop]
+    assert [word for *_, word in machine.writes()][-2:] == [
+        int(sent[-5:].replace(" ", ""), 16) for sent in written(line)[-2:]
+    ]
+    assert machine.words_written == 2 + words_in([*maker.prepare, *maker.forward])
 
 
 @each
@@ -135,7 +195,7 @@ def test_a_fault_is_told_kept_from_starting_and_reset(line: Simulator, drive: Dr
 @each
 def test_it_coasts_where_a_word_for_that_is_known(line: Simulator, drive: Drive, maker: Maker) -> None:
     drive.prepare_control(store=drive.profile.memory() is None)
-    drive.run(20.0)
+    drive.run(maker.hertz)
     line.advance(5.0)
     before = written(line)
     if maker.coast is None:
@@ -146,6 +206,23 @@ def test_it_coasts_where_a_word_for_that_is_known(line: Simulator, drive: Drive,
     drive.coast()
     assert (line.drive(1).frequency, line.drive(1).speed > 0.0) == (0.0, True)
     assert written(line) == [*before, maker.coast]
+
+
+@each
+def test_it_jogs_where_words_for_that_are_known(line: Simulator, drive: Drive, maker: Maker) -> None:
+    drive.prepare_control(store=drive.profile.memory() is None)
+    before = written(line)
+    if maker.jogs is None:
+        with pytest.raises(NotAllowed, match="no command jog_forward"):
+            drive.jog()
+        assert written(line) == before
+        return
+    drive.jog()
+    line.advance(2.0)
+    assert (line.drive(1).state, line.drive(1).frequency) == ("forward", pytest.approx(5.0))
+    drive.jog_stop()
+    drive.wait_until_stopped(timeout=30.0)
+    assert written(line) == [*before, *maker.jogs]
 
 
 @each
@@ -183,7 +260,7 @@ class TestDelta:
             found = bus.identify(1)
         assert (found.family, found.certainty) == ("ms300", "by answers")
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
-        assert list(dict.fromkeys(asked)) == ["2103", "1900", "2104", "2106", "3000", "004b"]
+        assert list(dict.fromkeys(asked)) == ["2103", "1900", "2104", "2106", "3000", "004b", "2180", "d000"]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])
     def test_at_a_frequency_that_reads_as_a_code_it_is_not_surely_another(

@@ -18,9 +18,9 @@ FAMILIES = drivebus.profiles()
 RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
-READ_ONLY = {"vfd500": 0x04, "ms300": 0x02, "a1000": 0x02}
+READ_ONLY = {"vfd500": 0x04, "eds300": 0x05, **dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300"], 0x02)}
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
-OUT_OF_RANGE = {"ms300": 0x03, "a1000": 0x03}
+OUT_OF_RANGE = dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300"], 0x03)
 """And a value that is out of range, where it is not their 04H."""
 
 PASSWORD = "P07.00"

@@ -31,6 +31,9 @@ FAMILIES = {
     15: "gd200a",
     16: "ms300",
     17: "a1000",
+    18: "saj8000m",
+    19: "eds300",
+    20: "sunfar-e300",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -114,6 +117,8 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
             assert read(bus, family, 0x2103) == [codes[family]]
         elif family == "ms300":  # its output frequency: manual, p. 799
             assert read(bus, family, 0x2103) == [0]
+        elif family == "eds300":  # 03H says that there is no such address: manual, p. 45
+            assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x03
         else:
             assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x02, family
 
@@ -217,11 +222,13 @@ def test_what_is_meant_for_another_family_reaches_nothing(simulator: Simulator, 
 
 def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
-        if family in ("chf100a", "ms300"):  # their manuals name 03H and 06H (p. 107), and 10H too (p. 1020)
-            assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == 0x01
+        unknown = 0x02 if family == "eds300" else 0x01  # manual, p. 45
+        # Their manuals have 03H and 06H, some of them 10H, and no others.
+        if family in ("chf100a", "ms300", "saj8000m", "eds300", "sunfar-e300"):
+            assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
-        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == 0x01, family
+        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == unknown, family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):
         assert refusal(bus, family, write_many) == 0x01, family

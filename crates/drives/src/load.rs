@@ -138,7 +138,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 17] = [
+static BUILTINS: [Builtin; 20] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -156,6 +156,9 @@ static BUILTINS: [Builtin; 17] = [
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("ms300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("sunfar-e300": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

@@ -167,6 +167,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("a1000", 20),
         ("chf100a", 27),
         ("chv100", 24),
+        ("eds300", 16),
         ("gd10", 81),
         ("gd100", 94),
         ("gd20", 92),
@@ -180,6 +181,8 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gd600", 15),
         ("gd600-rectifier", 0),
         ("ms300", 17),
+        ("saj8000m", 14),
+        ("sunfar-e300", 6),
         ("vfd500", 47),
     ];
     assert_eq!(all, expected.into());

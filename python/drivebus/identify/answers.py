@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from drivebus.profile import Profile
 
-__all__ = ["LOCKED", "UNREACHED", "Answer", "no_such_address", "tells_nothing"]
+__all__ = ["LOCKED", "UNREACHED", "Answer", "no_such_address", "passes", "tells_nothing"]
 
 _ILLEGAL_ADDRESS = 0x02
 """In the Modbus specification, and under this name in the profiles that list their exceptions."""
@@ -39,7 +39,12 @@ def no_such_address(profile: Profile, exception: int) -> bool:
     return exception == _ILLEGAL_ADDRESS or name == "illegal_address"
 
 
+def passes(answer: Answer) -> bool:
+    """Whether *answer* is a refusal that passes, whatever the unit is."""
+    return answer.exception in _PASSING
+
+
 def tells_nothing(profile: Profile, answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, and so tells nothing of a unit of *profile*."""
     code = answer.exception
-    return code is not None and (code in _PASSING or profile.exception(code)[0] == _DAMAGED)
+    return code is not None and (passes(answer) or profile.exception(code)[0] == _DAMAGED)

@@ -69,12 +69,11 @@ def _is_known_by_something(profile: Profile) -> bool:
 def _surprises(profile: Profile, answer: Answer, refused: tuple[int, ...]) -> bool:
     """Whether *answer* is not what a unit of *profile* says there; at *refused* it has nothing."""
     if answer.word is None:
-        return (
-            answer.address not in refused
-            and profile.name_at(answer.address) is not None
-            and answer.exception is not None
-            and no_such_address(profile, answer.exception)
-        )
+        lacks = answer.exception is not None and no_such_address(profile, answer.exception)
+        if profile.name_at(answer.address) is None:
+            # It has nothing there, as is right, and says so in the words of another family.
+            return not lacks
+        return answer.address not in refused
     if answer.address in refused:
         return True
     if answer.address in codes.registers():

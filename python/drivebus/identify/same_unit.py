@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
 from drivebus.identify import codes
-from drivebus.identify.answers import Answer, tells_nothing
+from drivebus.identify.answers import Answer, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
 from drivebus.identify.signatures import shown_by, signature_of
 from drivebus.line.protocols import AwaitableBus
@@ -129,9 +129,10 @@ class SameUnit:
 
     async def _other(self, bus: AwaitableBus, answers: Sequence[Answer]) -> str | None:
         """What speaks against the profile where *answers* are strange: the signature of another family."""
-        if self._put_off(answers) or not is_suspicious(self._profile, answers):
+        if any(map(passes, answers)) or not is_suspicious(self._profile, answers):
             return None
-        answered = {answer.address: answer.word is not None for answer in answers}
+        told = [answer for answer in answers if not tells_nothing(self._profile, answer)]
+        answered = {answer.address: answer.word is not None for answer in told}
         return other_signature(self._profile, self._unit, await shown_by(bus.read, self._unit, answered))
 
     async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:

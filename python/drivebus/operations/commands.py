@@ -39,8 +39,8 @@ _MAY = {
 
 _WHATEVER_IT_IS = ("reset_fault",)
 """Commands that are given to a unit that contradicts its profile too, as those that halt are: whether a drive gets out
-of a fault shall not depend on a name. It has shown that fault in the words of the profile. One that behaves as a unit of
-another family gets none: that word may start its motor."""
+of a fault shall not depend on a name. It has shown that fault in the words of the profile. One that behaves as a unit
+of another family gets none: that word may start its motor."""
 
 HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""

@@ -11,6 +11,7 @@
 
 mod a1000;
 mod chf100a;
+mod eds300;
 mod gd200a;
 mod gd300;
 mod gd3000;
@@ -20,6 +21,8 @@ mod ms300;
 pub(crate) mod own;
 mod register;
 mod roles;
+mod saj8000m;
+mod sunfar;
 mod unlisted;
 mod vfd500;
 
@@ -123,7 +126,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 17] = [
+const FAMILIES: [fn() -> Family; 20] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -141,6 +144,9 @@ const FAMILIES: [fn() -> Family; 17] = [
     chf100a::chv100,
     ms300::ms300,
     a1000::a1000,
+    saj8000m::saj8000m,
+    eds300::eds300,
+    sunfar::e300,
 ];
 
 impl Family {
