@@ -15,7 +15,10 @@ from drivebus import Bus, Drive, NoAnswer, NotAllowed, Profile, Simulator
 from drivebus.discovery.walk import LAST, Walk
 from drivebus.sim import FAULT_KINDS
 
-FAMILIES = sorted(drivebus.profiles())
+LISTED = ["a1000", "eds300", "ms300", "saj8000m", "sunfar-e300"]
+"""Families whose codes do not tell their addresses."""
+
+FAMILIES = sorted({*drivebus.profiles()} - {*LISTED})
 MOST = {"gd350": 9_900, "vfd500": 10_400}
 """Reads: one for each number that is not there, and some for each run."""
 
@@ -144,6 +147,14 @@ def test_what_was_found_is_a_profile_to_go_on_with(tmp_path: Path) -> None:
         own.write("P05.22", 9, unverified=True)
         # RAM alone, by the family's rule.
         assert [(address, word) for _, address, word in simulator.drive(1).writes()] == [(0x8516, 9)]
+
+
+@pytest.mark.parametrize("family", LISTED)
+def test_where_codes_tell_no_address_nothing_is_asked(family: str) -> None:
+    with of(family) as (simulator, drive):
+        with pytest.raises(NotAllowed, match="do not tell addresses"):
+            drive.discover()
+        assert simulator.line.requests == 0
 
 
 COMMANDED = [name for name in FAMILIES if Profile.builtin(name).command_address is not None]

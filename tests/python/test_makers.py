@@ -219,7 +219,8 @@ def test_it_jogs_where_words_for_that_are_known(line: Simulator, drive: Drive, m
         return
     drive.jog()
     line.advance(2.0)
-    assert (line.drive(1).state, line.drive(1).frequency) == ("forward", pytest.approx(5.0))
+    assert line.drive(1).state == "forward"
+    assert line.drive(1).frequency == pytest.approx(5.0)
     drive.jog_stop()
     drive.wait_until_stopped(timeout=30.0)
     assert written(line) == [*before, *maker.jogs]

@@ -27,8 +27,9 @@ class Families:
 
     A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed: any
     that has all registers that it is asked for and does not refuse. Where several have them, names are those on which
-    they agree, so a guess stays where the next request brings a register on which they differ. Where no family has all
-    of them any more, it is taken back; see `withdrawn`.
+    they agree, so a guess stays where the next request brings a register on which they differ. A family that is told by
+    what its units answer is guessed only when they were asked for that, if another fits too: makers use the same
+    addresses. Where no family has all of them any more, it is taken back; see `withdrawn`.
 
     Args:
         given: A profile for each unit by its address, one for all, or None.
@@ -47,6 +48,7 @@ class Families:
         self._told: dict[int, Profile] = {}
         self._asked: dict[int, set[int]] = {}
         self._fitting: dict[int, tuple[Profile, ...]] = {}
+        self._likely: dict[int, tuple[Profile, ...]] = {}
         self._agreed: dict[tuple[int, int, int], bool] = {}
         self._withdrawn: list[tuple[int, str, int]] = []
 
@@ -55,7 +57,7 @@ class Families:
         known = self._given.get(unit) or self._all or self._told.get(unit)
         if known is not None:
             return known
-        fitting = self._fitting.get(unit, ())
+        fitting = self._likely.get(unit, ())
         if not fitting or (request is not None and not self._agree(fitting, request)):
             return None
         return fitting[0]
@@ -122,6 +124,7 @@ class Families:
             return
         able = [Profile.builtin(name) for name in profiles()] if before is None else before
         self._fitting[unit] = fitting = tuple(each for each in able if None not in _meant(each, asked))
+        self._likely[unit] = tuple(each for each in fitting if _shows_itself(each, asked)) or fitting
         self._agreed.clear()
         if before and not fitting:
             self._withdrawn.append((unit, before[0].name, _misfit(before[0], new)))
@@ -136,6 +139,12 @@ class Families:
         if key not in self._agreed:
             self._agreed[key] = len({_meant(each, range(first, first + count)) for each in fitting}) == 1
         return self._agreed[key]
+
+
+def _shows_itself(profile: Profile, asked: set[int]) -> bool:
+    """Whether nothing else is known by which *profile* is told, or some of that is among what was *asked*."""
+    signature = profile.signature()
+    return signature is None or not asked.isdisjoint(signature["answers"])
 
 
 def _misfit(profile: Profile, addresses: set[int]) -> int:
