@@ -13,7 +13,7 @@ from drivebus.values import State
 
 __all__ = ["explained", "read_words", "send", "write", "write_words"]
 
-_WRITE_ONE = 0x06
+_WRITE_ONE, _WRITE_MANY = 0x06, 0x10
 
 _LOCKED = ("password_error", "password_protected")
 """What INVT's families call the exceptions that have to do with the user password."""
@@ -31,7 +31,7 @@ async def read_words(
 
 
 async def write_words(unit: Unit, address: int, value: int | Sequence[int], force: bool = False) -> None:
-    """Writes one word (an int: 06H) or several (a sequence: 10H) by address, as they are. Sent once.
+    """Writes one word (an int: 06H, or 10H where there is no 06H) or several (a sequence: 10H), as they are. Sent once.
 
     As `Bus.write`, but another drive that answers at this address gets nothing, and a refusal says what this family
     means by it. A word in the command register moves the motor.
@@ -90,7 +90,8 @@ async def send(
 
     A drive that knows no 06H gets a single word by 10H.
     """
-    if isinstance(value, int) and _WRITE_ONE not in unit.profile.functions:
+    functions = unit.profile.functions
+    if isinstance(value, int) and _WRITE_ONE not in functions and _WRITE_MANY in functions:
         value = [value]
     # What a bus of somebody's own must know is the rest: only a raw write is ever forced.
     forced = {"force": True} if force else {}
