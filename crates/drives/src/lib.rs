@@ -65,6 +65,7 @@ mod parts;
 mod plan;
 mod profile;
 mod quantity;
+mod scale;
 mod text;
 mod value;
 

@@ -146,7 +146,7 @@ impl Profile {
         self.entries.iter()
     }
 
-    /// The entry that is read at `address`.
+    /// The entry that is read at `address`, or that is only written there.
     pub fn entry_at(&self, address: u16) -> Option<&Entry> {
         self.by_address.get(&address).and_then(|&index| self.entries.get(index))
     }

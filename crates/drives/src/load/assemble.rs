@@ -293,7 +293,7 @@ fn in_unit(
     problems: &mut Problems,
 ) -> Option<String> {
     let entry = entries.get(file, wanted, problems)?;
-    if entry.quantity.unit != unit || entry.quantity.decimals.is_none() {
+    if entry.quantity.unit != unit || entry.quantity.scale.is_none() {
         let reason = format!("{} must be in {unit}, with a scale that is known", wanted.get_ref());
         problems.add(file, line(file, wanted), reason);
     }

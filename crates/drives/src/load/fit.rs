@@ -45,7 +45,7 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
         }
     };
     for &address in profile.command_registers().keys() {
-        one_word("the command register", profile.entry_at(address), Access::Ro);
+        one_word("the command register", profile.written_entry_at(address), Access::Ro);
     }
     for setpoint in profile.setpoints.values() {
         one_word("a setpoint", profile.entry(&setpoint.register), Access::Ro);

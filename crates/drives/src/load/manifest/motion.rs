@@ -2,6 +2,7 @@
 //! happens when the bus falls silent.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::Deserialize;
 
@@ -154,8 +155,8 @@ pub(in crate::load) struct VariantChoice {
     /// The unit; empty for a plain number.
     #[serde(default)]
     pub(in crate::load) unit: String,
-    /// Counts in one unit.
-    pub(in crate::load) scale: u32,
+    /// Counts in one unit: 1, 10, 100, 1000 or 10000; or so many counts in so many units, as text: `"16384/100"`.
+    pub(in crate::load) scale: Scale,
     /// Whether the word is two's complement.
     #[serde(default)]
     pub(in crate::load) signed: bool,
@@ -163,6 +164,25 @@ pub(in crate::load) struct VariantChoice {
     pub(in crate::load) low: Option<f64>,
     /// The highest value, in the unit.
     pub(in crate::load) high: Option<f64>,
+}
+
+/// Counts in one unit, or in several.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[cfg_attr(test, schemars(inline))]
+#[serde(untagged, expecting = "scale must be a number, or a ratio as text such as \"16384/100\"")]
+pub(in crate::load) enum Scale {
+    Number(u32),
+    Ratio(String),
+}
+
+impl fmt::Display for Scale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(counts) => write!(f, "{counts}"),
+            Self::Ratio(text) => write!(f, "\"{text}\""),
+        }
+    }
 }
 
 /// What makes the drive act by itself when the bus falls silent.
