@@ -3,7 +3,8 @@
 //! Everything a file can have wrong is found here, with file, line and reason; a `Profile` that exists is consistent.
 //! `manifest` knows the shape of `profile.toml`, `placed` where its values stand, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
 //! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
-//! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
+//! `inherit` what may be trusted of that, `facts`, `motion` and
+//! `sequence` the tables of `profile.toml`, `words` the words that bit fields make, `assemble` what must agree
 //! between them, `sense` what cannot be meant, `fit` whether what came from below still fits.
 
 mod assemble;
@@ -17,9 +18,11 @@ mod placed;
 mod problems;
 mod rows;
 mod sense;
+mod sequence;
 mod shape;
 mod succeed;
 mod table;
+mod words;
 
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};

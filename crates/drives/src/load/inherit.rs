@@ -62,6 +62,7 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
             base.command_address = None;
             base.commands.clear();
             base.other_commands.clear();
+            base.start_sequence.clear();
         }
         base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != place));
         for entry in &mut base.entries {
