@@ -453,6 +453,8 @@ class Profile:
         """Every code that the family defines at its command register."""
     def command_registers(self) -> dict[int, dict[int, str]]:
         """Every register that takes commands, with its codes."""
+    def start_sequence(self) -> list[dict[str, Any]]:
+        """The words before a run: `word`, `label`, `until`, `mask`, `value`."""
     @property
     def command_address(self) -> int | None: ...
     def stored_address(self, address: int, /) -> int | None:

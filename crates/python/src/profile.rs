@@ -292,6 +292,10 @@ impl Profile {
         self.0.command_registers()
     }
 
+    fn start_sequence<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        tables::start_sequence(py, &self.0)
+    }
+
     #[getter]
     fn command_address(&self) -> Option<u16> {
         self.0.command_address()

@@ -162,6 +162,24 @@ pub(crate) fn items<'py>(py: Python<'py>, profile: &Profile, rows: &[Control]) -
     rows.collect()
 }
 
+/// The words before a run.
+pub(crate) fn start_sequence<'py>(py: Python<'py>, profile: &Profile) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let steps = profile.start_sequence().iter().map(|step| {
+        let until = PyDict::new(py);
+        for field in &step.until {
+            until.set_item(&field.field, field.value >> field.mask.trailing_zeros())?;
+        }
+        let dict = PyDict::new(py);
+        dict.set_item("word", step.word)?;
+        dict.set_item("label", &step.label)?;
+        dict.set_item("until", until)?;
+        dict.set_item("mask", step.until.iter().fold(0, |mask, field| mask | field.mask))?;
+        dict.set_item("value", step.until.iter().fold(0, |value, field| value | field.value))?;
+        Ok(dict)
+    });
+    steps.collect()
+}
+
 pub(crate) fn variants<'py>(py: Python<'py>, profile: &Profile) -> Table<'py> {
     let all = PyDict::new(py);
     for (name, variant) in profile.variants() {

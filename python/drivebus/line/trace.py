@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import rtu
 from drivebus.errors import DrivebusError
-from drivebus.line.write_guard import KnownUnits
+from drivebus.line.write_guard import KnownUnits, code_text
 from drivebus.profile import Profile
 from drivebus.values import Choice, Description
 
@@ -199,7 +199,7 @@ def _value(row: Description, words: list[int], profile: Profile) -> str:
     codes = None if row.address is None or is_state else profile.command_registers().get(row.address)
     if codes is not None:
         meant = codes.get(words[0])
-        return f"{words[0]}" if meant is None else f"{words[0]} ({meant.replace('_', ' ')})"
+        return code_text(words[0]) if meant is None else f"{code_text(words[0])} ({meant.replace('_', ' ')})"
     if row.bits:
         return f"{words[0]:04X}H"
     try:

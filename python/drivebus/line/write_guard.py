@@ -13,9 +13,14 @@ from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.rtu import written
 
-__all__ = ["KnownUnits", "check_words"]
+__all__ = ["KnownUnits", "check_words", "code_text"]
 
 _HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
+
+
+def code_text(code: int) -> str:
+    """A command's code for people: as manuals print it, small numbers in decimal and words of bits in hexadecimal."""
+    return f"{code}" if code <= 0xFF else f"{code:04X}H"
 
 
 class KnownUnits:
@@ -70,10 +75,10 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 
 
 def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
-    codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
+    codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return NotAllowed(
-        f"{word} at {address:04X}H is not a command of unit {unit}, which is known as {family.title}: its codes are "
-        f"{codes or 'not known'}; {_HINT}",
+        f"{code_text(word)} at {address:04X}H is not a command of unit {unit}, which is known as {family.title}: its "
+        f"codes are {codes or 'not known'}; {_HINT}",
         unit=unit,
     )
 

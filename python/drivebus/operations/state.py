@@ -47,6 +47,8 @@ class Seen(NamedTuple):
     missing: Mapping[str, str]
     in_fault: bool
     """Whether the state word says that the drive is in fault. It may run all the same."""
+    word: int | None
+    """The state word itself."""
 
     @property
     def source(self) -> ControlSource | None:
@@ -95,7 +97,7 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
     plan = planned(unit)
     if plan.plan is None:
-        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False)
+        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
     answers: list[list[int]] = []
     first = 0.0
     for address, count in plan.plan.reads:
@@ -108,13 +110,15 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     for word in plan.words:
         fields.update(unit.profile.fields(word, values[word]))
     number = values[plan.fault] if plan.fault is not None else 0
+    word = None if plan.state is None else values[plan.state]
     seen = Seen(
-        State.UNKNOWN if plan.state is None else state_of(unit, values[plan.state]),
+        State.UNKNOWN if word is None else state_of(unit, word),
         fields,
         unit.profile.fault(number) if number else None,
         first,
         plan.missing,
-        plan.state is not None and unit.profile.is_in_fault(values[plan.state]),
+        word is not None and unit.profile.is_in_fault(word),
+        word,
     )
     remember(unit, str(seen))
     return seen

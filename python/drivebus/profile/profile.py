@@ -273,6 +273,14 @@ class Profile:
         """
         return self._native.command_registers()
 
+    def start_sequence(self) -> list[dict[str, Any]]:
+        """The words that come, in this order, before one that runs or jogs a motor at rest; none of most families.
+
+        Keys of each: `word`, `label`, `until` (fields of the state word, and what they must be before the next word is
+        sent), and the same as bits: `mask` and `value`.
+        """
+        return self._native.start_sequence()
+
     @property
     def command_address(self) -> int | None:
         """Where commands are written, 0..0xFFFF; None where the family has none."""

@@ -6,6 +6,7 @@
 use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Words, function};
 
 use super::family::{Memory, Range};
+use super::machine::Command;
 use super::map::{Access, Word};
 use super::refusal::Refusal;
 use super::{Drive, WRITES_KEPT, WriteRecord};
@@ -221,7 +222,30 @@ impl Drive {
         if self.obeys_bus()
             && let Some(command) = self.family().command_at(address, word)
         {
-            self.machine.command(command, &self.settings);
+            self.obey(address, word, command);
         }
+    }
+
+    /// Does a command, where a run needs words before it only if these came in their order.
+    ///
+    /// Assumption: while it runs, a word of those that means nothing else changes nothing, and a run that follows another is obeyed
+    /// at once.
+    fn obey(&mut self, address: u16, word: u16, command: Command) {
+        let family = self.map.family();
+        let handshake = family.roles.handshake.as_ref().filter(|_| family.command == Some(address));
+        if let Some(handshake) = handshake {
+            let is_running = self.machine.is_running();
+            match command {
+                Command::Run(_) | Command::Jog(_) if !is_running && !handshake.is_through(self.led_up) => return,
+                Command::Run(_) | Command::Jog(_) => {}
+                _ if self.machine.fault().is_some() && command != Command::ResetFault => return,
+                Command::Nothing if is_running => return,
+                _ => match handshake.after(self.led_up, word) {
+                    Some(led_up) => self.led_up = led_up,
+                    None => return,
+                },
+            }
+        }
+        self.machine.command(command, &self.settings);
     }
 }

@@ -15,6 +15,7 @@ mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+mod handshake;
 pub(crate) mod own;
 mod register;
 mod roles;
@@ -25,6 +26,7 @@ use std::borrow::Cow;
 
 use super::machine::Command;
 use super::refusal::Refusal;
+pub(crate) use handshake::Handshake;
 pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
 pub(crate) use roles::{OnSilence, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
 pub(crate) use unlisted::unlisted;

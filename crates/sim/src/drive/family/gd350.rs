@@ -60,6 +60,7 @@ pub(crate) fn gd350() -> Family {
             response_delay: Some(0x0E03),
             bus_timeout: Some(Scaled::tenths(0x0E04)),
             on_silence: Some(Silence::at(0x0E05)),
+            handshake: None,
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,

@@ -18,8 +18,8 @@ use drivebus_drives::{
 };
 
 use super::{
-    Bit, Family, Faults, Flag, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled, Shows,
-    Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
+    Bit, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled,
+    Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::{Access, bounds, low_word};
@@ -49,6 +49,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
     let obeys = own.conditions(profile.control());
     let needs = profile.setpoints().get(&Setpoint::Frequency).map(|setpoint| setpoint.needs.as_slice());
     let needs = own.conditions(needs.unwrap_or_default());
+    let handshake = own.handshake(states);
     if !own.missing.is_empty() {
         return Err(own.missing);
     }
@@ -58,6 +59,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         obeys,
         speed,
         max_frequency,
+        handshake,
         ..own.roles()
     };
     let delay = profile.serial().map(|serial| u16::try_from(serial.response_delay.as_millis()).unwrap_or(u16::MAX));
@@ -178,6 +180,14 @@ impl Own<'_> {
             rules.iter().map(|other| rule.value | (other.value & !rule.mask)).filter(fits)
         });
         alone.chain(joined).find(|&word| self.profile.state(word) == state)
+    }
+
+    fn handshake(&mut self, [_, _, stopped, _]: [u16; 4]) -> Option<Handshake> {
+        Handshake::of(self.profile, stopped).unwrap_or_else(|step| {
+            let what = format!("no word that means stopped is what \"{step}\" waits for");
+            self.miss("profile.toml, [[commands.sequence]]", &what);
+            None
+        })
     }
 
     fn speed(&mut self) -> Option<Speed> {
