@@ -110,15 +110,15 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     for word in plan.words:
         fields.update(unit.profile.fields(word, values[word]))
     number = values[plan.fault] if plan.fault is not None else 0
-    word = None if plan.state is None else values[plan.state]
+    told = None if plan.state is None else values[plan.state]
     seen = Seen(
-        State.UNKNOWN if word is None else state_of(unit, word),
+        State.UNKNOWN if told is None else state_of(unit, told),
         fields,
         unit.profile.fault(number) if number else None,
         first,
         plan.missing,
-        word is not None and unit.profile.is_in_fault(word),
-        word,
+        told is not None and unit.profile.is_in_fault(told),
+        told,
     )
     remember(unit, str(seen))
     return seen
