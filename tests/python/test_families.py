@@ -44,7 +44,7 @@ def words(section: dict[str, Any]) -> dict[int, str]:
 
 def test_the_table_has_every_family() -> None:
     assert {family["name"] for family in FAMILIES} == set(drivebus.profiles())
-    assert len(FAMILIES) == 15
+    assert len(FAMILIES) == 16
 
 
 @every_family
@@ -69,6 +69,7 @@ def test_no_other_code_is_defined(family: dict[str, Any]) -> None:
     codes.pop(None, None)
     codes.update({int(code): label for code, label in table["other"].items()})
     assert profile.command_codes() == codes
+    assert [step["word"] for step in profile.start_sequence()] == table.get("sequence", [])
     assert profile.command_address == given(table["register"])
     assert [address for address in range(0x8000) if profile.is_command(address)] == table["moves"]
     assert profile.kind == family["kind"]

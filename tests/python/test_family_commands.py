@@ -61,6 +61,13 @@ def prepare(drive: Drive) -> None:
     drive.prepare_control(store=drive.profile.memory() is None)
 
 
+def words_of(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
+    """Address and word of all that *command* takes from rest: some families want words before a run."""
+    table = family["commands"]
+    before: list[int] = table.get("sequence", []) if command in STARTS else []
+    return [(given(table["register"]), word) for word in (*before, given(table[command]))]
+
+
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
     """Address and word of all that was written where any family takes commands."""
     found = []
@@ -89,14 +96,14 @@ def test_the_code_on_the_line_is_the_familys_own(
             DO[command](drive)
         assert commanded(simulator) == []
         return
-    expected = []
+    expected: list[tuple[int | None, int | None]] = []
     if command in BEFORE:
         DO[BEFORE[command]](drive)
-        expected.append((register, given(table[BEFORE[command]])))
+        expected += words_of(family, BEFORE[command])
     elif command == "reset_fault":
         simulator.drive(1).trip(1)
     DO[command](drive)
-    assert commanded(simulator) == [*expected, (register, code)]
+    assert commanded(simulator) == [*expected, *words_of(family, command)]
 
 
 @each(KNOWN)

@@ -18,6 +18,9 @@ FAMILIES = drivebus.profiles()
 RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
+READ_ONLY = {"vfd500": 0x04, "atv312": 0x02}
+"""How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
+
 PASSWORD = "P07.00"
 COMMANDS = {
     # What becomes of a motor at standstill and of one that turns forward at 10 Hz: its state a second later, and Hz.
@@ -122,7 +125,7 @@ def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
     for name in bench.profile.names():
         row = bench.profile.describe(name)
         if row.access == "ro" and row.address is not None:
-            assert bench.refusal(row.address, 1) == (0x04 if bench.profile.name == "vfd500" else 0x07), name
+            assert bench.refusal(row.address, 1) == READ_ONLY.get(bench.profile.name, 0x07), name
 
 
 @pytest.mark.parametrize("family", RUN)

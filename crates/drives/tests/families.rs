@@ -57,6 +57,9 @@ struct Commands {
     source: String,
     register: Word,
     needs_unverified: Vec<String>,
+    /// Words that come before a run.
+    #[serde(default)]
+    sequence: Vec<u16>,
     other: BTreeMap<String, String>,
     moves: Vec<u16>,
     #[serde(flatten)]
@@ -123,7 +126,7 @@ fn the_table_has_every_family_and_every_command() {
     let names: Vec<String> = document().family.into_iter().map(|family| family.name).collect();
     let listed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     assert_eq!(listed, Profile::builtin_names().collect());
-    assert_eq!((names.len(), listed.len()), (15, 15));
+    assert_eq!((names.len(), listed.len()), (16, 16));
     for (family, profile) in families() {
         let commands: BTreeSet<&str> = family.commands.codes.keys().map(String::as_str).collect();
         assert_eq!(commands, Command::ALL.map(Command::name).into(), "{}", family.name);
@@ -159,6 +162,8 @@ fn every_command_of_every_family_is_that_of_the_table() {
             assert_eq!(profile.command_codes().get(&code), Some(&label.as_str()), "{name} {code}");
             defined.insert(code);
         }
+        let sequence: Vec<u16> = profile.start_sequence().iter().map(|step| step.word).collect();
+        assert_eq!(sequence, table.sequence, "{name}");
         assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
         let moving: Vec<u16> = (0..0x8000).filter(|&address| profile.is_command(address)).collect();
         assert_eq!(moving, table.moves, "{name}");

@@ -9,6 +9,7 @@
 //!
 //! What the manuals at hand leave open is marked "Assumption:" where it is decided.
 
+mod atv312;
 mod chf100a;
 mod gd200a;
 mod gd300;
@@ -123,7 +124,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 15] = [
+const FAMILIES: [fn() -> Family; 16] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -139,6 +140,7 @@ const FAMILIES: [fn() -> Family; 15] = [
     vfd500::vfd500,
     chf100a::chf100a,
     chf100a::chv100,
+    atv312::atv312,
 ];
 
 impl Family {
