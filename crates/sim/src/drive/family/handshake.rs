@@ -19,7 +19,7 @@ impl Handshake {
     ///
     /// # Errors
     ///
-    /// The label of a word behind which no word would mean stopped.
+    /// A word behind which nothing would mean stopped, with its place.
     pub(super) fn of(profile: &Profile, idle: u16) -> Result<Option<Self>, String> {
         let rules = profile.state_word().map_or(&[][..], |word| word.rules.as_slice());
         let stopped = || rules.iter().filter(|rule| rule.state == State::Stopped).map(|rule| rule.value);
@@ -27,7 +27,10 @@ impl Handshake {
         for step in profile.start_sequence() {
             let shows = |word| step.until.iter().fold(word, |word, field| (word & !field.mask) | field.value);
             let mut shown = std::iter::once(idle).chain(stopped()).map(shows);
-            let shown = shown.find(|&word| profile.state(word) == State::Stopped).ok_or_else(|| step.label.clone())?;
+            let shown = shown.find(|&word| profile.state(word) == State::Stopped).ok_or_else(|| {
+                let what = format!("no word that means stopped is what \"{}\" waits for", step.label);
+                format!("profile.toml, [[commands.sequence]]: {what}")
+            })?;
             words.push((step.word, shown));
         }
         Ok((!words.is_empty()).then_some(Self { idle, words }))

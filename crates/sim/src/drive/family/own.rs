@@ -49,7 +49,8 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
     let obeys = own.conditions(profile.control());
     let needs = profile.setpoints().get(&Setpoint::Frequency).map(|setpoint| setpoint.needs.as_slice());
     let needs = own.conditions(needs.unwrap_or_default());
-    let handshake = own.handshake(states);
+    let [_, _, stopped, _] = states;
+    let handshake = Handshake::of(profile, stopped).map_err(|lack| own.missing.push(lack)).unwrap_or_default();
     if !own.missing.is_empty() {
         return Err(own.missing);
     }
@@ -180,14 +181,6 @@ impl Own<'_> {
             rules.iter().map(|other| rule.value | (other.value & !rule.mask)).filter(fits)
         });
         alone.chain(joined).find(|&word| self.profile.state(word) == state)
-    }
-
-    fn handshake(&mut self, [_, _, stopped, _]: [u16; 4]) -> Option<Handshake> {
-        Handshake::of(self.profile, stopped).unwrap_or_else(|step| {
-            let what = format!("no word that means stopped is what \"{step}\" waits for");
-            self.miss("profile.toml, [[commands.sequence]]", &what);
-            None
-        })
     }
 
     fn speed(&mut self) -> Option<Speed> {
