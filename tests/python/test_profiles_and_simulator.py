@@ -18,8 +18,11 @@ FAMILIES = drivebus.profiles()
 RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
-READ_ONLY = {"vfd500": 0x04, "atv312": 0x02}
+READ_ONLY = {"vfd500": 0x04, "atv312": 0x02, "v20": 0x02}
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
+
+OUT_OF_RANGE = {"v20": 0x03}
+"""How a drive refuses a word that is out of range, where it is not 04H."""
 
 PASSWORD = "P07.00"
 COMMANDS = {
@@ -40,8 +43,9 @@ class Bench:
 
     def __init__(self, family: str) -> None:
         profile = Profile.builtin(family)
-        # P30.14 is 1 from the factory.
-        self.profile = profile.with_variants({"speed_unit": "Hz"}) if profile.variants() else profile
+        # P30.14 is 1 from the factory, and P2000 50 Hz.
+        as_sold = {"speed_unit": "Hz", "base_frequency": "50 Hz"}
+        self.profile = profile.with_variants({name: as_sold[name] for name in profile.variants()})
         self.simulator = Simulator({1: family}, transport="process", clock="virtual")
         self.bus = Bus(self.simulator)
         self.machine = self.simulator.drive(1)
@@ -116,8 +120,9 @@ def test_every_register_has_the_range_that_the_drive_has(bench: Bench) -> None:
         for word in (low, high):
             bench.write(row.address, word)
         below = [(low - 1) & 0xFFFF] if low or row.signed else []
-        for word in (*below, high + 1):
-            assert bench.refusal(row.address, word) == 0x04, f"{name} {word:04X}"
+        above = [high + 1] if high < 0xFFFF else []
+        for word in (*below, *above):
+            assert bench.refusal(row.address, word) == OUT_OF_RANGE.get(bench.profile.name, 0x04), f"{name} {word:04X}"
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -25,7 +25,17 @@ from drivebus.cli import cli
 
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
 
-SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100", "atv312"]
+SILENT_ON_CODES = [
+    "gd600",
+    "gd600-rectifier",
+    "gd3000",
+    "gd3000-rectifier",
+    "vfd500",
+    "chf100a",
+    "chv100",
+    "atv312",
+    "v20",
+]
 """The families whose units refuse 2103H."""
 
 TAKEN_FOR: dict[str, list[str]] = {
@@ -42,6 +52,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "vfd500": ["vfd500"],
     # And this one ETA, rFr and CMD: 0C81H, 0C82H and 2135H.
     "atv312": ["atv312"],
+    # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
+    "v20": ["v20"],
     # Of these nothing is known that they must say; only a code gives another one away.
     "gd600": SILENT_ON_CODES,
     "gd600-rectifier": SILENT_ON_CODES,
@@ -111,7 +123,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 256
+    assert len(PAIRS) == 289
 
 
 @every_pair

@@ -141,7 +141,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 16] = [
+static BUILTINS: [Builtin; 17] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -158,6 +158,7 @@ static BUILTINS: [Builtin; 16] = [
     builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

@@ -179,6 +179,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gd350", 97),
         ("gd600", 15),
         ("gd600-rectifier", 0),
+        ("v20", 19),
         ("vfd500", 47),
     ];
     assert_eq!(all, expected.into());

@@ -21,6 +21,7 @@ pub(crate) mod own;
 mod register;
 mod roles;
 mod unlisted;
+mod v20;
 mod vfd500;
 
 use std::borrow::Cow;
@@ -124,7 +125,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 16] = [
+const FAMILIES: [fn() -> Family; 17] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -141,6 +142,7 @@ const FAMILIES: [fn() -> Family; 16] = [
     chf100a::chf100a,
     chf100a::chv100,
     atv312::atv312,
+    v20::v20,
 ];
 
 impl Family {
