@@ -273,7 +273,7 @@ def test_all_of_it_takes_a_word_of_trust(line: Simulator) -> None:
 
 def test_the_command_line_says_the_words() -> None:
     told = CliRunner().invoke(cli, ["profiles", "show", "atv312"]).stdout
-    assert "080FH run reverse [unverified]" in told
+    assert "2063 run reverse (080FH) [unverified]" in told
     assert "before a run or jog from rest: 6 shutdown, until fault = 0" in told
     assert Profile.builtin("atv312").command("run_reverse") == (CMD, 0x080F)
     result = CliRunner().invoke(

@@ -128,13 +128,19 @@ def _commands(profile: drivebus.Profile) -> list[str]:
         lines.append(f"written to {address:04X}H")
         for code, label in sorted(registers[address].items()):
             doubt = " [unverified]" if label in reasons else ""
-            lines.append(f"{code_text(code):>3} {label.replace('_', ' ')}{doubt}")
+            lines.append(f"{_code(code, label)}{doubt}")
     for number, step in enumerate(profile.start_sequence()):
         until = ", ".join(f"{field} = {value}" for field, value in step["until"].items())
         when = "before a run or jog from rest:" if number == 0 else "then"
-        lines.append(f"{when} {code_text(step['word'])} {step['label']}, until {until}")
+        lines.append(f"{when} {_code(step['word'], step['label']).lstrip()}, until {until}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
+
+
+def _code(code: int, label: str) -> str:
+    """A code and what it means; words of bits as manuals print them too."""
+    printed = code_text(code)
+    return f"{code:>3} {label.replace('_', ' ')}" + ("" if printed == f"{code}" else f" ({printed})")
 
 
 def _reasons(profile: drivebus.Profile) -> dict[str, str]:
