@@ -127,7 +127,9 @@ def test_the_list_says_how_much_of_each_is_printed() -> None:
         assert (None if line[2] is None else int(line[2])) in percents
 
 
-DOCUMENTS = re.compile(r"(?:manualshive|manualslib|INVT ebook) (\d+)|easymanua\.ls (?:(?:danfoss|siemens) )?([a-z0-9-]+)|(BBV\d+)")
+DOCUMENTS = re.compile(
+    r"(?:manualshive|manualslib|INVT ebook) (\d+)|easymanua\.ls (?:(?:danfoss|siemens) )?([a-z0-9-]+)|(BBV\d+)"
+)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

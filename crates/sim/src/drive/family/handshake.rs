@@ -25,9 +25,9 @@ impl Handshake {
         let stopped = || rules.iter().filter(|rule| rule.state == State::Stopped).map(|rule| rule.value);
         let mut words = Vec::new();
         for step in profile.start_sequence() {
-            let shows = |word| step.until.iter().fold(word, |word, field| (word & !field.mask) | field.value);
-            let mut shown = std::iter::once(idle).chain(stopped()).map(shows);
-            let shown = shown.find(|&word| profile.state(word) == State::Stopped).ok_or_else(|| {
+            let waited_for = |word| step.until.iter().fold(word, |word, field| (word & !field.mask) | field.value);
+            let mut candidates = std::iter::once(idle).chain(stopped()).map(waited_for);
+            let shown = candidates.find(|&word| profile.state(word) == State::Stopped).ok_or_else(|| {
                 let what = format!("no word that means stopped is what \"{}\" waits for", step.label);
                 format!("profile.toml, [[commands.sequence]]: {what}")
             })?;
