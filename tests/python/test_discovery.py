@@ -79,7 +79,7 @@ def test_exactly_what_is_there_is_found(family: str) -> None:
         assert found.requests <= MOST.get(family, 10_400)
 
 
-@pytest.mark.parametrize("family", ["atv312", "v20"])
+@pytest.mark.parametrize("family", ["atv312", "v20", "acs355"])
 def test_where_codes_do_not_tell_their_addresses_nothing_is_tried(family: str) -> None:
     with of(family) as (simulator, drive):
         with pytest.raises(NotAllowed):

@@ -128,7 +128,9 @@ def test_the_list_says_how_much_of_each_is_printed() -> None:
 
 
 DOCUMENTS = re.compile(
-    r"(?:manualshive|manualslib|INVT ebook) (\d+)|easymanua\.ls (?:(?:danfoss|siemens) )?([a-z0-9-]+)|(BBV\d+)"
+    r"(?:manualshive|manualslib|manualarchiveguide|INVT ebook) (\d+)"
+    r"|easymanua\.ls (?:(?:abb|danfoss|siemens) )?([a-z0-9-]+)"
+    r"|(BBV\d+)"
 )
 
 

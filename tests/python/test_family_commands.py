@@ -118,7 +118,8 @@ def test_what_no_document_prints_is_not_sent_unasked(
     if command == "reset_fault":
         simulator.drive(1).trip(1)
     plain = drive_of(bus, family["name"], unverified=False)
-    refused = command in doubted or (command in STARTS and {"stop", "coast"} <= doubted)
+    unproved = bool(table.get("sequence")) and family["states"]["needs_unverified"]
+    refused = command in doubted or (command in STARTS and ({"stop", "coast"} <= doubted or unproved))
     if refused:
         with pytest.raises(NotAllowed, match="unverified=True"):
             DO[command](plain)

@@ -18,7 +18,7 @@ FAMILIES = drivebus.profiles()
 RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
-READ_ONLY = {"vfd500": 0x04, "atv312": 0x02, "v20": 0x02}
+READ_ONLY = {"vfd500": 0x04, "atv312": 0x02, "v20": 0x02, "acs355": 0x02}
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 
 OUT_OF_RANGE = {"v20": 0x03}

@@ -35,6 +35,7 @@ SILENT_ON_CODES = [
     "chv100",
     "atv312",
     "v20",
+    "acs355",
 ]
 """The families whose units refuse 2103H."""
 
@@ -54,6 +55,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "atv312": ["atv312"],
     # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
     "v20": ["v20"],
+    # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
+    "acs355": ["acs355"],
     # Of these nothing is known that they must say; only a code gives another one away.
     "gd600": SILENT_ON_CODES,
     "gd600-rectifier": SILENT_ON_CODES,
@@ -123,7 +126,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 289
+    assert len(PAIRS) == 324
 
 
 @every_pair

@@ -141,7 +141,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 17] = [
+static BUILTINS: [Builtin; 18] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -159,6 +159,7 @@ static BUILTINS: [Builtin; 17] = [
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

@@ -9,6 +9,7 @@
 //!
 //! What the manuals at hand leave open is marked "Assumption:" where it is decided.
 
+mod acs355;
 mod atv312;
 mod chf100a;
 mod gd200a;
@@ -125,7 +126,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 17] = [
+const FAMILIES: [fn() -> Family; 18] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -143,6 +144,7 @@ const FAMILIES: [fn() -> Family; 17] = [
     chf100a::chv100,
     atv312::atv312,
     v20::v20,
+    acs355::acs355,
 ];
 
 impl Family {

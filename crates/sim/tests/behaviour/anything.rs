@@ -38,7 +38,7 @@ proptest! {
 
     #[test]
     fn every_request_gets_a_right_frame_or_silence(
-        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "atv312", "v20"]),
+        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "atv312", "v20", "acs355"]),
         pdus in vec(any_pdu(), 1..30)
     ) {
         let mut bench = Bench::of(family);
