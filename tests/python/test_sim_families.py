@@ -29,6 +29,7 @@ FAMILIES = {
     13: "gd20",
     14: "gd100",
     15: "gd200a",
+    16: "fc51",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -213,7 +214,7 @@ def test_what_is_meant_for_another_family_reaches_nothing(simulator: Simulator, 
 
 def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
-        if family == "chf100a":  # its manual names 03H and 06H (p. 107)
+        if family in ("chf100a", "fc51"):  # manuals name 03H and 06H (p. 107), and others without a loop-back (p. 80)
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == 0x01
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)

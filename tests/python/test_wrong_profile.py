@@ -25,7 +25,7 @@ from drivebus.cli import cli
 
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
 
-SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"]
+SILENT_ON_CODES = ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100", "fc51"]
 """The families whose units refuse 2103H."""
 
 TAKEN_FOR: dict[str, list[str]] = {
@@ -40,6 +40,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
+    # And this one answers C417H and 3F01H, its status word and its output frequency.
+    "fc51": ["fc51"],
     # Of these nothing is known that they must say; only a code gives another one away.
     "gd600": SILENT_ON_CODES,
     "gd600-rectifier": SILENT_ON_CODES,
@@ -109,7 +111,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 225
+    assert len(PAIRS) == 256
 
 
 @every_pair

@@ -138,7 +138,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 15] = [
+static BUILTINS: [Builtin; 16] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -154,6 +154,7 @@ static BUILTINS: [Builtin; 15] = [
     builtin!("vfd500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

@@ -178,7 +178,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         let mut bench = Bench::of(family);
         assert_eq!((bench.read::<1>(0x2103), bench.read::<1>(0x3016)), ([code], [code]), "{family}");
     }
-    for family in ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100"] {
+    for family in ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "chv100", "fc51"] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }
 }
