@@ -18,6 +18,15 @@ FAMILIES = drivebus.profiles()
 RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "gd600", "gd3000", "vfd500"]
 """Those whose motor the bus moves."""
 
+VARIANTS = {"vfd500": {"speed_unit": "Hz"}, "fc51": {"base_frequency": "50 Hz"}}
+"""As they come from the factory: P30.14 is 1, 3-03 is 50.000."""
+
+READ_ONLY = {"vfd500": 0x04, "fc51": 0x02}
+"""By which exception what can only be read is refused; 07H by all others."""
+
+WITHOUT = {("vfd500", "jog_stop"), *(("fc51", name) for name in ("run_reverse", "jog_forward", "jog_reverse", "jog_stop"))}
+"""The commands that a family does not have."""
+
 PASSWORD = "P07.00"
 COMMANDS = {
     # What becomes of a motor at standstill and of one that turns forward at 10 Hz: its state a second later, and Hz.
@@ -37,8 +46,7 @@ class Bench:
 
     def __init__(self, family: str) -> None:
         profile = Profile.builtin(family)
-        # P30.14 is 1 from the factory.
-        self.profile = profile.with_variants({"speed_unit": "Hz"}) if profile.variants() else profile
+        self.profile = profile.with_variants(VARIANTS.get(family, {}))
         self.simulator = Simulator({1: family}, transport="process", clock="virtual")
         self.bus = Bus(self.simulator)
         self.machine = self.simulator.drive(1)
@@ -122,14 +130,14 @@ def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
     for name in bench.profile.names():
         row = bench.profile.describe(name)
         if row.access == "ro" and row.address is not None:
-            assert bench.refusal(row.address, 1) == (0x04 if bench.profile.name == "vfd500" else 0x07), name
+            assert bench.refusal(row.address, 1) == READ_ONLY.get(bench.profile.name, 0x07), name
 
 
-@pytest.mark.parametrize("family", RUN)
+@pytest.mark.parametrize("family", [*RUN, "fc51"])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, command: str) -> None:
     if command not in bench.profile.commands():
-        assert (bench.profile.name, command) == ("vfd500", "jog_stop")
+        assert (bench.profile.name, command) in WITHOUT
         return
     from_standstill, from_ten = COMMANDS[command]
     bench.obey()
@@ -145,7 +153,7 @@ def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, com
         assert bench.machine.frequency == pytest.approx(from_ten[1], abs=0.1)
 
 
-@pytest.mark.parametrize("family", RUN)
+@pytest.mark.parametrize("family", [*RUN, "fc51"])
 def test_a_coasting_motor_turns_on_and_a_stopped_one_is_slowed_down(bench: Bench) -> None:
     bench.obey()
     bench.command("run_forward", 3.0)
