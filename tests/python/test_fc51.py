@@ -1,8 +1,8 @@
 """A Danfoss FC 51: whole control words, a reference in shares of 4000H, and a status word of bits.
 
-Bytes are typed by hand from the bits of the control word (operating instructions MG.02.A4.02, p. 28) and from the registers
-50000, 50010 and 50200 of its sisters, less one on the wire: C34FH, C359H, C417H. 10 Hz of 50 Hz are 16384 / 5 = 3276.8
-counts: 3277 are 0CCDH.
+Bytes are typed by hand from the bits of the control word (operating instructions MG.02.A4.02, p. 28) and from the
+registers 50000, 50010 and 50200 of its sisters, less one on the wire: C34FH, C359H, C417H. 10 Hz of 50 Hz are
+16384 / 5 = 3276.8 counts: 3277 are 0CCDH.
 """
 
 from __future__ import annotations
@@ -88,7 +88,9 @@ def test_who_says_it_is_not_asked(line: Simulator) -> None:
 def test_without_a_word_of_trust_nothing_moves(line: Simulator) -> None:
     with Bus(line) as bus:
         drive = bus.drive(1, "fc51")
-        for command in (drive.run, lambda: drive.run(hz=10.0), drive.stop, drive.coast):
+        with pytest.raises(NotAllowed, match="unverified=True"):
+            drive.run(hz=10.0)
+        for command in (drive.run, drive.stop, drive.coast):
             with pytest.raises(NotAllowed, match="unverified=True"):
                 command()
         assert drive.state() is State.STOPPED

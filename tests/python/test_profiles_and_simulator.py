@@ -24,7 +24,7 @@ VARIANTS = {"vfd500": {"speed_unit": "Hz"}, "fc51": {"base_frequency": "50 Hz"}}
 READ_ONLY = {"vfd500": 0x04, "fc51": 0x02}
 """By which exception what can only be read is refused; 07H by all others."""
 
-WITHOUT = {("vfd500", "jog_stop"), *(("fc51", name) for name in ("run_reverse", "jog_forward", "jog_reverse", "jog_stop"))}
+WITHOUT = {"vfd500": {"jog_stop"}, "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"}}
 """The commands that a family does not have."""
 
 PASSWORD = "P07.00"
@@ -137,7 +137,7 @@ def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, command: str) -> None:
     if command not in bench.profile.commands():
-        assert (bench.profile.name, command) in WITHOUT
+        assert command in WITHOUT[bench.profile.name]
         return
     from_standstill, from_ten = COMMANDS[command]
     bench.obey()

@@ -76,7 +76,7 @@ fn counts(text: &str, scale: i128) -> i128 {
 /// `count` of which `counts` are `units`, with the fewest digits at which every count reads differently: the nearest number,
 /// and of two the one farther from zero.
 fn share(count: i128, (counts, units): (i128, i128)) -> String {
-    let scale = (0..).map(|digits| 10_i128.pow(digits)).find(|tens| units * tens >= counts).unwrap();
+    let scale = (0..9).map(|digits| 10_i128.pow(digits)).find(|tens| units * tens >= counts).unwrap();
     let steps = (2 * count.abs() * units * scale + counts) / (2 * counts);
     written(if count < 0 { -steps } else { steps }, scale)
 }

@@ -95,9 +95,9 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
 
 
 def _codes_at(family: Profile, address: int) -> Mapping[int, str] | None:
-    """The commands of *family* at *address*, with the bit that may tell RAM from EEPROM or without; None: none are there."""
+    """The commands of *family* at *address*, or without the bit that may tell RAM from EEPROM; None: none are there."""
     registers = family.command_registers()
-    return registers.get(address) or registers.get(_plain(family, address))
+    return registers.get(address, registers.get(_plain(family, address)))
 
 
 def _plain(family: Profile, address: int) -> int:
