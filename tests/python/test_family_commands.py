@@ -77,7 +77,8 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
         address = int.from_bytes(frame[2:4], "big")
         data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
         words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
-        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in REGISTERS]
+        told = [(address + at, word) for at, word in enumerate(words)]
+        found += [(place, word) for place, word in told if {place, place & 0x7FFF} & REGISTERS]
     return found
 
 

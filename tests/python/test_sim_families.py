@@ -32,6 +32,7 @@ FAMILIES = {
     16: "atv312",
     17: "v20",
     18: "acs355",
+    19: "fc51",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -216,7 +217,13 @@ def test_what_is_meant_for_another_family_reaches_nothing(simulator: Simulator, 
 
 def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
-        if family in ("chf100a", "atv312", "v20", "acs355"):  # their manuals do not name 08H (chf100a: p. 107)
+        if family in (
+            "chf100a",
+            "atv312",
+            "v20",
+            "acs355",
+            "fc51",
+        ):  # chf100a: p. 107; fc51: p. 80; no other manual names 08H
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == 0x01
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)

@@ -33,6 +33,7 @@ SILENT_ON_CODES = [
     "vfd500",
     "chf100a",
     "chv100",
+    "fc51",
     "atv312",
     "v20",
     "acs355",
@@ -57,6 +58,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
     "acs355": ["acs355"],
+    # And this one answers C417H and 3F01H, its status word and its output frequency.
+    "fc51": ["fc51"],
     # Of these nothing is known that they must say; only a code gives another one away.
     "gd600": SILENT_ON_CODES,
     "gd600-rectifier": SILENT_ON_CODES,
@@ -126,7 +129,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 324
+    assert len(PAIRS) == 361
 
 
 @every_pair

@@ -177,7 +177,9 @@ impl Drive {
         let family = self.family();
         let fits = match target {
             Word::Parameter(parameter) => parameter.bounds.allows(word, |bound| self.parameter(bound)),
-            Word::Register(_) if family.takes_commands(address) => family.command_at(address, word).is_some(),
+            Word::Register(_) if family.takes_commands(address) => {
+                family.command_at(address, self.control_word(address), word).is_some()
+            }
             Word::Register(register) => match register.range {
                 Range::Words(low, high) => (low..=high).contains(&word),
                 Range::UpTo(high, bound) => word <= high.min(self.parameter(bound)),
@@ -204,6 +206,7 @@ impl Drive {
             self.unlocked = true;
             return;
         }
+        let before = self.control_word(address);
         match self.target(address) {
             Some(Target::Control) => {
                 if let Some(control) = self.map.control(address).and_then(|place| self.control.get_mut(place)) {
@@ -220,7 +223,7 @@ impl Drive {
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.obeys_bus()
-            && let Some(command) = self.family().command_at(address, word)
+            && let Some(command) = self.family().command_at(address, before, word)
         {
             self.obey(address, word, command);
         }

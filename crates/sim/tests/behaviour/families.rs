@@ -186,6 +186,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "vfd500",
         "chf100a",
         "chv100",
+        "fc51",
         "atv312",
         "v20",
         "acs355",

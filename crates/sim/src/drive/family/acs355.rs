@@ -34,6 +34,7 @@ pub(crate) fn acs355() -> Family {
         identification: 0,
         command: Some(0),
         commands: COMMANDS.to_vec(),
+        control_word: None,
         elsewhere: Vec::new(),
         registers: REGISTERS.to_vec(),
         parameters: PARAMETERS.to_vec(),

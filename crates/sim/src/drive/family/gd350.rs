@@ -35,6 +35,7 @@ pub(crate) fn gd350() -> Family {
         parameters: Vec::new(),
         factory: FACTORY,
         // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
         roles: Roles {

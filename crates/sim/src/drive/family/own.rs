@@ -85,6 +85,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
         factory: &[],
+        control_word: None,
         elsewhere: own.elsewhere(),
         capped: &[],
         roles,

@@ -35,6 +35,7 @@ pub(crate) fn v20() -> Family {
         identification: 0,
         command: Some(COMMAND),
         commands: COMMANDS.to_vec(),
+        control_word: None,
         elsewhere: Vec::new(),
         registers: REGISTERS.to_vec(),
         parameters: PARAMETERS.to_vec(),
