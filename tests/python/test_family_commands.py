@@ -61,6 +61,13 @@ def prepare(drive: Drive) -> None:
     drive.prepare_control(store=drive.profile.memory() is None)
 
 
+def words_of(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
+    """Address and word of all that *command* takes from rest: some families want words before a run."""
+    table = family["commands"]
+    before: list[int] = table.get("sequence", []) if command in STARTS else []
+    return [(given(table["register"]), word) for word in (*before, given(table[command]))]
+
+
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
     """Address and word of all that was written where a family takes commands and the unit itself has no parameter."""
     profile = Profile.builtin(simulator.drive(1).profile)
@@ -73,7 +80,8 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
         address = int.from_bytes(frame[2:4], "big")
         data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
         words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
-        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in registers]
+        told = [(address + at, word) for at, word in enumerate(words)]
+        found += [(place, word) for place, word in told if {place, place & 0x7FFF} & registers]
     return found
 
 
@@ -92,14 +100,14 @@ def test_the_code_on_the_line_is_the_familys_own(
             DO[command](drive)
         assert commanded(simulator) == []
         return
-    expected = []
+    expected: list[tuple[int | None, int | None]] = []
     if command in BEFORE:
         DO[BEFORE[command]](drive)
-        expected.append((place_of(family, BEFORE[command]), given(table[BEFORE[command]])))
+        expected += words_of(family, BEFORE[command])
     elif command == "reset_fault":
         simulator.drive(1).trip(1)
     DO[command](drive)
-    assert commanded(simulator) == [*expected, (register, code)]
+    assert commanded(simulator) == [*expected, *words_of(family, command)]
 
 
 @each(KNOWN)
@@ -114,7 +122,8 @@ def test_what_no_document_prints_is_not_sent_unasked(
     if command == "reset_fault":
         simulator.drive(1).trip(1)
     plain = drive_of(bus, family["name"], unverified=False)
-    refused = command in doubted or (command in STARTS and {"stop", "coast"} <= doubted)
+    unproved = bool(table.get("sequence")) and family["states"]["needs_unverified"]
+    refused = command in doubted or (command in STARTS and ({"stop", "coast"} <= doubted or unproved))
     if refused:
         with pytest.raises(NotAllowed, match="unverified=True"):
             DO[command](plain)

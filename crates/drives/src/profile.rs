@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::entry::{Access, AccessError, Entry, Kind, Store};
-use crate::parts::command::{Command, CommandCode, Control};
+use crate::parts::command::{Command, CommandCode, Control, StartWord};
 use crate::parts::fault::{Exception, Fault};
 use crate::parts::identification::{Identification, Signature};
 use crate::parts::memory::{Memory, MemoryBit};
@@ -64,6 +64,8 @@ pub struct Profile {
     pub(crate) other_commands: BTreeMap<u16, String>,
     /// Why some commands are not verified.
     pub(crate) commands_note: String,
+    /// What comes before a word that runs or jogs.
+    pub(crate) start_sequence: Vec<StartWord>,
     pub(crate) moving: Vec<u16>,
     pub(crate) state: Option<StateWord>,
     pub(crate) control: Vec<Control>,
@@ -146,7 +148,7 @@ impl Profile {
         self.entries.iter()
     }
 
-    /// The entry that is read at `address`.
+    /// The entry that is read at `address`, or that is only written there.
     pub fn entry_at(&self, address: u16) -> Option<&Entry> {
         self.by_address.get(&address).and_then(|&index| self.entries.get(index))
     }
@@ -275,7 +277,9 @@ impl Profile {
         let here = self.commands.iter().filter(|(_, known)| known.elsewhere.is_none());
         let named = here.map(|(command, known)| (known.code, command.name()));
         let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
-        others.chain(named).collect()
+        // A word of the sequence that stops as well is called a stop.
+        let sequence = self.start_sequence.iter().map(|step| (step.word, step.label.as_str()));
+        others.chain(sequence).chain(named).collect()
     }
 
     /// The command that `raw` means at the command register.
@@ -294,6 +298,11 @@ impl Profile {
             }
         }
         registers
+    }
+
+    /// The words that come, in this order, before one that runs or jogs a motor at rest; none where that is done by one word.
+    pub fn start_sequence(&self) -> &[StartWord] {
+        &self.start_sequence
     }
 
     /// Where commands are written.

@@ -2,37 +2,42 @@
 
 use std::fmt;
 
-/// An exact value: `count / 10^decimals`. `Display` prints every decimal: `10.00`.
+/// A value as a decimal number, and the counts that it is. `Display` prints every decimal: `10.00`.
+///
+/// It is exact where there are so many counts to a unit as a power of ten says. Else it has as many digits as tell it from
+/// the values of the counts beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Value {
     count: i64,
+    /// The value × 10^decimals.
+    digits: i64,
     decimals: u8,
 }
 
 impl Value {
-    pub(crate) fn new(count: i64, decimals: u8) -> Self {
-        Self { count, decimals }
+    pub(crate) fn new(count: i64, digits: i64, decimals: u8) -> Self {
+        Self { count, digits, decimals }
     }
 
-    /// The counts, with their sign.
+    /// The counts of the drive, with their sign: what its word is, and not the value where there is a scale.
     pub fn count(self) -> i64 {
         self.count
     }
 
     /// The float closest to this value. It prints with no more digits than the value has.
     pub fn to_f64(self) -> f64 {
-        // 32 bits at most, so both are exact and the one division is correctly rounded.
-        #[expect(clippy::cast_precision_loss, reason = "a count has 32 bits at most")]
-        let count = self.count as f64;
-        count / f64::from(10_u32.pow(u32::from(self.decimals)))
+        // 49 bits at most, so both are exact and the one division is correctly rounded.
+        #[expect(clippy::cast_precision_loss, reason = "32 bits of counts, and at most 16 and a few for the scale")]
+        let digits = self.digits as f64;
+        digits / f64::from(10_u32.pow(u32::from(self.decimals)))
     }
 }
 
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let scale = 10_u64.pow(u32::from(self.decimals));
-        let magnitude = self.count.unsigned_abs();
-        let sign = if self.count < 0 { "-" } else { "" };
+        let magnitude = self.digits.unsigned_abs();
+        let sign = if self.digits < 0 { "-" } else { "" };
         if self.decimals == 0 {
             return write!(f, "{sign}{magnitude}");
         }

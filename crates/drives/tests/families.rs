@@ -60,6 +60,9 @@ struct Commands {
     /// Commands that another register takes.
     #[serde(default)]
     elsewhere: BTreeMap<String, u16>,
+    /// Words that come before a run.
+    #[serde(default)]
+    sequence: Vec<u16>,
     other: BTreeMap<String, String>,
     moves: Vec<u16>,
     #[serde(flatten)]
@@ -126,7 +129,7 @@ fn the_table_has_every_family_and_every_command() {
     let names: Vec<String> = document().family.into_iter().map(|family| family.name).collect();
     let listed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     assert_eq!(listed, Profile::builtin_names().collect());
-    assert_eq!((names.len(), listed.len()), (20, 20));
+    assert_eq!((names.len(), listed.len()), (24, 24));
     for (family, profile) in families() {
         let commands: BTreeSet<&str> = family.commands.codes.keys().map(String::as_str).collect();
         assert_eq!(commands, Command::ALL.map(Command::name).into(), "{}", family.name);
@@ -163,8 +166,11 @@ fn every_command_of_every_family_is_that_of_the_table() {
             assert_eq!(profile.command_codes().get(&code), Some(&label.as_str()), "{name} {code}");
             defined.insert(code);
         }
+        let sequence: Vec<u16> = profile.start_sequence().iter().map(|step| step.word).collect();
+        assert_eq!(sequence, table.sequence, "{name}");
         assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
-        let moving: Vec<u16> = (0..0x8000).filter(|&address| profile.is_command(address)).collect();
+        let is_plain = |address: &u16| profile.stored_address(*address).is_none();
+        let moving: Vec<u16> = (0..=u16::MAX).filter(is_plain).filter(|&address| profile.is_command(address)).collect();
         assert_eq!(moving, table.moves, "{name}");
     }
 }
@@ -277,7 +283,8 @@ fn values_are_those_of_the_worked_examples() {
     for example in document().example {
         let mut profile = (*Profile::builtin(&example.family).unwrap()).clone();
         if let Some(variant) = &example.variant {
-            profile = profile.with_variants([("speed_unit", variant.as_str())]).unwrap();
+            let name = profile.variants().keys().next().unwrap().clone();
+            profile = profile.with_variants([(name.as_str(), variant.as_str())]).unwrap();
         }
         let entry = profile.find(&example.name).unwrap();
         let what = format!("{} {} = {} ({})", example.family, example.name, example.value, example.source);

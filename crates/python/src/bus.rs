@@ -20,7 +20,7 @@ use crate::format::SerialFormat;
 use crate::{overhear, trace};
 
 /// One line and its owner.
-#[pyclass(frozen, module = "drivebus._native")]
+#[pyclass(frozen, weakref, module = "drivebus._native")]
 #[derive(Debug)]
 pub(crate) struct Bus {
     /// Shared with the threads that work for it.

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import drivebus
+from drivebus.line.write_guard import code_text
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
 
@@ -39,6 +40,7 @@ def known(profile: drivebus.Profile) -> dict[str, Any]:
         "commands": profile.commands(),
         "command_codes": profile.command_codes(),
         "command_registers": profile.command_registers(),
+        "start_sequence": profile.start_sequence(),
         "commands_not_usable": _reasons(profile),
         "states": _states(profile),
         "state_reason": profile.state_reason(),
@@ -126,9 +128,19 @@ def _commands(profile: drivebus.Profile) -> list[str]:
         lines.append(f"written to {address:04X}H")
         for code, label in sorted(registers[address].items()):
             doubt = " [unverified]" if label in reasons else ""
-            lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
+            lines.append(f"{_code(code, label)}{doubt}")
+    for number, step in enumerate(profile.start_sequence()):
+        until = ", ".join(f"{field} = {value}" for field, value in step["until"].items())
+        when = "before a run or jog from rest:" if number == 0 else "then"
+        lines.append(f"{when} {_code(step['word'], step['label']).lstrip()}, until {until}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
+
+
+def _code(code: int, label: str) -> str:
+    """A code and what it means; words of bits as manuals print them too."""
+    printed = code_text(code)
+    return f"{code:>3} {label.replace('_', ' ')}" + ("" if printed == f"{code}" else f" ({printed})")
 
 
 def _reasons(profile: drivebus.Profile) -> dict[str, str]:

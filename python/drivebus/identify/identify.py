@@ -48,7 +48,9 @@ async def identify(read: Read, unit: int) -> Identification:
     if not candidates:
         reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
-    seen = ", ".join(f"{address:04X}H {'answered' if yes else 'refused'}" for address, yes in sorted(answered.items()))
+    told_by = [signatures.listed()[name] for name in candidates]
+    telling = {address for signature in told_by for address in (*signature["answers"], *signature["refuses"])}
+    seen = ", ".join(f"{address:04X}H {'answered' if answered[address] else 'refused'}" for address in sorted(telling))
     return Identification(
         unit,
         candidates,

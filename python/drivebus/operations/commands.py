@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
-from drivebus.operations import setpoints, state, words
+from drivebus.operations import halts, setpoints, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
-__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Proof", "confirm", "explained", "give", "send_once"]
+__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Proof", "confirm", "explained", "give", "prepared", "send_once"]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
@@ -46,17 +46,23 @@ HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
 
-async def give(unit: Unit, name: str, setpoint: int | None = None) -> None:
-    """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
+async def give(unit: Unit, name: str) -> None:
+    """Sends the command word once."""
+    await send_once(unit, name, *unit.profile.command(name))
+
+
+async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, int | list[int]]:
+    """Where the command goes, and what goes there: the setpoint behind it, where the drive has both side by side.
+
+    Where it has not, the setpoint is sent now.
+    """
     address, code = unit.profile.command(name)
-    payload: int | list[int] = code
     if setpoint is not None:
         together = _WRITE_MANY in unit.profile.functions
         if together and unit.profile.address(setpoints.register_of(unit, "frequency")) == address + 1:
-            payload = [code, setpoint]
-        else:
-            await setpoints.write_word(unit, setpoint)
-    await send_once(unit, name, address, payload)
+            return address, [code, setpoint]
+        await setpoints.write_word(unit, setpoint)
+    return address, code
 
 
 async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
@@ -64,6 +70,7 @@ async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence
     urgent = name in HALTS
     try:
         if urgent:
+            halts.begin(unit)
             await words.send(unit, address, payload, urgent=True)
             unit.memory.halts += 1
         else:

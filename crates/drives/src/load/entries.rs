@@ -7,7 +7,7 @@ use super::manifest::line;
 use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
-use crate::entry::{Entry, Kind, names};
+use crate::entry::{Access, Entry, Kind, names};
 use crate::parts::memory::Memory;
 use crate::text::{closest, group, parse_code};
 
@@ -15,6 +15,7 @@ use crate::text::{closest, group, parse_code};
 #[derive(Debug, Default)]
 pub(super) struct Entries {
     pub(super) list: Vec<Entry>,
+    /// Of two at one address the one that is read.
     pub(super) by_address: BTreeMap<u16, usize>,
     /// Some rows were broken, so that a name that is missing may be theirs.
     pub(super) incomplete: bool,
@@ -33,7 +34,7 @@ impl Entries {
         for (file, Located { line, item }) in rows {
             if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| is_called(other, name))) {
                 problems.add(file, line, format!("{twice} is there twice"));
-            } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
+            } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, clash(other, &item)?))) {
                 let reason = format!("{} is at {address:04X}H, where {} is already", item.name, other.name);
                 problems.add(file, line, reason);
             } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
@@ -43,7 +44,7 @@ impl Entries {
             }
         }
         let replaced = |old: &Entry| {
-            own.iter().any(|new| overlap(old, new).is_some() || names(old).any(|name| is_called(new, name)))
+            own.iter().any(|new| clash(old, new).is_some() || names(old).any(|name| is_called(new, name)))
         };
         let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
         list.append(&mut own);
@@ -51,7 +52,10 @@ impl Entries {
             let place = |entry: &Entry| (entry.kind, entry.address.is_none(), entry.address);
             place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
         });
-        let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.address?, index))).collect();
+        let placed = |index: usize| Some((list.get(index)?.address?, index));
+        let (written, read): (Vec<_>, Vec<_>) =
+            (0..list.len()).filter_map(placed).partition(|&(_, index)| list[index].access == Access::Wo);
+        let by_address = written.into_iter().chain(read).collect();
         Self { list, by_address, incomplete: false }
     }
 
@@ -135,8 +139,20 @@ fn is_called(entry: &Entry, name: &str) -> bool {
     names(entry).any(|own| own.eq_ignore_ascii_case(name))
 }
 
+/// An address that both have, and only one can.
+pub(super) fn clash(one: &Entry, other: &Entry) -> Option<u16> {
+    overlap(one, other).filter(|_| !is_other_way(one, other))
+}
+
+/// Whether one is what is read and the other what is written at the same address.
+pub(super) fn is_other_way(one: &Entry, other: &Entry) -> bool {
+    let ways = (one.access, other.access);
+    let same_word = one.address.is_some() && one.address == other.address && one.words() == other.words();
+    same_word && matches!(ways, (Access::Ro, Access::Wo) | (Access::Wo, Access::Ro))
+}
+
 /// An address that both have.
-pub(super) fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
+fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
     let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
     let (first, second) = (one.address?, other.address?);
     (first.max(second) <= last(first, one).min(last(second, other))).then_some(first.max(second))

@@ -1,10 +1,11 @@
 //! What a profile takes over from the one below it, and how much of it may then be trusted.
 
 use super::File;
+use super::entries::is_other_way;
 use super::manifest::{Extends, Manifest, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::entry::names;
+use crate::entry::{Access, names};
 use crate::evidence::Evidence;
 use crate::profile::Profile;
 use crate::text::closest;
@@ -40,6 +41,10 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
             continue;
         };
         let gone = base.entries.remove(index);
+        // Where the same address is written as something else, the commands stay.
+        let place = gone
+            .address
+            .filter(|_| gone.access != Access::Ro || !base.entries.iter().any(|other| is_other_way(&gone, other)));
         let stays = |name: &String| *name != gone.name;
         base.lists_mut().into_iter().for_each(|list| list.retain(stays));
         for role in base.roles.single_mut() {
@@ -52,13 +57,14 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.watchdog.take_if(|watchdog| {
             !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
         });
-        base.moving.retain(|&address| Some(address) != gone.address);
-        if base.command_address.is_some_and(|address| Some(address) == gone.address) {
+        base.moving.retain(|&address| Some(address) != place);
+        if base.command_address.is_some_and(|address| Some(address) == place) {
             base.command_address = None;
             base.commands.clear();
             base.other_commands.clear();
+            base.start_sequence.clear();
         }
-        base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != gone.address));
+        base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != place));
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {

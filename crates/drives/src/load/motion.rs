@@ -3,15 +3,14 @@
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
-use super::manifest::{Elsewhere, Manifest, States, line};
+use super::manifest::{Elsewhere, Manifest, States, Word, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::entry::names;
+use super::words;
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
 use crate::parts::state::{StateRule, StateWord};
 use crate::profile::Profile;
-use crate::text::closest;
 
 /// The command register, its codes, and what else moves a motor.
 pub(super) fn commands(
@@ -25,7 +24,7 @@ pub(super) fn commands(
     profile.commands.clear();
     profile.other_commands.clear();
     profile.commands_note.clear();
-    let mut all: Vec<(Command, &Placed<u16>, bool)> = Vec::new();
+    let mut all: Vec<(Command, &Placed<Word>, bool)> = Vec::new();
     all.extend(table.codes.iter().map(|(&command, code)| (command, code, true)));
     if let Some(assumed) = &table.assumed {
         all.extend(assumed.codes.iter().map(|(&command, code)| (command, code, false)));
@@ -37,9 +36,11 @@ pub(super) fn commands(
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
     profile.command_address = register.address;
     register.quantity.choices.clear();
+    let base = table.base.as_ref();
+    let base = base.map_or(0, |base| words::word(file, base, 0, register, manifest, problems));
     let mut choices = std::collections::BTreeMap::new();
     for (command, spanned, verified) in all {
-        let code = *spanned.get_ref();
+        let code = words::word(file, spanned, base, register, manifest, problems);
         if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
             let reason = format!("a rectifier feeds no motor: it has no {}", command.name());
             problems.add(file, line(file, spanned), reason);
@@ -56,7 +57,7 @@ pub(super) fn commands(
         }
     }
     for (key, label) in &table.other {
-        let Ok(code) = key.get_ref().parse::<u16>() else {
+        let Some(code) = number(key.get_ref()) else {
             let reason = format!("\"{}\" must be a number, the code of \"{label}\"", key.get_ref());
             problems.add(file, line(file, key), reason);
             continue;
@@ -68,7 +69,7 @@ pub(super) fn commands(
     }
     register.quantity.choices = choices;
     for (&command, other) in &table.elsewhere {
-        elsewhere(file, command, other, profile, entries, problems);
+        elsewhere(file, manifest, command, other, profile, entries, problems);
     }
     let moves = entries.names(file, &table.moves, problems);
     profile.moving = moves.iter().filter_map(|name| entries.find(name)?.address).collect();
@@ -77,14 +78,16 @@ pub(super) fn commands(
 /// A command in a register of its own.
 fn elsewhere(
     file: &File,
+    manifest: &Manifest,
     command: Command,
     table: &Elsewhere,
     profile: &mut Profile,
     entries: &mut Entries,
     problems: &mut Problems,
 ) {
-    let (place, code) = (line(file, &table.register), *table.code.get_ref());
+    let place = line(file, &table.register);
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
+    let code = words::word(file, &table.code, 0, register, manifest, problems);
     if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
         problems.add(file, place, format!("a rectifier feeds no motor: it has no {}", command.name()));
     }
@@ -112,6 +115,14 @@ fn elsewhere(
     let known = CommandCode { code, verified: true, elsewhere: Some(address) };
     if profile.commands.insert(command, known).is_some() {
         problems.add(file, place, format!("{} is there twice", command.name()));
+    }
+}
+
+/// A word as a key of TOML has it, which is a text: `9`, or `0x0476`.
+fn number(key: &str) -> Option<u16> {
+    match key.strip_prefix("0x") {
+        Some(digits) if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) => u16::from_str_radix(digits, 16).ok(),
+        _ => key.parse().ok(),
     }
 }
 
@@ -170,27 +181,11 @@ fn by_bits(
     problems: &mut Problems,
 ) -> Vec<StateRule> {
     let Some(register) = entries.find(table.register.get_ref()) else { return Vec::new() };
-    let of_register = manifest.bits.iter().filter(|(name, _)| names(register).any(|own| own == name.get_ref()));
-    let declared: Vec<_> = of_register.flat_map(|(_, fields)| fields).collect();
     let mut rules = Vec::new();
     for spanned in &table.when {
         let when = spanned.get_ref();
         let mut rule = StateRule { state: when.state, mask: 0, value: 0 };
-        for (name, &value) in &when.fields {
-            let Some(field) = register.bits.iter().find(|field| field.name == *name) else {
-                // A field that is broken has a problem of its own.
-                if declared.iter().any(|field| field.get_ref().name == *name) {
-                    continue;
-                }
-                let closest = closest(name, register.bits.iter().map(|field| field.name.as_str())).unwrap_or("none");
-                let reason = format!("{} has no bit field \"{name}\"; the closest is \"{closest}\"", register.name);
-                problems.add(file, line(file, spanned), reason);
-                continue;
-            };
-            if field.extract(field.insert(0, value)) != value {
-                let reason = format!("{value} does not fit the {} bits of \"{name}\"", field.width);
-                problems.add(file, line(file, spanned), reason);
-            }
+        for (field, value) in words::fields(file, line(file, spanned), &when.fields, register, manifest, problems) {
             rule.mask |= field.mask();
             rule.value = field.insert(rule.value, value);
         }

@@ -10,6 +10,7 @@ use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
 use crate::parts::fault::Fault;
 use crate::quantity::{Quantity, limits, to_word};
+use crate::scale::Scale;
 use crate::text::{parameter_address, parse_address, parse_code};
 
 /// An item and the line it came from.
@@ -49,7 +50,7 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
             "note",
             "source",
         ],
-        optional: &["words", "variant"],
+        optional: &["words", "order", "variant"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let name = row.required("name")?;
@@ -84,7 +85,7 @@ pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> 
             "note",
             "source",
         ],
-        optional: &["address", "name", "words"],
+        optional: &["address", "name", "words", "order"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let (code, address) = place(row, listed)?;
@@ -258,10 +259,11 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
             return Err(row.broken("what has a \"variant\" has one word"));
         }
     }
-    let decimals = match row.text("scale") {
+    let scale = match row.text("scale") {
         "" => None,
-        text => Some(text.parse().ok().and_then(decimals).ok_or_else(|| {
-            row.broken(format!("scale \"{text}\" must be 1, 10, 100, 1000 or 10000, or empty if unknown"))
+        text => Some(Scale::parse(text).ok_or_else(|| {
+            let right = "1, 10, 100, 1000 or 10000, a ratio such as 16384/100, or empty if unknown";
+            row.broken(format!("scale \"{text}\" must be {right}"))
         })?),
     };
     let wide = match row.text("words") {
@@ -271,9 +273,10 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     };
     let mut quantity = Quantity {
         unit: row.text("unit").to_owned(),
-        decimals,
+        scale,
         signed: row.flag("signed")?,
         wide,
+        high_first: high_first(row, wide)?,
         low: None,
         high: None,
         low_from,
@@ -291,9 +294,17 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     }
 }
 
-/// Digits after the point for so many counts per unit.
-pub(super) fn decimals(scale: u32) -> Option<u8> {
-    (0..=4).find(|&decimals| 10_u32.pow(u32::from(decimals)) == scale)
+/// Which of two words comes first.
+fn high_first(row: &Row<'_>, wide: bool) -> Result<bool, ProfileError> {
+    match row.text("order") {
+        "" => Ok(false),
+        order if !wide => {
+            Err(row.broken(format!("\"order\" is \"{order}\", and only two words have an order: leave it empty")))
+        }
+        "low first" => Ok(false),
+        "high first" => Ok(true),
+        other => Err(row.broken(format!("\"order\" is \"{other}\" and must be low first or high first"))),
+    }
 }
 
 /// Whether the range of `quantity`, as far as it is known, holds `count`.
@@ -312,7 +323,7 @@ fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i64>
 fn count(row: &Row<'_>, column: &str, text: &str, quantity: &Quantity) -> Result<i64, ProfileError> {
     let counts = match parse_address(text) {
         Some(word) => Some(Counts::Whole(i64::from(word))),
-        None => Decimal::parse(text).map(|number| number.counts(quantity.decimals())),
+        None => Decimal::parse(text).map(|number| quantity.counts_of(&number)),
     };
     let (least, most) = limits(quantity.signed, quantity.wide);
     match counts {

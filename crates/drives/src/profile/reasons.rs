@@ -12,7 +12,7 @@ impl Profile {
         if !known.verified {
             return Some(&self.commands_note);
         }
-        let register = self.entry_at(known.elsewhere.or(self.command_address)?)?;
+        let register = self.written_entry_at(known.elsewhere.or(self.command_address)?)?;
         (!register.verified()).then_some(&register.note)
     }
 

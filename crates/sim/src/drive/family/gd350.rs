@@ -35,6 +35,7 @@ pub(crate) fn gd350() -> Family {
         parameters: Vec::new(),
         factory: FACTORY,
         // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
         roles: Roles {
@@ -60,6 +61,7 @@ pub(crate) fn gd350() -> Family {
             response_delay: Some(0x0E03),
             bus_timeout: Some(Scaled::tenths(0x0E04)),
             on_silence: Some(Silence::at(0x0E05)),
+            handshake: None,
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,

@@ -18,11 +18,11 @@ use drivebus_drives::{
 };
 
 use super::{
-    Bit, Family, Faults, Flag, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled, Shows,
-    Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Bit, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled,
+    Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::map::{Access, bounds};
+use crate::drive::map::{Access, bounds, low_word};
 use crate::drive::refusal::Refusal;
 
 /// What the bus reads at a register that has this name and this unit.
@@ -49,6 +49,8 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
     let obeys = own.conditions(profile.control());
     let needs = profile.setpoints().get(&Setpoint::Frequency).map(|setpoint| setpoint.needs.as_slice());
     let needs = own.conditions(needs.unwrap_or_default());
+    let [_, _, stopped, _] = states;
+    let handshake = Handshake::of(profile, stopped).map_err(|lack| own.missing.push(lack)).unwrap_or_default();
     if !own.missing.is_empty() {
         return Err(own.missing);
     }
@@ -58,6 +60,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         obeys,
         speed,
         max_frequency,
+        handshake,
         ..own.roles()
     };
     let delay = profile.serial().map(|serial| u16::try_from(serial.response_delay.as_millis()).unwrap_or(u16::MAX));
@@ -82,6 +85,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
         factory: &[],
+        control_word: None,
         elsewhere: own.elsewhere(),
         capped: &[],
         roles,
@@ -198,7 +202,8 @@ impl Own<'_> {
             self.miss(PLACE, &what);
             return None;
         };
-        let parameter = variant.and_then(|variant| self.address_of(&variant.parameter));
+        // Of two words the low one tells: a choice has one word.
+        let parameter = variant.and_then(|variant| self.profile.find(&variant.parameter).ok()).and_then(low_word);
         Some(Speed { register, unit: parameter.map(|parameter| (parameter, choices)), usual })
     }
 
@@ -287,7 +292,7 @@ impl Own<'_> {
         let kept: Vec<u16> = self.kept_registers().collect();
         let placed = entries.filter_map(|entry| Some((entry, entry.address()?)));
         let placed = placed.filter(|(_, address)| !kept.contains(address));
-        placed
+        let registers = placed
             .flat_map(|(entry, address)| {
                 let access = match entry.access() {
                     ProfileAccess::Ro => Access::ReadOnly,
@@ -298,12 +303,17 @@ impl Own<'_> {
                     Some(_) if self.has_role(entry, "setpoints.frequency") => Range::Speed,
                     _ => Range::Within(bounds(self.profile, entry.quantity())),
                 };
-                let register = Register { address, access, range, shows: self.shows(entry, states) };
-                let second = (entry.words() == 2).then(|| Register::read(address.wrapping_add(1), Shows::Zero));
-                [Some(register), second]
+                let shows = self.shows(entry, states);
+                if entry.words() == 1 {
+                    return vec![Register { address, access, range, shows }];
+                }
+                // Two words are only read, and nothing that is shown fills the high one.
+                let low = low_word(entry).unwrap_or(address);
+                let high = if low == address { address.wrapping_add(1) } else { address };
+                vec![Register::read(low, shows), Register::read(high, Shows::Zero)]
             })
-            .flatten()
-            .collect()
+            .collect();
+        register::joined(registers)
     }
 
     fn has_role(&self, entry: &Entry, role: &str) -> bool {
@@ -349,7 +359,8 @@ impl Own<'_> {
 
 /// Counts in one unit of `quantity`.
 fn counts(quantity: &Quantity) -> f64 {
-    f64::from(quantity.scale().unwrap_or(1))
+    let (counts, units) = quantity.ratio().unwrap_or((1, 1));
+    f64::from(counts) / f64::from(units)
 }
 
 /// What a command does to the motor.
