@@ -209,8 +209,7 @@ impl Quantity {
     }
 
     fn value(&self, count: i64) -> Value {
-        let scale = self.scale_or_one();
-        Value::new(count, scale.digits(count), scale.decimals())
+        Value::new(count, self.scale_or_one())
     }
 }
 

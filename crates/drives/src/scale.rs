@@ -6,54 +6,55 @@
 use crate::decimal::{Counts, Decimal};
 
 /// `counts` counts are `units` units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Scale {
     /// Without a common divisor, as `units`.
-    counts: u32,
-    units: u32,
+    counts: u16,
+    units: u16,
     /// Digits after the point: the fewest at which every count reads differently.
     decimals: u8,
+    /// Whether a count is a step of the last digit, as nearly everywhere.
+    is_decimal: bool,
 }
 
-/// The most counts, and the most units, that a scale may name.
-const MOST: u32 = 65_535;
 /// The most counts in one unit that a plain number says: 10^4.
 const MOST_DECIMALS: u8 = 4;
 
 impl Scale {
     /// One count is one unit.
-    pub(crate) const ONE: Self = Self { counts: 1, units: 1, decimals: 0 };
+    pub(crate) const ONE: Self = Self { counts: 1, units: 1, decimals: 0, is_decimal: true };
 
     /// Reads `text`: `1`, `10`, `100`, `1000` or `10000` counts in one unit, or a ratio such as `16384/100`: 16384 counts are
     /// 100 units.
     pub(crate) fn parse(text: &str) -> Option<Self> {
-        let number = |text: &str| text.trim().parse().ok();
         match text.split_once('/') {
-            None => Self::decimal(number(text)?),
-            Some((counts, units)) => Self::ratio(number(counts)?, number(units)?),
+            None => Self::decimal(text.trim().parse().ok()?),
+            Some((counts, units)) => Self::ratio(counts.trim().parse().ok()?, units.trim().parse().ok()?),
         }
     }
 
     /// The scale of so many counts per unit, if that is a power of ten up to 10000.
     pub(crate) fn decimal(counts: u32) -> Option<Self> {
         let decimals = (0..=MOST_DECIMALS).find(|&decimals| 10_u32.pow(decimals.into()) == counts)?;
-        Some(Self { counts, units: 1, decimals })
+        Some(Self { counts: u16::try_from(counts).ok()?, units: 1, decimals, is_decimal: true })
     }
 
-    fn ratio(counts: u32, units: u32) -> Option<Self> {
-        if !(1..=MOST).contains(&counts) || !(1..=MOST).contains(&units) {
+    /// Counts and units are 1 to 65535 each.
+    fn ratio(counts: u16, units: u16) -> Option<Self> {
+        if counts == 0 || units == 0 {
             return None;
         }
         let divisor = greatest_common_divisor(counts, units);
         let (counts, units) = (counts / divisor, units / divisor);
         // With one digit less a count would be less than one step of the last digit, and two of 65536 would read the same.
-        let decimals = (0..=5).find(|&decimals| u64::from(units) * 10_u64.pow(decimals.into()) >= u64::from(counts))?;
-        Some(Self { counts, units, decimals })
+        let steps = |decimals: u8| u64::from(units) * 10_u64.pow(decimals.into());
+        let decimals = (0..=5).find(|&decimals| steps(decimals) >= u64::from(counts))?;
+        Some(Self { counts, units, decimals, is_decimal: units == 1 && steps(decimals) == u64::from(counts) })
     }
 
     /// Counts and units, without a common divisor.
     pub(crate) fn as_ratio(self) -> (u32, u32) {
-        (self.counts, self.units)
+        (self.counts.into(), self.units.into())
     }
 
     /// Digits after the point.
@@ -63,14 +64,16 @@ impl Scale {
 
     /// Whether every count is a number of so many digits, exactly.
     pub(crate) fn is_decimal(self) -> bool {
-        self.units == 1 && self.counts == 10_u32.pow(self.decimals.into())
+        self.is_decimal
     }
 
     /// The value of `count` × 10^decimals: the nearest whole number, and of two the one farther from zero.
+    #[inline]
     pub(crate) fn digits(self, count: i64) -> i64 {
-        if self.is_decimal() {
-            return count;
-        }
+        if self.is_decimal { count } else { self.rounded(count) }
+    }
+
+    fn rounded(self, count: i64) -> i64 {
         let (steps, counts) = (self.steps(), i128::from(self.counts));
         let magnitude = (i128::from(count).abs() * steps * 2 + counts) / (counts * 2);
         signed(magnitude, count < 0)
@@ -78,7 +81,7 @@ impl Scale {
 
     /// The count nearest to the value `digits` / 10^decimals, and of two the one nearer to zero: never more than was asked.
     fn nearest(self, digits: i64) -> i64 {
-        if self.is_decimal() {
+        if self.is_decimal {
             return digits;
         }
         let (steps, counts) = (self.steps(), i128::from(self.counts));
@@ -109,7 +112,7 @@ impl Scale {
     }
 }
 
-fn greatest_common_divisor(mut one: u32, mut other: u32) -> u32 {
+fn greatest_common_divisor(mut one: u16, mut other: u16) -> u16 {
     while other != 0 {
         (one, other) = (other, one % other);
     }
