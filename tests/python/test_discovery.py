@@ -18,6 +18,8 @@ from drivebus.sim import FAULT_KINDS
 FAMILIES = [name for name in sorted(drivebus.profiles()) if Profile.builtin(name).parameter_groups()]
 """Those whose codes tell their addresses: of any other there is no code to try."""
 
+LISTED = sorted({*drivebus.profiles()} - {*FAMILIES})
+
 MOST = {"gd350": 9_900, "vfd500": 10_400}
 """Reads: one for each number that is not there, and some for each run."""
 

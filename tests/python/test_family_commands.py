@@ -51,9 +51,10 @@ def line(family: dict[str, Any]) -> Iterator[tuple[Simulator, Bus]]:
 
 def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
     """Unit 1; one whose speed has a unit that a parameter decides is told which: no page prints the numbers of that."""
-    if Profile.builtin(family).variants():
-        return bus.drive(1, family, unverified=unverified, variants={"speed_unit": "Hz"})
-    return bus.drive(1, family, unverified=unverified)
+    variants = {"speed_unit": "Hz", "base_frequency": "50 Hz"}
+    own = Profile.builtin(family).variants()
+    chosen = {name: choice for name, choice in variants.items() if name in own}
+    return bus.drive(1, family, unverified=unverified, variants=chosen or None)
 
 
 def prepare(drive: Drive) -> None:
@@ -65,7 +66,8 @@ def words_of(family: dict[str, Any], command: str) -> list[tuple[int | None, int
     """Address and word of all that *command* takes from rest: some families want words before a run."""
     table = family["commands"]
     before: list[int] = table.get("sequence", []) if command in STARTS else []
-    return [(given(table["register"]), word) for word in (*before, given(table[command]))]
+    first = [(given(table["register"]), word) for word in before]
+    return [*first, (place_of(family, command), given(table[command]))]
 
 
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
