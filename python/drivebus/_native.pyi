@@ -469,6 +469,8 @@ class Profile:
         """Whether state word 1 says that the drive is in fault, which it may run in."""
     def state_tells_fault(self) -> bool:
         """Whether the state word can say that the drive is in fault."""
+    def rest_by_frequency(self) -> bool:
+        """Whether a motor only rests once its output frequency is zero, too."""
     def state_reason(self) -> str | None:
         """Why the states are not verified."""
     def control(self) -> list[dict[str, Any]]:

@@ -141,8 +141,8 @@ class Status:
         source: Where it takes its commands from.
         motor: Which motor's data are in force, 1..4.
         overload_alarm: Whether it warns that a motor overload is near.
-        frequency: Output frequency in Hz.
-        setpoint: Set frequency in force, in Hz.
+        frequency: Output frequency in Hz, without a sign: the state tells the direction.
+        setpoint: Set frequency in force, in Hz, without a sign.
         fault: The present fault, or None.
         fields: Every field of the status word in the drive's own words.
         time: Unix time in seconds at which the first of it was asked for; 0.0 where nothing was.

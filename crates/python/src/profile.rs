@@ -327,6 +327,11 @@ impl Profile {
         Ok(self.0.is_in_fault(one_word("raw", raw)?))
     }
 
+    /// Whether a motor only rests once its output frequency is zero, too.
+    fn rest_by_frequency(&self) -> bool {
+        self.0.state_word().is_some_and(|word| word.rest_by_frequency)
+    }
+
     /// Whether the state word can say that the drive is in fault.
     fn state_tells_fault(&self) -> bool {
         self.0.state_tells_fault()

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivebus.hal.pins import Asked
+from drivebus.operations.speed import STANDSTILL
 from drivebus.values import State
 
 __all__ = ["Action", "Coast", "Course", "Look", "Reset", "Run", "Scale", "Speed", "Spindle", "Stop"]
-
-STANDSTILL = 0.05
-"""Output frequency in Hz up to which a drive that has stopped counts as stopped."""
 
 PATIENCE = 3.0
 """Seconds for which the frequency of a motor that was told to stop may stay as it is."""

@@ -129,7 +129,10 @@ class BusTimeout:
         """Whether the motor is stopped, once it no longer slows down."""
         bus = self._unit.bus
         lowest, deadline = math.inf, bus.now()
-        while not (await state.state(self._unit)).at_rest:
+        while True:
+            seen = await state.state(self._unit)
+            if seen.at_rest and not await speed.turns_in_spite_of(self._unit, seen, urgent=False):
+                return True
             frequency = await speed.output_frequency(self._unit)
             now = bus.now()
             if frequency is not None and frequency < lowest:
@@ -137,7 +140,6 @@ class BusTimeout:
             elif now >= deadline:
                 return False
             await bus.sleep(POLL_INTERVAL)
-        return True
 
     def __repr__(self) -> str:
         now = "armed" if self.armed else "off"

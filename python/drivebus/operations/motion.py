@@ -235,12 +235,13 @@ def proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, withi
     async def shows(seen: Seen) -> bool:
         nonlocal by_ramp, ramp
         asked = unit.bus.now()
-        if seen.state.at_rest:
+        urgent = not fall.is_overdue(asked)
+        turns = await speed.turns_in_spite_of(unit, seen.state, urgent=urgent)
+        if seen.state.at_rest and not turns:
             return fall.rests(asked)
         fall.goes_on()
-        if not seen.state.running:
+        if not (seen.state.running or turns):
             return False
-        urgent = not fall.is_overdue(asked)
         frequency, setpoint = await speed.frequencies(unit, urgent=urgent)
         if frequency is None:
             return False

@@ -9,9 +9,12 @@ from typing import NamedTuple
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.operations import control, registers, words
 from drivebus.operations.unit import Unit
-from drivebus.values import Value
+from drivebus.values import State, Value
 
-__all__ = ["Ramp", "frequencies", "output_frequency", "ramp"]
+__all__ = ["STANDSTILL", "Ramp", "frequencies", "output_frequency", "ramp", "turns_in_spite_of"]
+
+STANDSTILL = 0.05
+"""Output frequency in Hz up to which a drive that has stopped counts as stopped."""
 
 
 class Ramp(NamedTuple):
@@ -50,12 +53,20 @@ async def ramp(unit: Unit, *, urgent: bool) -> Ramp:
 
 
 async def output_frequency(unit: Unit, *, urgent: bool = False) -> float | None:
-    """The output frequency in Hz; None where the family does not tell."""
+    """The output frequency in Hz, whichever way the motor turns; None where the family does not tell."""
     register = unit.profile.role("frequency")
     if register is None or unit.evidence.unreadable(register) is not None:
         return None
     [word] = await words.read_words(unit, unit.profile.address(register), urgent=urgent)
-    return float(registers.value(unit, register, word))
+    return abs(float(registers.value(unit, register, word)))
+
+
+async def turns_in_spite_of(unit: Unit, state: State, *, urgent: bool) -> bool:
+    """Whether a motor whose *state* says that it rests still turns, in a family whose word may say so on the ramp."""
+    if not state.at_rest or not unit.profile.rest_by_frequency():
+        return False
+    frequency = await output_frequency(unit, urgent=urgent)
+    return frequency is not None and frequency > STANDSTILL
 
 
 async def _told(unit: Unit, names: Sequence[str], *, urgent: bool) -> dict[str, Value]:

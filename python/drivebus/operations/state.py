@@ -205,7 +205,8 @@ async def _status(unit: Unit, seen: Seen) -> Status:
         else:
             names[role] = name
     frequencies = await registers.snapshot(unit, *names.values()) if names else {}
-    told = {role: float(frequencies[name]) for role, name in names.items()}
+    # The state tells the direction; some families have it in the sign as well.
+    told = {role: abs(float(frequencies[name])) for role, name in names.items()}
     motor = seen.fields.get("motor", "")
     ready = seen.fields.get("ready")
     alarm = seen.fields.get("overload_alarm")

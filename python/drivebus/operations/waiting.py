@@ -8,13 +8,11 @@ from drivebus import checks
 from drivebus.errors import NotAllowed, Unconfirmed
 from drivebus.operations import state
 from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.speed import STANDSTILL
 from drivebus.operations.unit import Unit
 from drivebus.values import State, Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
-
-_STANDSTILL = 0.05
-"""Output frequency in Hz below which a drive that has stopped counts as stopped."""
 
 
 async def wait_for_speed(
@@ -76,7 +74,7 @@ async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: b
     """
 
     def stopped(status: Status) -> bool:
-        turns = status.frequency is not None and status.frequency > _STANDSTILL
+        turns = status.frequency is not None and status.frequency > STANDSTILL
         return status.state.at_rest and not turns
 
     unit = unit.trusting(unverified)

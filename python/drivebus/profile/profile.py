@@ -310,6 +310,10 @@ class Profile:
         """Whether the state word can say that the drive is in fault. Where it cannot, the fault number alone does."""
         return self._native.state_tells_fault()
 
+    def rest_by_frequency(self) -> bool:
+        """Whether a motor only rests once its output frequency is zero, too: its state word may say so on the ramp."""
+        return self._native.rest_by_frequency()
+
     def state_reason(self) -> str | None:
         """Why the states are not verified; None where they are, or where the family has no state word."""
         return self._native.state_reason()

@@ -129,6 +129,9 @@ class Recording:
         half = snapshot.duration / 2
         time = bus.now() - half
         values = {name: float(snapshot[name]) for name in self._names}
+        roles = self._bounds.roles
+        # A course has no direction; some families have it in the sign.
+        values |= {name: abs(values[name]) for name in (roles.frequency, roles.setpoint) if name in values}
         if not self.samples.times:
             self.samples.began = snapshot.time + half - time
         self.samples.add(time, values)

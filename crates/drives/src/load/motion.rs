@@ -167,6 +167,7 @@ pub(super) fn state(
     profile.state = Some(StateWord {
         register: register.name.clone(),
         rules,
+        rest_by_frequency: table.rest_by_frequency,
         verified: table.verified,
         note: table.note.clone(),
         source: table.source.clone(),

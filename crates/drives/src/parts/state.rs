@@ -58,6 +58,8 @@ pub struct StateWord {
     pub register: String,
     /// Which words mean which state: of those that fit, one that runs, else the first.
     pub rules: Vec<StateRule>,
+    /// Whether the word may say that the motor rests while it slows down, so that its frequency has to say so, too.
+    pub rest_by_frequency: bool,
     /// Whether a document of this family prints it.
     pub verified: bool,
     /// What to know about it; says what is assumed where it is not verified.

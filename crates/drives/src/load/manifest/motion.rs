@@ -126,6 +126,9 @@ pub(in crate::load) struct States {
     /// By bits: the first that fits.
     #[serde(default)]
     pub(in crate::load) when: Vec<Placed<When>>,
+    /// Whether a motor only rests once its output frequency is zero, too: the word may say so while it slows down.
+    #[serde(default)]
+    pub(in crate::load) rest_by_frequency: bool,
     /// Whether a document of this very family prints it.
     #[serde(default = "yes")]
     pub(in crate::load) verified: bool,

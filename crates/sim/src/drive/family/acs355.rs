@@ -73,6 +73,7 @@ fn exception(refusal: Refusal) -> u8 {
 
 const COMMANDS: &[(u16, Command)] = &[
     (0x0476, Command::Coast),
+    (0x047C, Command::Coast),
     (0x047D, Command::Coast),
     (0x047E, Command::Stop),
     (0x047F, Command::Run(Direction::Forward)),
