@@ -406,7 +406,7 @@ class TestWhatTells:
         drive = bus.drive(1, "vfd500", unverified=True)
         read = bus.read
 
-        def other(unit: int, place: int, *rest: int, **how: bool) -> list[int]:
+        def other(unit: int, place: int, *rest: int, **how: Any) -> list[int]:
             # 6300H is nowhere: the drive itself refuses.
             return read(unit, 0x6300 if place == address else place, *rest, **how)
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use drivebus_drives::{Command, Entry, Evidence, Input, Profile, Store, UnitKind, Value};
+use drivebus_drives::{Command, Entry, Evidence, Input, Place, Profile, Store, UnitKind, Value};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -36,12 +36,12 @@ struct Family {
 #[derive(Deserialize, Clone)]
 #[serde(untagged)]
 enum Word {
-    Is(u16),
+    Is(u32),
     None(String),
 }
 
 impl Word {
-    fn get(&self) -> Option<u16> {
+    fn get(&self) -> Option<u32> {
         match self {
             Self::Is(word) => Some(*word),
             Self::None(text) => {
@@ -59,9 +59,9 @@ struct Commands {
     needs_unverified: Vec<String>,
     /// Commands that another register takes.
     #[serde(default)]
-    elsewhere: BTreeMap<String, u16>,
+    elsewhere: BTreeMap<String, u32>,
     other: BTreeMap<String, String>,
-    moves: Vec<u16>,
+    moves: Vec<u32>,
     #[serde(flatten)]
     codes: BTreeMap<String, Word>,
 }
@@ -140,13 +140,14 @@ fn the_table_has_every_family_and_every_command() {
 fn every_command_of_every_family_is_that_of_the_table() {
     for (family, profile) in families() {
         let (name, table) = (&family.name, &family.commands);
-        assert_eq!(profile.command_address(), table.register.get(), "{name}");
+        assert_eq!(profile.command_address().map(Place::number), table.register.get(), "{name}");
         let mut defined: BTreeSet<u16> = BTreeSet::new();
         for command in Command::ALL {
-            let code = table.codes[command.name()].get();
+            let code = table.codes[command.name()].get().map(|code| u16::try_from(code).unwrap());
             let elsewhere = table.elsewhere.get(command.name()).copied();
             let expected = code.map(|code| (elsewhere.or(table.register.get()).unwrap(), code));
-            assert_eq!(profile.command(command), expected, "{name} {}", command.name());
+            let known = profile.command(command).map(|(place, code)| (place.number(), code));
+            assert_eq!(known, expected, "{name} {}", command.name());
             let in_doubt = profile.command_reason(command).is_some();
             assert_eq!(
                 in_doubt,
@@ -164,7 +165,8 @@ fn every_command_of_every_family_is_that_of_the_table() {
             defined.insert(code);
         }
         assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
-        let moving: Vec<u16> = (0..0x8000).filter(|&address| profile.is_command(address)).collect();
+        let places = (0..0x5_0000).filter_map(Place::of_number).filter(|place| place.address < 0x8000);
+        let moving: Vec<u32> = places.filter(|&place| profile.is_command(place)).map(Place::number).collect();
         assert_eq!(moving, table.moves, "{name}");
     }
 }
@@ -206,8 +208,8 @@ fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
         };
         let entry = profile.find(&table.parameter).unwrap();
         let ram = profile.write_address(entry, Store::Ram);
-        assert_eq!(ram.as_ref().ok().copied(), table.ram.get(), "{}: {ram:?}", family.name);
-        let eeprom = profile.write_address(entry, Store::Eeprom).ok();
+        assert_eq!(ram.as_ref().ok().copied().map(Place::number), table.ram.get(), "{}: {ram:?}", family.name);
+        let eeprom = profile.write_address(entry, Store::Eeprom).ok().map(Place::number);
         assert_eq!(eeprom, table.eeprom.get(), "{}: {}", family.name, table.source);
         let in_doubt = profile.memory().is_some_and(|memory| !memory.verified);
         assert_eq!(in_doubt, table.needs_unverified, "{}", family.name);
@@ -220,8 +222,8 @@ fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
 fn the_memory_bit_is_never_set_on_a_register() {
     for (family, profile) in families() {
         for entry in profile.entries().filter(|entry| entry.code().is_none()) {
-            if let Ok(address) = profile.write_address(entry, Store::Ram) {
-                assert_eq!(Some(address), entry.address(), "{} {}", family.name, entry.name());
+            if let Ok(place) = profile.write_address(entry, Store::Ram) {
+                assert_eq!(Some(place), entry.place(), "{} {}", family.name, entry.name());
             }
             assert!(profile.write_address(entry, Store::Eeprom).is_err(), "{} {}", family.name, entry.name());
         }

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import drivebus
+from drivebus import places
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
 
@@ -107,7 +108,7 @@ def _identification(profile: drivebus.Profile) -> list[str]:
     signature = profile.signature()
     if signature is not None:
         told = [
-            f"{what} {', '.join(f'{address:04X}H' for address in signature[key])}"
+            f"{what} {', '.join(places.shown(place) for place in signature[key])}"
             for key, what in (("answers", "answers"), ("refuses", "refuses"))
             if signature[key]
         ]
@@ -123,7 +124,7 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     lines = []
     registers = profile.command_registers()
     for address in sorted(registers, key=lambda address: address != profile.command_address):
-        lines.append(f"written to {address:04X}H")
+        lines.append(f"written to {places.shown(address)}")
         for code, label in sorted(registers[address].items()):
             doubt = " [unverified]" if label in reasons else ""
             lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
@@ -218,7 +219,7 @@ def _left_alone(profile: drivebus.Profile) -> list[str]:
 
 def _place(profile: drivebus.Profile, name: str) -> str:
     row = profile.describe(name)
-    return f"{name}, whose address is not known" if row.address is None else f"{name} ({row.address:04X}H)"
+    return f"{name}, whose address is not known" if row.address is None else f"{name} ({places.shown(row.place or 0)})"
 
 
 def _doubt(verified: bool, note: str) -> str:

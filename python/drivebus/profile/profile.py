@@ -183,10 +183,10 @@ class Profile:
         return self._native.monitor_names()
 
     def name_at(self, address: int, /) -> str | None:
-        """The register or parameter at *address* (0..0xFFFF), or None."""
+        """The register or parameter at *address* (0..0xFFFF, or the `place` of another table), or None."""
         if not self._places:
             # The first of two names for one place is the one that is meant.
-            self._places = {self.describe(name).address: name for name in reversed(self._names)}
+            self._places = {self.describe(name).place: name for name in reversed(self._names)}
         return self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
@@ -202,7 +202,10 @@ class Profile:
         return address if stored is None else stored
 
     def address(self, name: str, /, *, store: bool | None = None) -> int:
-        """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True)."""
+        """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True).
+
+        Beside the holding registers that is its `Description.place`.
+        """
         return self._native.address(name, store=store)
 
     def read_back(self, name: str, /) -> int | None:
@@ -268,7 +271,7 @@ class Profile:
 
     @property
     def command_address(self) -> int | None:
-        """Where commands are written, 0..0xFFFF; None where the family has none."""
+        """Where commands are written, as `address` tells places; None where the family has none."""
         return self._native.command_address
 
     def memory(self) -> dict[str, Any] | None:

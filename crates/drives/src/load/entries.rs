@@ -9,13 +9,14 @@ use super::problems::Problems;
 use super::rows::Located;
 use crate::entry::{Entry, Kind, names};
 use crate::parts::memory::Memory;
+use crate::place::{Place, Table};
 use crate::text::{closest, group, parse_code};
 
 /// The registers and parameters, and where each address is.
 #[derive(Debug, Default)]
 pub(super) struct Entries {
     pub(super) list: Vec<Entry>,
-    pub(super) by_address: BTreeMap<u16, usize>,
+    pub(super) by_address: BTreeMap<Place, usize>,
     /// Some rows were broken, so that a name that is missing may be theirs.
     pub(super) incomplete: bool,
 }
@@ -33,8 +34,8 @@ impl Entries {
         for (file, Located { line, item }) in rows {
             if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| is_called(other, name))) {
                 problems.add(file, line, format!("{twice} is there twice"));
-            } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
-                let reason = format!("{} is at {address:04X}H, where {} is already", item.name, other.name);
+            } else if let Some((other, place)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
+                let reason = format!("{} is at {place}, where {} is already", item.name, other.name);
                 problems.add(file, line, reason);
             } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
                 problems.add(file, line, reason);
@@ -48,10 +49,10 @@ impl Entries {
         let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
         list.append(&mut own);
         list.sort_by(|one, other| {
-            let place = |entry: &Entry| (entry.kind, entry.address.is_none(), entry.address);
+            let place = |entry: &Entry| (entry.kind, entry.place.is_none(), entry.place);
             place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
         });
-        let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.address?, index))).collect();
+        let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.place?, index))).collect();
         Self { list, by_address, incomplete: false }
     }
 
@@ -135,16 +136,18 @@ fn is_called(entry: &Entry, name: &str) -> bool {
     names(entry).any(|own| own.eq_ignore_ascii_case(name))
 }
 
-/// An address that both have.
-pub(super) fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
+/// A place that both have.
+pub(super) fn overlap(one: &Entry, other: &Entry) -> Option<Place> {
     let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
-    let (first, second) = (one.address?, other.address?);
-    (first.max(second) <= last(first, one).min(last(second, other))).then_some(first.max(second))
+    let (Place { table, address: first }, second) = (one.place?, other.place?);
+    let meet = first.max(second.address);
+    let both = table == second.table && meet <= last(first, one).min(last(second.address, other));
+    both.then_some(Place::new(table, meet))
 }
 
 /// Why `entry` cannot stand at its address.
 fn out_of_place(entry: &Entry, closed_groups: &[u8], memory: Option<&Memory>) -> Option<String> {
-    let address = entry.address?;
+    let Place { table: Table::Holding, address } = entry.place? else { return None };
     let [group, _] = address.to_be_bytes();
     if entry.kind == Kind::Parameter && closed_groups.contains(&group) {
         return Some(format!("{} is in the group {group}, which is one of \"closed_groups\"", entry.name));

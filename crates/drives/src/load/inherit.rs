@@ -52,13 +52,13 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.watchdog.take_if(|watchdog| {
             !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
         });
-        base.moving.retain(|&address| Some(address) != gone.address);
-        if base.command_address.is_some_and(|address| Some(address) == gone.address) {
+        base.moving.retain(|&place| Some(place) != gone.place);
+        if base.command_address.is_some_and(|place| Some(place) == gone.place) {
             base.command_address = None;
             base.commands.clear();
             base.other_commands.clear();
         }
-        base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != gone.address));
+        base.commands.retain(|_, known| known.elsewhere.is_none_or(|place| Some(place) != gone.place));
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {

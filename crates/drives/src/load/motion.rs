@@ -35,7 +35,7 @@ pub(super) fn commands(
         }
     }
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
-    profile.command_address = register.address;
+    profile.command_address = register.place;
     register.quantity.choices.clear();
     let mut choices = std::collections::BTreeMap::new();
     for (command, spanned, verified) in all {
@@ -71,7 +71,7 @@ pub(super) fn commands(
         elsewhere(file, command, other, profile, entries, problems);
     }
     let moves = entries.names(file, &table.moves, problems);
-    profile.moving = moves.iter().filter_map(|name| entries.find(name)?.address).collect();
+    profile.moving = moves.iter().filter_map(|name| entries.find(name)?.place).collect();
 }
 
 /// A command in a register of its own.
@@ -89,7 +89,7 @@ fn elsewhere(
         problems.add(file, place, format!("a rectifier feeds no motor: it has no {}", command.name()));
     }
     // Without an address of its own it would go to the command register, where the word means something else.
-    let Some(address) = register.address else {
+    let Some(address) = register.place else {
         problems.add(file, place, format!("{} takes {}, so it needs an address", register.name, command.name()));
         return;
     };

@@ -9,6 +9,7 @@ use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
 use crate::parts::fault::Fault;
+use crate::place::{Place, Table};
 use crate::quantity::{Quantity, limits, to_word};
 use crate::text::{parameter_address, parse_address, parse_code};
 
@@ -49,7 +50,7 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
             "note",
             "source",
         ],
-        optional: &["words", "variant"],
+        optional: &["table", "words", "variant"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let name = row.required("name")?;
@@ -59,8 +60,17 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
                 row.broken(format!("address \"{text}\" must be hex such as 0x3004, or empty if nobody knows it"))
             })?),
         };
+        let table = table_of(row)?;
         let quantity = quantity(row, None, BTreeMap::new())?;
-        entry(row, Kind::Register, checked_name(row, name)?, None, address, quantity, None)
+        let quantity = if table.is_bits() { bit(row, quantity)? } else { quantity };
+        let place = address.map(|address| Place::new(table, address));
+        let row_access = row.text("access");
+        if matches!(table, Table::Input | Table::Discrete) && row_access != "ro" {
+            let reason =
+                format!("table \"{}\" is only read: its \"access\" is {row_access} and must be ro", table.name());
+            return Err(row.broken(reason));
+        }
+        entry(row, Kind::Register, checked_name(row, name)?, None, place, quantity, None)
     })
 }
 
@@ -103,8 +113,28 @@ pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> 
             "" => None,
             name => Some(checked_name(row, name)?),
         };
-        entry(row, Kind::Parameter, code, alias, Some(address), quantity, default)
+        entry(row, Kind::Parameter, code, alias, Some(address.into()), quantity, default)
     })
+}
+
+/// The table that a row of registers is in.
+fn table_of(row: &Row<'_>) -> Result<Table, ProfileError> {
+    match row.text("table") {
+        "" => Ok(Table::Holding),
+        text => Table::named(text).ok_or_else(|| {
+            let known = Table::ALL.map(Table::name).join(", ");
+            row.broken(format!("table \"{text}\" must be one of {known}, or empty for holding"))
+        }),
+    }
+}
+
+/// `quantity` as that of a bit: 0 or 1, and nothing else.
+fn bit(row: &Row<'_>, quantity: Quantity) -> Result<Quantity, ProfileError> {
+    let is_plain = quantity.unit.is_empty() && quantity.decimals.unwrap_or(0) == 0 && quantity.high_from.is_none();
+    if !is_plain || quantity.signed || quantity.wide || quantity.variant.is_some() {
+        return Err(row.broken("a bit has no unit, scale, sign, variant or second word: leave those cells empty"));
+    }
+    Ok(Quantity { decimals: Some(0), low: Some(0), high: Some(1), ..quantity })
 }
 
 /// The code of a parameter and its address: the one that the row says, or the one that follows from the code.
@@ -213,7 +243,7 @@ fn entry(
     kind: Kind,
     name: String,
     alias: Option<String>,
-    address: Option<u16>,
+    place: Option<Place>,
     quantity: Quantity,
     default: Option<u16>,
 ) -> Result<Located<Entry>, ProfileError> {
@@ -224,7 +254,7 @@ fn entry(
     if quantity.wide && access != Access::Ro {
         return Err(row.broken("a value of two words can only be read: its \"access\" must be ro"));
     }
-    if quantity.wide && address == Some(u16::MAX) {
+    if quantity.wide && place.is_some_and(|place| place.address == u16::MAX) {
         return Err(row.broken("a value of two words does not fit at the last address"));
     }
     let (evidence, note, source) = evidence(row)?;
@@ -232,7 +262,7 @@ fn entry(
         name,
         alias,
         kind,
-        address,
+        place,
         label: row.required("label")?.to_owned(),
         quantity,
         bits: Vec::new(),

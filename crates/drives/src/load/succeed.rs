@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use crate::entry::{Entry, Kind, names};
 use crate::evidence::Evidence;
+use crate::place::Place;
 use crate::profile::Profile;
 
 /// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in
@@ -36,15 +37,15 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
             new.quantity.choices.clone_from(&old.quantity.choices);
         }
         called.insert(old.name.clone(), new.name.clone());
-        places.extend(old.address.map(|place| (place, new.address)));
+        places.extend(old.place.map(|place| (place, new.place)));
     }
     rename(base, &called);
-    let follow = |address: u16| places.get(&address).copied().unwrap_or(Some(address));
-    base.moving = base.moving.iter().filter_map(|&address| follow(address)).collect();
+    let follow = |place: Place| places.get(&place).copied().unwrap_or(Some(place));
+    base.moving = base.moving.iter().filter_map(|&place| follow(place)).collect();
     base.command_address = base.command_address.and_then(follow);
     base.commands.retain(|_, known| {
-        known.elsewhere.is_none_or(|address| {
-            known.elsewhere = follow(address);
+        known.elsewhere.is_none_or(|place| {
+            known.elsewhere = follow(place);
             known.elsewhere.is_some()
         })
     });
@@ -56,7 +57,7 @@ fn pairs(inherited: &[Entry], rows: &[&mut Entry]) -> BTreeMap<usize, usize> {
     let same_place = |old: &Entry, new: &Entry| {
         let unnamed = new.kind == Kind::Parameter && new.alias.is_none();
         let known = old.evidence != Evidence::Assumed || unnamed;
-        known && (share_a_name(old, new) || (old.address.is_some() && old.address == new.address))
+        known && (share_a_name(old, new) || (old.place.is_some() && old.place == new.place))
     };
     let mut pairs = BTreeMap::new();
     for same in [&same_word as &dyn Fn(&Entry, &Entry) -> bool, &same_place] {

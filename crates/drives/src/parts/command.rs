@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::place::Place;
+
 /// What a motor can be told. The codes differ from family to family; the profile owns them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -63,7 +65,7 @@ pub struct CommandCode {
     /// Whether a document of the family prints it.
     pub verified: bool,
     /// The register that takes it, where that is not the command register.
-    pub elsewhere: Option<u16>,
+    pub elsewhere: Option<Place>,
 }
 
 impl std::str::FromStr for Command {

@@ -54,10 +54,10 @@ pub(crate) struct Family {
     /// What [`Shows::Identification`] shows.
     pub(crate) identification: u16,
     /// The register that takes commands, and what each code does; codes it does not know are out of range.
-    pub(crate) command: Option<u16>,
+    pub(crate) command: Option<u32>,
     pub(crate) commands: Vec<(u16, Command)>,
     /// Commands in registers of their own: address, code, and what it does.
-    pub(crate) elsewhere: Vec<(u16, u16, Command)>,
+    pub(crate) elsewhere: Vec<(u32, u16, Command)>,
     /// Its bus registers; a later one replaces an earlier one at the same address.
     pub(crate) registers: Vec<Register>,
     /// Its parameters, beside those of the profile, which they replace at the same address.
@@ -161,12 +161,12 @@ impl Family {
     }
 
     /// Whether `address` takes commands.
-    pub(crate) fn takes_commands(&self, address: u16) -> bool {
+    pub(crate) fn takes_commands(&self, address: u32) -> bool {
         self.command == Some(address) || self.elsewhere.iter().any(|&(place, ..)| place == address)
     }
 
     /// What `code` does at `address`; `None` where it is out of range, or no command is taken there.
-    pub(crate) fn command_at(&self, address: u16, code: u16) -> Option<Command> {
+    pub(crate) fn command_at(&self, address: u32, code: u16) -> Option<Command> {
         let here = self.commands.iter().filter(|_| self.command == Some(address));
         let others = self.elsewhere.iter().filter(|&&(place, ..)| place == address);
         let mut known = here.copied().chain(others.map(|&(_, code, command)| (code, command)));

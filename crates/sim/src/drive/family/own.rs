@@ -13,8 +13,8 @@
 use std::borrow::Cow;
 
 use drivebus_drives::{
-    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, MemoryBit, Profile,
-    Quantity, Setpoint, State, UnitKind, Value,
+    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, MemoryBit, Place, Profile,
+    Quantity, Setpoint, State, Table, UnitKind, Value,
 };
 
 use super::{
@@ -77,7 +77,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
             None => Memory::EepromOnly,
         },
         identification: own.identification(),
-        command: profile.command_address(),
+        command: profile.command_address().map(Place::number),
         commands,
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
@@ -136,9 +136,9 @@ impl Own<'_> {
     }
 
     /// The commands that stand in registers of their own.
-    fn elsewhere(&self) -> Vec<(u16, u16, Command)> {
+    fn elsewhere(&self) -> Vec<(u32, u16, Command)> {
         let known = self.profile.commands().iter();
-        known.filter_map(|(&told, known)| Some((known.elsewhere?, known.code, done(told)))).collect()
+        known.filter_map(|(&told, known)| Some((known.elsewhere?.number(), known.code, done(told)))).collect()
     }
 
     /// The words for forward, reverse, stopped and fault. One that nothing asks for is that of a stopped motor.
@@ -183,7 +183,7 @@ impl Own<'_> {
     fn speed(&mut self) -> Option<Speed> {
         const PLACE: &str = "profile.toml, [setpoints.frequency]";
         let entry = self.profile.role("setpoints.frequency");
-        let Some((entry, register)) = entry.and_then(|entry| Some((entry, entry.address()?))) else {
+        let Some((entry, register)) = entry.and_then(|entry| Some((entry, entry.place()?.number()))) else {
             self.miss(PLACE, "no register that sets the frequency, or registers.csv has no address for it");
             return None;
         };
@@ -279,13 +279,14 @@ impl Own<'_> {
 
     /// The registers that the drive keeps its last faults in.
     fn kept_registers(&self) -> impl Iterator<Item = u16> {
-        self.profile.fault_history().filter(|entry| entry.kind() == EntryKind::Register).filter_map(Entry::address)
+        let is_kept = |entry: &&Entry| entry.kind() == EntryKind::Register && entry.table() == Table::Holding;
+        self.profile.fault_history().filter(is_kept).filter_map(Entry::address)
     }
 
     fn registers(&self, states: [u16; 4]) -> Vec<Register> {
         let entries = self.profile.entries().filter(|entry| entry.kind() == EntryKind::Register);
-        let kept: Vec<u16> = self.kept_registers().collect();
-        let placed = entries.filter_map(|entry| Some((entry, entry.address()?)));
+        let kept: Vec<u32> = self.kept_registers().map(u32::from).collect();
+        let placed = entries.filter_map(|entry| Some((entry, entry.place()?.number())));
         let placed = placed.filter(|(_, address)| !kept.contains(address));
         placed
             .flat_map(|(entry, address)| {
@@ -299,7 +300,7 @@ impl Own<'_> {
                     _ => Range::Within(bounds(self.profile, entry.quantity())),
                 };
                 let register = Register { address, access, range, shows: self.shows(entry, states) };
-                let second = (entry.words() == 2).then(|| Register::read(address.wrapping_add(1), Shows::Zero));
+                let second = (entry.words() == 2).then(|| Register::read(address + 1, Shows::Zero));
                 [Some(register), second]
             })
             .flatten()

@@ -60,7 +60,7 @@ impl Scaled {
 /// How the bus sets a speed.
 #[derive(Debug, Clone)]
 pub(crate) struct Speed {
-    pub(crate) register: u16,
+    pub(crate) register: u32,
     /// A parameter that decides what the register counts, and what its words decide.
     pub(crate) unit: Option<(u16, Vec<(u16, SpeedScale)>)>,
     /// What it counts otherwise.
@@ -87,7 +87,7 @@ pub(crate) enum SpeedUnit {
 
 impl Speed {
     /// Hundredths of a hertz, always.
-    pub(crate) const fn hertz(register: u16) -> Self {
+    pub(crate) const fn hertz(register: u32) -> Self {
         let usual = SpeedScale { unit: SpeedUnit::Hertz, counts: 100.0, bounds: Bounds::NONE };
         Self { register, unit: None, usual }
     }
