@@ -105,7 +105,21 @@ ON_THE_CORE = {
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "hal", "later", "line", "places", "plot", "record", "rtu", "sim", "site", "sniffer", "trial"},
+    "cli": {
+        "capture",
+        "drivebus",
+        "hal",
+        "later",
+        "line",
+        "places",
+        "plot",
+        "record",
+        "rtu",
+        "sim",
+        "site",
+        "sniffer",
+        "trial",
+    },
     "__main__": {"cli"},
 }
 

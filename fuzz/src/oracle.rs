@@ -164,7 +164,7 @@ pub(crate) fn lengths(here: &[u8]) -> Vec<usize> {
     let mut lengths = match here {
         [248..=255, ..] => vec![],
         [_, 1 | 2, ..] => {
-            let bytes = here.get(2).filter(|&&bytes| bytes >= 1 && bytes <= 250);
+            let bytes = here.get(2).filter(|&&bytes| (1..=250).contains(&bytes));
             vec![Some(8), bytes.map(|&bytes| 5 + usize::from(bytes))]
         }
         [_, 3 | 4, ..] => vec![Some(8), even(2, 250).map(|&bytes| 5 + usize::from(bytes))],

@@ -467,6 +467,8 @@ class Profile:
         Commands are `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`,
         `jog_stop`.
         """
+    def command_first(self, name: str, /) -> tuple[int, int] | None:
+        """Place and word of what is written before a command, or None."""
     def command_reason(self, name: str, /) -> str | None:
         """Why a command is not verified."""
     def commands(self) -> dict[str, int]: ...

@@ -15,7 +15,7 @@ from drivebus import Bus, Drive, NoAnswer, NotAllowed, Profile, Simulator
 from drivebus.discovery.walk import LAST, Walk
 from drivebus.sim import FAULT_KINDS
 
-LISTED = ["a1000", "eds300", "ms300", "saj8000m", "sunfar-e300"]
+LISTED = ["a1000", "eds300", "ms300", "saj8000m", "sunfar-e300", "wj200"]
 """Families whose codes do not tell their addresses."""
 
 FAMILIES = sorted({*drivebus.profiles()} - {*LISTED})

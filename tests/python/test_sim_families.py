@@ -34,6 +34,7 @@ FAMILIES = {
     18: "saj8000m",
     19: "eds300",
     20: "sunfar-e300",
+    21: "wj200",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

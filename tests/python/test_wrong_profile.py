@@ -41,10 +41,11 @@ SILENT_ON_CODES = [
     "saj8000m",
     "eds300",
     "sunfar-e300",
+    "wj200",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300"]
+SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "wj200"]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -65,6 +66,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
+    # This one has coils, which no other has.
+    "wj200": ["wj200"],
     # And this one 2104H and 2106H.
     "ms300": ["ms300"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
@@ -144,7 +147,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 400
+    assert len(PAIRS) == 441
 
 
 @every_pair

@@ -54,19 +54,16 @@ pub fn plan_reads(wanted: &[u16], max_words: u16, cost: ReadCost, readable: impl
 
 /// As [`plan_reads`], for values of one word or more, none of which is cut in two. Those wanted must not overlap.
 pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(Place) -> bool) -> Vec<ReadSpan> {
-    let of = |table| wanted.iter().copied().filter(|span| span.table == table).collect();
-    Table::ALL.into_iter().flat_map(|table| plan_table(table, of(table), rules, &readable)).collect()
-}
-
-/// As [`plan_spans`], for values of one table: no read runs from one into another.
-fn plan_table(
-    table: Table,
-    mut wanted: Vec<ReadSpan>,
-    rules: ReadRules,
-    readable: impl Fn(Place) -> bool,
-) -> Vec<ReadSpan> {
+    let mut wanted = wanted.to_vec();
     wanted.sort_unstable();
     wanted.dedup();
+    let tables = wanted.chunk_by(|one, other| one.table == other.table);
+    tables.flat_map(|wanted| plan_table(wanted, rules, &readable)).collect()
+}
+
+/// As [`plan_spans`], for values of one table in address order: no read runs from one into another.
+fn plan_table(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(Place) -> bool) -> Vec<ReadSpan> {
+    let table = wanted.first().map_or(Table::Holding, |span| span.table);
     let last_of = |span: &ReadSpan| span.address + (span.count - 1);
 
     // Whether the drive answers for all that lies before a value, from the end of the one before.

@@ -275,6 +275,11 @@ impl Profile {
         Some((known.elsewhere.or(self.command_address)?, known.code))
     }
 
+    /// Place and word of what is written before a command, where one word does not say which way the motor turns.
+    pub fn command_first(&self, command: Command) -> Option<(Place, u16)> {
+        self.commands.get(&command)?.first
+    }
+
     /// The commands of the family, with their words.
     pub fn commands(&self) -> &BTreeMap<Command, CommandCode> {
         &self.commands
@@ -283,7 +288,9 @@ impl Profile {
     /// Every word that the family defines at its command register, and what it means.
     pub fn command_codes(&self) -> BTreeMap<u16, &str> {
         let here = self.commands.iter().filter(|(_, known)| known.elsewhere.is_none());
-        let named = here.map(|(command, known)| (known.code, command.name()));
+        // Two that another word tells apart share theirs, and the row has both names.
+        let label = |code| self.entry_at(self.command_address?)?.quantity.choices.get(&code).map(String::as_str);
+        let named = here.map(|(command, known)| (known.code, label(known.code).unwrap_or(command.name())));
         let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
         others.chain(named).collect()
     }
@@ -300,7 +307,7 @@ impl Profile {
         registers.extend(self.command_address.map(|address| (address, self.command_codes())));
         for (command, known) in &self.commands {
             if let Some(address) = known.elsewhere {
-                registers.entry(address).or_default().insert(known.code, command.name());
+                registers.entry(address).or_default().entry(known.code).or_insert(command.name());
             }
         }
         registers

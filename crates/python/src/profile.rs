@@ -272,6 +272,13 @@ impl Profile {
         self.0.command(command).map(|(place, code)| (place.number(), code)).ok_or_else(missing)
     }
 
+    /// What is written before a command, if anything.
+    #[pyo3(signature = (name, /))]
+    fn command_first(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<(u32, u16)>> {
+        let command: Command = text("command", name)?.parse().map_err(refuse)?;
+        Ok(self.0.command_first(command).map(|(place, code)| (place.number(), code)))
+    }
+
     /// Why a command is not verified; `None` where it is.
     #[pyo3(signature = (name, /))]
     fn command_reason(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {

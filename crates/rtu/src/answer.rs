@@ -214,6 +214,7 @@ impl<'a> Answer<'a> {
 }
 
 /// What the answer to 01H, 02H or 04H carries, if it can: whole words, or all bits of its bytes.
+#[cold]
 fn words_of(function: u8, data: &[u8]) -> Option<Answer<'_>> {
     let table = Table::of_function(function)?;
     let words = if table.is_bits() { Words::from_bits(data, MAX_READ_BITS) } else { Words::from_wire(data)? };

@@ -7,7 +7,7 @@ use core::fmt;
 use crate::pdu::function::{
     DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
 };
-use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_WRITE, coil_of, coil_word, put_words};
+use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, coil_of, coil_word, put_words};
 use crate::{Table, Words};
 
 /// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
@@ -71,7 +71,10 @@ impl<'a> Request<'a> {
     /// [`RequestError`]: the count is out of range, or the last register would lie beyond 0xFFFF.
     #[inline]
     pub const fn read(address: u16, count: u16) -> Result<Self, RequestError> {
-        Self::read_of(Table::Holding, address, count)
+        match check_range(address, count as usize, MAX_READ) {
+            Ok(_) => Ok(Self::Read { table: Table::Holding, address, count }),
+            Err(error) => Err(error),
+        }
     }
 
     /// 01H, 02H, 03H or 04H: `count` words (1..=125) or bits (1..=2000) of `table` from `address`.

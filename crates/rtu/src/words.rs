@@ -73,10 +73,7 @@ impl<'a> Words<'a> {
         match self.0 {
             Source::Host(words) => words.get(index).copied(),
             Source::Wire(pairs) => pairs.get(index).map(|&pair| u16::from_be_bytes(pair)),
-            Source::Bits { bytes, count } if index < usize::from(count) => {
-                bytes.get(index / 8).map(|byte| u16::from(byte >> (index % 8) & 1))
-            }
-            Source::Bits { .. } => None,
+            Source::Bits { bytes, count } => bit(bytes, count, index),
         }
     }
 
@@ -99,6 +96,7 @@ impl<'a> Words<'a> {
     }
 
     /// Writes the words into `target` as bits, the lowest of the first byte first, as many as fit: any word but 0 is 1.
+    #[cold]
     pub(crate) fn put_bits(&self, target: &mut [u8]) {
         target.fill(0);
         for (index, word) in self.iter().enumerate() {
@@ -107,6 +105,13 @@ impl<'a> Words<'a> {
             }
         }
     }
+}
+
+/// The bit at `index` of the first `count`. Apart, because nearly all that is read are words.
+#[cold]
+fn bit(bytes: &[u8], count: u16, index: usize) -> Option<u16> {
+    let byte = bytes.get(index / 8).filter(|_| index < usize::from(count))?;
+    Some(u16::from(byte >> (index % 8) & 1))
 }
 
 impl PartialEq for Words<'_> {

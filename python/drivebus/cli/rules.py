@@ -126,10 +126,17 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     for address in sorted(registers, key=lambda address: address != profile.command_address):
         lines.append(f"written to {places.shown(address)}")
         for code, label in sorted(registers[address].items()):
-            doubt = " [unverified]" if label in reasons else ""
-            lines.append(f"{code:>3} {label.replace('_', ' ')}{doubt}")
+            for command in label.split(" or ") if label not in profile.commands() else [label]:
+                doubt = " [unverified]" if command in reasons else ""
+                lines.append(f"{code:>3} {command.replace('_', ' ')}{_after(profile, command)}{doubt}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
+
+
+def _after(profile: drivebus.Profile, command: str) -> str:
+    """What goes out before *command*, if anything does."""
+    first = profile.command_first(command) if command in profile.commands() else None
+    return "" if first is None else f", after {first[1]} at {places.shown(first[0])}"
 
 
 def _reasons(profile: drivebus.Profile) -> dict[str, str]:

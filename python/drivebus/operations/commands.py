@@ -47,8 +47,12 @@ HALTS = ("stop", "coast", "jog_stop")
 
 
 async def give(unit: Unit, name: str, setpoint: int | None = None) -> None:
-    """Sends the command word once, with the setpoint behind it where the drive has both side by side."""
+    """Sends the command word once, with the setpoint behind it where the drive has both side by side.
+
+    Where another word says which way the motor turns, that goes out first, once too.
+    """
     address, code = unit.profile.command(name)
+    first = unit.profile.command_first(name)
     payload: int | list[int] = code
     if setpoint is not None:
         together = _WRITE_MANY in unit.profile.functions
@@ -56,6 +60,8 @@ async def give(unit: Unit, name: str, setpoint: int | None = None) -> None:
             payload = [code, setpoint]
         else:
             await setpoints.write_word(unit, setpoint)
+    if first is not None:
+        await send_once(unit, name, *first)
     await send_once(unit, name, address, payload)
 
 

@@ -250,6 +250,10 @@ class Profile:
         """Address and code of a command such as `"run_forward"` or `"coast"`."""
         return self._native.command(name)
 
+    def command_first(self, name: str, /) -> tuple[int, int] | None:
+        """Place and word of what is written before the command, which says which way the motor turns; None for most."""
+        return self._native.command_first(name)
+
     def command_reason(self, name: str, /) -> str | None:
         """Why a command is not verified; None where it is, or where the family has no such command."""
         return self._native.command_reason(name)

@@ -1,7 +1,7 @@
 //! Answers beside those of 03H, 06H, 08H/0000 and 10H, held against `tests/vectors/functions.toml`.
 //!
 //! Python runs the same file through `decode_answer` in `tests/python/test_vectors.py`.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -58,7 +58,10 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
             base.commands.clear();
             base.other_commands.clear();
         }
-        base.commands.retain(|_, known| known.elsewhere.is_none_or(|place| Some(place) != gone.place));
+        base.commands.retain(|_, known| {
+            let places = known.elsewhere.into_iter().chain(known.first.map(|(place, _)| place));
+            places.into_iter().all(|place| Some(place) != gone.place)
+        });
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {

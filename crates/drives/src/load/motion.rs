@@ -1,12 +1,14 @@
 //! What `profile.toml` says of commands and states: the words that move a motor, and those that tell what it does.
 
+use std::collections::BTreeMap;
+
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
-use super::manifest::{Elsewhere, Manifest, States, line};
+use super::manifest::{Commands, Elsewhere, Manifest, States, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::entry::names;
+use crate::entry::{Access, names};
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
 use crate::parts::state::{StateRule, StateWord};
@@ -37,7 +39,7 @@ pub(super) fn commands(
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
     profile.command_address = register.place;
     register.quantity.choices.clear();
-    let mut choices = std::collections::BTreeMap::new();
+    let mut choices: BTreeMap<u16, String> = BTreeMap::new();
     for (command, spanned, verified) in all {
         let code = *spanned.get_ref();
         if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
@@ -48,10 +50,17 @@ pub(super) fn commands(
         if problems.keep(word).is_none() {
             continue;
         }
-        if let Some(other) = choices.insert(code, command.name().to_owned()) {
-            problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
-        }
-        if profile.commands.insert(command, CommandCode { code, verified, elsewhere: None }).is_some() {
+        let label = match choices.get(&code) {
+            Some(other) if told_apart(table, command, other) => format!("{other} or {}", command.name()),
+            other => {
+                if let Some(other) = other {
+                    problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
+                }
+                command.name().to_owned()
+            }
+        };
+        choices.insert(code, label);
+        if profile.commands.insert(command, CommandCode { code, verified, elsewhere: None, first: None }).is_some() {
             problems.add(file, line(file, spanned), format!("{} is there twice", command.name()));
         }
     }
@@ -69,6 +78,9 @@ pub(super) fn commands(
     register.quantity.choices = choices;
     for (&command, other) in &table.elsewhere {
         elsewhere(file, command, other, profile, entries, problems);
+    }
+    for (&command, row) in &table.first {
+        first(file, command, row, profile, entries, problems);
     }
     let moves = entries.names(file, &table.moves, problems);
     profile.moving = moves.iter().filter_map(|name| entries.find(name)?.place).collect();
@@ -109,9 +121,54 @@ fn elsewhere(
         problems.add(file, line(file, &table.code), reason);
     }
     register.quantity.choices.insert(code, command.name().to_owned());
-    let known = CommandCode { code, verified: true, elsewhere: Some(address) };
+    let known = CommandCode { code, verified: true, elsewhere: Some(address), first: None };
     if profile.commands.insert(command, known).is_some() {
         problems.add(file, place, format!("{} is there twice", command.name()));
+    }
+}
+
+/// Whether what is written before them tells `one` and the command called `other` apart, which have the same word.
+fn told_apart(table: &Commands, one: Command, other: &str) -> bool {
+    let before =
+        |command: Command| Some(table.first.get(&command)?).map(|row| (row.register.get_ref(), row.code.get_ref()));
+    let other = other.parse().ok().and_then(before);
+    matches!((before(one), other), (Some((here, code)), Some((there, word))) if here == there && code != word)
+}
+
+/// What is written before the word of a command.
+fn first(
+    file: &File,
+    command: Command,
+    table: &Elsewhere,
+    profile: &mut Profile,
+    entries: &Entries,
+    problems: &mut Problems,
+) {
+    let (place, code) = (line(file, &table.register), *table.code.get_ref());
+    let Some(register) = entries.get(file, &table.register, problems) else { return };
+    let word = check(file, line(file, &table.code), &register.quantity, &register.name, code.into());
+    if problems.keep(word).is_none() {
+        return;
+    }
+    if register.access == Access::Ro || register.words() != 1 {
+        let reason = format!(
+            "{} is written before {}, so it must have one word that can be written",
+            register.name,
+            command.name()
+        );
+        problems.add(file, place, reason);
+    }
+    let Some(at) = register.place else {
+        problems.add(
+            file,
+            place,
+            format!("{} is written before {}, so it needs an address", register.name, command.name()),
+        );
+        return;
+    };
+    match profile.commands.get_mut(&command) {
+        Some(known) => known.first = Some((at, code)),
+        None => problems.add(file, place, format!("there is no {} that this could come before", command.name())),
     }
 }
 

@@ -44,10 +44,15 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
     base.moving = base.moving.iter().filter_map(|&place| follow(place)).collect();
     base.command_address = base.command_address.and_then(follow);
     base.commands.retain(|_, known| {
-        known.elsewhere.is_none_or(|place| {
+        let is_there = known.elsewhere.is_none_or(|place| {
             known.elsewhere = follow(place);
             known.elsewhere.is_some()
-        })
+        });
+        is_there
+            && known.first.is_none_or(|(place, code)| {
+                known.first = follow(place).map(|place| (place, code));
+                known.first.is_some()
+            })
     });
 }
 

@@ -66,6 +66,8 @@ pub struct CommandCode {
     pub verified: bool,
     /// The register that takes it, where that is not the command register.
     pub elsewhere: Option<Place>,
+    /// What is written before it: where, and the word. It says which way the motor turns, where the word itself does not.
+    pub first: Option<(Place, u16)>,
 }
 
 impl std::str::FromStr for Command {

@@ -6,6 +6,7 @@
 use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Table, Words, function};
 
 use super::family::{Memory, Range};
+use super::machine::{Command, Direction, RunState};
 use super::map::{Access, Word};
 use super::places::{spot, table_of};
 use super::refusal::Refusal;
@@ -198,6 +199,26 @@ impl Drive {
         if fits { Ok(()) } else { Err(Refusal::Value) }
     }
 
+    /// What `word` at `address` tells the machine. A run turns the way that another word says, where a family has one, and
+    /// so does a motor that runs when that word changes.
+    fn command_at(&self, address: u32, word: u16) -> Option<Command> {
+        let direction = self.family().roles.direction;
+        let turns =
+            direction.map(
+                |(place, reverse)| {
+                    if self.control_word(place) == reverse { Direction::Reverse } else { Direction::Forward }
+                },
+            );
+        let runs = || matches!(self.machine.state(), RunState::Forward | RunState::Reverse);
+        match (self.family().command_at(address, word), turns) {
+            (Some(Command::Run(_)), Some(turns)) => Some(Command::Run(turns)),
+            (None, Some(turns)) if direction.is_some_and(|(place, _)| place == address) && runs() => {
+                Some(Command::Run(turns))
+            }
+            (command, _) => command,
+        }
+    }
+
     /// Does what was found right.
     fn take(&mut self, now: Instant, address: u32, word: u16) {
         if self.writes.len() == WRITES_KEPT {
@@ -227,7 +248,7 @@ impl Drive {
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.obeys_bus()
-            && let Some(command) = self.family().command_at(address, word)
+            && let Some(command) = self.command_at(address, word)
         {
             self.machine.command(command, &self.settings);
         }

@@ -25,6 +25,7 @@ mod saj8000m;
 mod sunfar;
 mod unlisted;
 mod vfd500;
+mod wj200;
 
 use std::borrow::Cow;
 
@@ -126,7 +127,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 20] = [
+const FAMILIES: [fn() -> Family; 21] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -147,6 +148,7 @@ const FAMILIES: [fn() -> Family; 20] = [
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
+    wj200::wj200,
 ];
 
 impl Family {

@@ -42,6 +42,7 @@ pub(crate) fn gd350() -> Family {
             obeys: vec![(0x0001, 2), (0x0002, 0)],
             channel: Some(0x0001),
             // Assumption: any source but 8 means the frequency set at the keypad.
+            direction: None,
             speed_source: Some(vec![(0x0006, 8)]),
             speed: Some(Speed::hertz(0x2001)),
             keypad_frequency: Some(Scaled::hundredths(KEYPAD_FREQUENCY)),

@@ -92,7 +92,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
 }
 
 /// Assumption, beyond 01H to 03H.
-fn exception(refusal: Refusal) -> u8 {
+pub(super) fn exception(refusal: Refusal) -> u8 {
     match refusal {
         Refusal::Function => 0x01,
         Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
@@ -139,6 +139,11 @@ impl Own<'_> {
     fn elsewhere(&self) -> Vec<(u32, u16, Command)> {
         let known = self.profile.commands().iter();
         known.filter_map(|(&told, known)| Some((known.elsewhere?.number(), known.code, done(told)))).collect()
+    }
+
+    /// The word that says which way a run turns, where two commands differ in nothing else.
+    fn direction(&self) -> Option<(u32, u16)> {
+        self.profile.command_first(Told::RunReverse).map(|(place, word)| (place.number(), word))
     }
 
     /// The words for forward, reverse, stopped and fault. One that nothing asks for is that of a stopped motor.
@@ -240,6 +245,7 @@ impl Own<'_> {
             Some(Silence { parameter: self.address_of(watchdog.action.as_deref()?)?, words })
         });
         Roles {
+            direction: self.direction(),
             acceleration: parameter(Some(ACCELERATION), "s").or(deceleration),
             deceleration,
             fault_history: self.profile.fault_history().filter_map(Entry::address).collect(),

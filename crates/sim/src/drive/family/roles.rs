@@ -11,6 +11,8 @@ pub(crate) struct Roles {
     pub(crate) channel: Option<u16>,
     /// The speed comes from the bus while these parameters have these values. Without them: while the bus is obeyed.
     pub(crate) speed_source: Option<Vec<(u16, u16)>>,
+    /// The word that says which way a run turns, and what it is for reverse.
+    pub(crate) direction: Option<(u32, u16)>,
     /// The speed that the bus sets.
     pub(crate) speed: Option<Speed>,
     /// The speed where it does not come from the bus, Hz.
@@ -131,6 +133,7 @@ impl Roles {
         obeys: Vec::new(),
         channel: None,
         speed_source: None,
+        direction: None,
         speed: None,
         keypad_frequency: None,
         max_frequency: None,
