@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::{env, fs, process};
 
-use drivebus_drives::{Command, Entry, Input, Profile, ProfileError, State, Value};
+use drivebus_drives::{Access, Command, Entry, Input, Profile, ProfileError, State, Value};
 
 /// The files of a folder, and what stands in them where the input does not say.
 const FILES: [(&str, &str); 4] = [
@@ -102,8 +102,12 @@ fn check_profile(profile: &Profile) {
         assert_eq!(profile.find(entry.name()), Ok(entry));
         assert!(entry.alias().is_none_or(|alias| profile.find(alias) == Ok(entry)));
         if let Some(address) = entry.address() {
-            assert_eq!(profile.find(&format!("0x{address:04X}")), Ok(entry));
-            assert_eq!(profile.entry_at(address), Some(entry));
+            let other =
+                |access| profile.entries().find(|other| other.address() == Some(address) && other.access() == access);
+            let read = if entry.access() == Access::Wo { other(Access::Ro).unwrap_or(entry) } else { entry };
+            let written = if entry.access() == Access::Ro { other(Access::Wo).unwrap_or(entry) } else { entry };
+            assert_eq!(profile.find(&format!("0x{address:04X}")), Ok(read));
+            assert_eq!((profile.entry_at(address), profile.written_entry_at(address)), (Some(read), Some(written)));
         }
     }
     let known = |entry: &&Entry| entry.is_known_readable() && entry.address().is_some();
@@ -122,7 +126,7 @@ fn check_profile(profile: &Profile) {
         if let Some((address, code)) = profile.command(command) {
             let registers = profile.command_registers();
             assert_eq!(registers[&address].get(&code), Some(&command.name()), "{address}");
-            assert!(profile.entry_at(address).is_some());
+            assert!(profile.written_entry_at(address).is_some());
         }
     }
     for rule in profile.state_word().iter().flat_map(|word| &word.rules) {
@@ -147,6 +151,7 @@ fn check_entry(entry: &Entry) {
     let high = quantity.high().map_or(most, Value::count);
     assert!(least <= low && low <= high && high <= most, "{}: {low} to {high}", entry.name());
     assert!(quantity.scale().is_none_or(|scale| scale == 10_u32.pow(quantity.decimals().into())));
+    let ratio = quantity.ratio().map_or((1, 1), |(counts, units)| (i128::from(counts), i128::from(units)));
     if entry.words() == 2 {
         assert!(entry.encode(low).is_err(), "{} takes two words", entry.name());
         return;
@@ -158,7 +163,7 @@ fn check_entry(entry: &Entry) {
     for count in [least, -1, 0, 1, most, low, high, low - 1, high + 1, i64::midpoint(low, high)] {
         let Some(raw) = word(count, signed) else { continue };
         let value = entry.decode(raw);
-        let text = decimal(count, quantity.decimals().into());
+        let text = decimal(digits(count, ratio, quantity.decimals()), quantity.decimals().into());
         assert_eq!((value.count(), value.to_string()), (count, text.clone()), "{}", entry.name());
         for input in [Input::Decimal(&text), Input::Float(value.to_f64())] {
             match entry.encode(input) {
@@ -179,6 +184,14 @@ fn check_entry(entry: &Entry) {
 /// The word that holds `count`; `None` if none does.
 fn word(count: i64, signed: bool) -> Option<u16> {
     if signed { i16::try_from(count).ok().map(i16::cast_unsigned) } else { u16::try_from(count).ok() }
+}
+
+/// `count`, of which so many counts are so many units, in steps of the last digit: the nearest, and of two the one farther
+/// from zero.
+fn digits(count: i64, (counts, units): (i128, i128), decimals: u8) -> i64 {
+    let exact = i128::from(count).abs() * units * 10_i128.pow(decimals.into());
+    let magnitude = i64::try_from(exact / counts + i128::from(exact % counts * 2 >= counts)).unwrap_or(i64::MAX);
+    if count < 0 { -magnitude } else { magnitude }
 }
 
 /// `count` with a point before its last `decimals` digits.

@@ -439,7 +439,7 @@ class Profile:
         `signed`, `low`, `high`, `low_from`, `high_from` (parameters that narrow the range), `default`,
         `access` (`"rw"`, `"ro"`, `"run"`, `"stop"`, `"unknown"`),
         `choices` ({int: str}), `bits` ({str: {int: str}} or None), `source`, `verified`, `evidence`, `note`, `words`,
-        `variant`. `address` is None where nobody knows it.
+        `high_first`, `variant`. `address` is None where nobody knows it; `scale` is a float where 16384 are 100 %.
         """
     def address(self, name: str, /, *, store: bool | None = None) -> int:
         """The address of *name*; with *store* given, the one to write to for RAM (False) or EEPROM (True)."""
@@ -476,6 +476,8 @@ class Profile:
         """Every code that the family defines at its command register."""
     def command_registers(self) -> dict[int, dict[int, str]]:
         """Every register that takes commands, with its codes."""
+    def start_sequence(self) -> list[dict[str, Any]]:
+        """The words before a run: `word`, `label`, `until`, `mask`, `value`."""
     @property
     def command_address(self) -> int | None: ...
     def stored_address(self, address: int, /) -> int | None:

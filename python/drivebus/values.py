@@ -5,7 +5,7 @@ Plain data: nothing here reads from a drive or knows how its words are laid out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -236,7 +236,7 @@ class Description:
         address: Where it is read, 0..0xFFFF; None where nobody knows that, and it cannot be used.
         table: The table it is in: `"holding"`, `"input"`, `"coil"` or `"discrete"`.
         unit: Engineering unit, empty for a plain number.
-        scale: Raw counts per unit.
+        scale: Raw counts per unit; no whole number where a share is counted: 163.84 where 16384 counts are 100 %.
         signed: Whether the word is two's complement.
         low, high: Range in engineering units; None where it is not known.
         low_from, high_from: The parameters that narrow the range on a given drive, or None.
@@ -249,10 +249,11 @@ class Description:
         evidence: `"verified"`, `"unverified"` (printed in part or for a sister series) or `"assumed"` (no document of
             the family prints it).
         note: What else is worth knowing; says what is missing where it is not verified.
-        words: How many words it takes, 1 or 2 of which the first is the low one.
+        words: How many words it takes, 1 or 2.
         variant: What decides its unit, scale and range, such as `"speed_unit"`, or None.
         unverified_bits: Those of *bits* whose place in the word no document of this family prints.
         listed: Whether the profile has a row for it; else only its address is known, which follows from its code.
+        high_first: Whether of two words the first is the high one.
     """
 
     name: str
@@ -279,12 +280,18 @@ class Description:
     variant: str | None = None
     unverified_bits: tuple[str, ...] = ()
     listed: bool = True
+    high_first: bool = False
     table: str = "holding"
 
     @property
     def place(self) -> int | None:
         """Table and address as one number: of a holding register its address, of a coil 0x1_0000 above it."""
         return None if self.address is None else places.place(self.table, self.address)
+
+    def number(self, words: Sequence[int]) -> int:
+        """What *words* are together, as they stand one behind the other: the raw number that `decode` takes."""
+        low_first = reversed(words) if self.high_first else words
+        return sum(word << 16 * index for index, word in enumerate(low_first))
 
     @property
     def reason(self) -> str:

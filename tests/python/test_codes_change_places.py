@@ -72,6 +72,10 @@ def test_what_asks_of_a_unit_that_nobody_knows_stays_small() -> None:
         assert bus.identify(1).certainty == "unknown"
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         # The first is asked twice: before anything is believed of a unit on a line just opened.
-        assert list(dict.fromkeys(asked)) == ["2103", "1900", "2104", "004b", "2180", "d000"]
-        assert len(asked) == 7
+        assert list(dict.fromkeys(asked)) == [
+            *("2103", "1900", "2104", "004b", "2180", "d000", "0c81", "006d"),
+            *("0003", "0000"),  # P00.03 is there, and no P00.00
+            *("c417", "1003"),
+        ]
+        assert len(asked) == 13
         assert written(line) == []

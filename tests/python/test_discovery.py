@@ -15,10 +15,11 @@ from drivebus import Bus, Drive, NoAnswer, NotAllowed, Profile, Simulator
 from drivebus.discovery.walk import LAST, Walk
 from drivebus.sim import FAULT_KINDS
 
-LISTED = ["a1000", "eds300", "ms300", "saj8000m", "sunfar-e300", "wj200"]
-"""Families whose codes do not tell their addresses."""
+FAMILIES = [name for name in sorted(drivebus.profiles()) if Profile.builtin(name).parameter_groups()]
+"""Those whose codes tell their addresses: of any other there is no code to try."""
 
-FAMILIES = sorted({*drivebus.profiles()} - {*LISTED})
+LISTED = sorted({*drivebus.profiles()} - {*FAMILIES})
+
 MOST = {"gd350": 9_900, "vfd500": 10_400}
 """Reads: one for each number that is not there, and some for each run."""
 
@@ -78,6 +79,14 @@ def test_exactly_what_is_there_is_found(family: str) -> None:
         assert found.missing == []
         assert simulator.drive(1).writes() == []
         assert found.requests <= MOST.get(family, 10_400)
+
+
+@pytest.mark.parametrize("family", ["atv312", "v20", "acs355"])
+def test_where_codes_do_not_tell_their_addresses_nothing_is_tried(family: str) -> None:
+    with of(family) as (simulator, drive):
+        with pytest.raises(NotAllowed):
+            drive.discover()
+        assert simulator.line.requests == 0
 
 
 def test_closed_groups_and_registers_are_left_alone() -> None:

@@ -127,7 +127,11 @@ def test_the_list_says_how_much_of_each_is_printed() -> None:
         assert (None if line[2] is None else int(line[2])) in percents
 
 
-DOCUMENTS = re.compile(r"(?:manualshive|manualslib|INVT ebook) (\d+)|easymanua\.ls (?:danfoss )?([a-z0-9-]+)")
+DOCUMENTS = re.compile(
+    r"(?:manualshive|manualslib|manualarchiveguide|INVT ebook) (\d+)"
+    r"|easymanua\.ls (?:(?:abb|danfoss|siemens) )?([a-z0-9-]+)"
+    r"|(BBV\d+)"
+)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -139,7 +143,7 @@ def test_the_page_names_the_documents_of_each_family(family: str) -> None:
         text for text in re.split(r"^## ", page, flags=re.MULTILINE) if re.match(rf"(.* and )?{family}\b[: ]", text)
     ]
     assert len(sections) == 1, family
-    documents = {number or name for number, name in DOCUMENTS.findall(manifest["source"])}
+    documents = {number or name or order for number, name, order in DOCUMENTS.findall(manifest["source"])}
     assert documents
     # One that the GD350 manual lends is named there.
     missing = {document for document in documents if document not in sections[0]} - {"2645"}

@@ -51,14 +51,22 @@ def line(family: dict[str, Any]) -> Iterator[tuple[Simulator, Bus]]:
 
 def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
     """Unit 1; one whose speed has a unit that a parameter decides is told which: no page prints the numbers of that."""
-    if Profile.builtin(family).variants():
-        return bus.drive(1, family, unverified=unverified, variants={"speed_unit": "Hz"})
-    return bus.drive(1, family, unverified=unverified)
+    variants = {"speed_unit": "Hz", "base_frequency": "50 Hz"}
+    own = Profile.builtin(family).variants()
+    chosen = {name: choice for name, choice in variants.items() if name in own}
+    return bus.drive(1, family, unverified=unverified, variants=chosen or None)
 
 
 def prepare(drive: Drive) -> None:
     """Where no write is known that RAM alone keeps, it is kept in EEPROM."""
     drive.prepare_control(store=drive.profile.memory() is None)
+
+
+def from_rest(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
+    """Place and word of all that *command* takes from rest: some families want words before a run."""
+    table = family["commands"]
+    sequence: list[int] = table.get("sequence", []) if command in STARTS else []
+    return [*((given(table["register"]), word) for word in sequence), *words_of(family, command)]
 
 
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
@@ -77,7 +85,8 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
         address = int.from_bytes(frame[2:4], "big")
         data = frame[4:6] if frame[1] == 0x06 else frame[7:-2]
         words = [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
-        found += [(address + at, word) for at, word in enumerate(words) if (address + at) & 0x7FFF in registers]
+        told = [(address + at, word) for at, word in enumerate(words)]
+        found += [(place, word) for place, word in told if {place, place & 0x7FFF} & registers]
     return found
 
 
@@ -96,14 +105,14 @@ def test_the_code_on_the_line_is_the_familys_own(
             DO[command](drive)
         assert commanded(simulator) == []
         return
-    expected = []
+    expected: list[tuple[int | None, int | None]] = []
     if command in BEFORE:
         DO[BEFORE[command]](drive)
-        expected += words_of(family, BEFORE[command])
+        expected += from_rest(family, BEFORE[command])
     elif command == "reset_fault":
         simulator.drive(1).trip(1)
     DO[command](drive)
-    assert commanded(simulator) == [*expected, *words_of(family, command)]
+    assert commanded(simulator) == [*expected, *from_rest(family, command)]
 
 
 @each(KNOWN)
@@ -118,14 +127,15 @@ def test_what_no_document_prints_is_not_sent_unasked(
     if command == "reset_fault":
         simulator.drive(1).trip(1)
     plain = drive_of(bus, family["name"], unverified=False)
-    refused = command in doubted or (command in STARTS and {"stop", "coast"} <= doubted)
+    unproved = bool(table.get("sequence")) and family["states"]["needs_unverified"]
+    refused = command in doubted or (command in STARTS and ({"stop", "coast"} <= doubted or unproved))
     if refused:
         with pytest.raises(NotAllowed, match="unverified=True"):
             DO[command](plain)
         assert commanded(simulator) == []
     else:
         DO[command](plain)
-        assert commanded(simulator) == words_of(family, command)
+        assert commanded(simulator) == from_rest(family, command)
 
 
 def test_what_a_vfd500_may_take_for_disable_is_sent_only_if_it_is_forced() -> None:

@@ -34,7 +34,11 @@ FAMILIES = {
     18: "saj8000m",
     19: "eds300",
     20: "sunfar-e300",
-    21: "wj200",
+    21: "atv312",
+    22: "v20",
+    23: "acs355",
+    24: "fc51",
+    25: "wj200",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -225,7 +229,17 @@ def test_which_functions_there_are(bus: Bus) -> None:
     for family in FAMILIES.values():
         unknown = 0x02 if family == "eds300" else 0x01  # manual, p. 45
         # Their manuals have 03H and 06H, some of them 10H, and no others.
-        if family in ("chf100a", "ms300", "saj8000m", "eds300", "sunfar-e300"):
+        if family in (
+            "chf100a",
+            "ms300",
+            "saj8000m",
+            "eds300",
+            "sunfar-e300",
+            "atv312",
+            "v20",
+            "acs355",
+            "fc51",
+        ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)

@@ -134,6 +134,28 @@ def test_a_drive_does_what_its_profile_says_of_coils(tmp_path: Path) -> None:
         assert dict(sample) == {"speed": 0.0, "door": 0, "run_command": 0}
 
 
+def test_a_coil_can_be_read_as_one_thing_and_written_as_another(tmp_path: Path) -> None:
+    rows = ROWS.replace("0x0011,coil,way,1 is forward,,,no,,,,rw", "0x0011,coil,way,1 is forward,,,no,,,,wo")
+    rows += "0x0011,coil,lamp,Lit,,,no,,,,ro,yes,,p. 4\n"
+    profile = Profile.load(folder(tmp_path, rows=rows))
+    for place, read, written in ((0x1_0011, "lamp", "way"), (0x11, "brake", "brake"), (0x4_0011, "turning", "turning")):
+        assert (profile.name_at(place), profile.name_at(place, written=True)) == (read, written)
+    assert profile.command_first("run_forward") == (0x1_0011, 1)
+    assert profile.command_reason("run_forward") is None
+
+
+def test_what_comes_first_can_be_bits(tmp_path: Path) -> None:
+    manifest = MANIFEST.replace('"run_command", "way"]', '"run_command", "brake"]')
+    for code, bits in ((1, "{ free = 1, ahead = 1 }"), (0, "{ free = 1 }")):
+        manifest = manifest.replace(
+            f'{{ register = "way", code = {code} }}', f'{{ register = "brake", code = {bits} }}'
+        )
+    manifest += '[bits]\nbrake = [{ name = "free", bits = [0, 0] }, { name = "ahead", bits = [3, 3] }]\n'
+    profile = Profile.load(folder(tmp_path, manifest=manifest))
+    first = {name: profile.command_first(name) for name in ("run_forward", "run_reverse")}
+    assert first == {"run_forward": (0x11, 9), "run_reverse": (0x11, 1)}
+
+
 @pytest.mark.parametrize(
     ("file", "find", "put", "said"),
     [

@@ -109,6 +109,23 @@ def test_what_follows_an_unconfirmed_direction_is_not_sent(
     assert simulator.drive(1).state == "stopped"
 
 
+def test_a_stop_between_direction_and_run_is_the_last_word(
+    simulator: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = Bus.write
+
+    def stopped(bus: Bus, unit: int, address: int, value: Any, /, **how: Any) -> None:
+        write(bus, unit, address, value, **how)
+        if how.get("table") == "coil" and address == 1:
+            bus.drive(unit, "wj200", unverified=True).stop()
+
+    monkeypatch.setattr(Bus, "write", stopped)
+    with pytest.raises(Unconfirmed, match=r"told to stop .* coil 0001H.* the rest of run_reverse was not sent"):
+        drive.run(reverse=True)
+    assert written(simulator) == ["05 00 01 FF 00", "05 00 00 00 00"]
+    assert simulator.drive(1).state == "stopped"
+
+
 def test_nothing_moves_unasked(bus: Bus, simulator: Simulator) -> None:
     with pytest.raises(NotAllowed, match="unverified=True"):
         bus.drive(1, "wj200").run(hz=10.0)

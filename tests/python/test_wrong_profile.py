@@ -41,11 +41,15 @@ SILENT_ON_CODES = [
     "saj8000m",
     "eds300",
     "sunfar-e300",
+    "fc51",
+    "atv312",
+    "v20",
+    "acs355",
     "wj200",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "wj200"]
+SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200"]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -74,6 +78,14 @@ TAKEN_FOR: dict[str, list[str]] = {
     "a1000": ["a1000"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
+    # And this one ETA, rFr and CMD: 0C81H, 0C82H and 2135H.
+    "atv312": ["atv312"],
+    # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
+    "v20": ["v20"],
+    # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
+    "acs355": ["acs355"],
+    # And this one answers C417H and 3F01H, its status word and its output frequency.
+    "fc51": ["fc51"],
     # Of these nothing is known that they must say; a code gives another one away, or strange words and a signature.
     "gd600": NO_SIGNATURE,
     "gd600-rectifier": NO_STRANGE_WORD,
@@ -147,7 +159,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 441
+    assert len(PAIRS) == 625
 
 
 @every_pair

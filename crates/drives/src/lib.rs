@@ -67,6 +67,7 @@ mod place;
 mod plan;
 mod profile;
 mod quantity;
+mod scale;
 mod text;
 mod value;
 
@@ -74,7 +75,7 @@ pub use bits::BitField;
 pub use entry::{Access, AccessError, Entry, Kind, Store};
 pub use evidence::Evidence;
 pub use load::ProfileError;
-pub use parts::command::{Command, CommandCode, Control, ParseCommandError};
+pub use parts::command::{Command, CommandCode, Control, ParseCommandError, StartWord, Until};
 pub use parts::fault::{Exception, Fault};
 pub use parts::identification::{Identification, Signature};
 pub use parts::memory::{Memory, MemoryBit};

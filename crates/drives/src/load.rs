@@ -3,7 +3,8 @@
 //! Everything a file can have wrong is found here, with file, line and reason; a `Profile` that exists is consistent.
 //! `manifest` knows the shape of `profile.toml`, `placed` where its values stand, `shape` all that is wrong with it, `table` the shape of CSV files, `rows`
 //! what their cells mean, `entries` how rows lie over those of a profile below, `succeed` what they take over from them,
-//! `inherit` what may be trusted of that, `facts` and `motion` the tables of `profile.toml`, `assemble` what must agree
+//! `inherit` what may be trusted of that, `facts`, `motion` and
+//! `sequence` the tables of `profile.toml`, `words` the words that bit fields make, `assemble` what must agree
 //! between them, `sense` what cannot be meant, `fit` whether what came from below still fits.
 
 mod assemble;
@@ -17,9 +18,12 @@ mod placed;
 mod problems;
 mod rows;
 mod sense;
+mod sequence;
 mod shape;
 mod succeed;
 mod table;
+mod table_cell;
+mod words;
 
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -138,7 +142,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 21] = [
+static BUILTINS: [Builtin; 25] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -159,6 +163,10 @@ static BUILTINS: [Builtin; 21] = [
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sunfar-e300": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 

@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::entry::{Access, AccessError, Entry, Kind, Store};
-use crate::parts::command::{Command, CommandCode, Control};
+use crate::parts::command::{Command, CommandCode, Control, StartWord};
 use crate::parts::fault::{Exception, Fault};
 use crate::parts::identification::{Identification, Signature};
 use crate::parts::memory::{Memory, MemoryBit};
@@ -65,6 +65,8 @@ pub struct Profile {
     pub(crate) other_commands: BTreeMap<u16, String>,
     /// Why some commands are not verified.
     pub(crate) commands_note: String,
+    /// What comes before a word that runs or jogs.
+    pub(crate) start_sequence: Vec<StartWord>,
     pub(crate) moving: Vec<Place>,
     pub(crate) state: Option<StateWord>,
     pub(crate) control: Vec<Control>,
@@ -147,7 +149,7 @@ impl Profile {
         self.entries.iter()
     }
 
-    /// The entry that is read at `place`; an address alone is that of a holding register.
+    /// The entry that is read at `place`, or that is only written there; an address alone is that of a holding register.
     pub fn entry_at(&self, place: impl Into<Place>) -> Option<&Entry> {
         self.by_address.get(&place.into()).and_then(|&index| self.entries.get(index))
     }
@@ -292,7 +294,9 @@ impl Profile {
         let label = |code| self.entry_at(self.command_address?)?.quantity.choices.get(&code).map(String::as_str);
         let named = here.map(|(command, known)| (known.code, label(known.code).unwrap_or(command.name())));
         let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
-        others.chain(named).collect()
+        // A word of the sequence that stops as well is called a stop.
+        let sequence = self.start_sequence.iter().map(|step| (step.word, step.label.as_str()));
+        others.chain(sequence).chain(named).collect()
     }
 
     /// The command that `raw` means at the command register.
@@ -311,6 +315,11 @@ impl Profile {
             }
         }
         registers
+    }
+
+    /// The words that come, in this order, before one that runs or jogs a motor at rest; none where that is done by one word.
+    pub fn start_sequence(&self) -> &[StartWord] {
+        &self.start_sequence
     }
 
     /// Where commands are written.

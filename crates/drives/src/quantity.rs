@@ -5,17 +5,21 @@
 use std::collections::BTreeMap;
 
 use crate::decimal::{Counts, Decimal};
+use crate::scale::Scale;
 use crate::text::{closest, parse_address};
 use crate::value::{Input, Limits, Value, ValueError};
 
-/// What a word means: value = counts / 10^decimals in [`unit`](Self::unit), within a range, or one of some choices.
+/// What a word means: counts of a [`unit`](Self::unit), within a range, or one of some choices.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quantity {
     pub(crate) unit: String,
-    pub(crate) decimals: Option<u8>,
+    pub(crate) scale: Option<Scale>,
     pub(crate) signed: bool,
-    /// Whether it takes two words, the low one first.
+    /// Whether it takes two words.
     pub(crate) wide: bool,
+    /// Of two words: whether the high one comes first.
+    pub(crate) high_first: bool,
+    /// In counts, as `high`.
     pub(crate) low: Option<i64>,
     pub(crate) high: Option<i64>,
     pub(crate) low_from: Option<String>,
@@ -29,22 +33,34 @@ impl Quantity {
     /// The unit of its values: `"Hz"`, `"A"`, `"%"` …; empty for plain numbers and choices; `"raw"` where the scale is
     /// not known and values are counts.
     pub fn unit(&self) -> &str {
-        if self.decimals.is_some() { &self.unit } else { "raw" }
+        if self.scale.is_some() { &self.unit } else { "raw" }
     }
 
-    /// Counts per unit (1, 10, 100 …). `None` where the manuals do not say: then values are counts.
+    /// Counts per unit (1, 10, 100 …). `None` where the manuals do not say: then values are counts; and where it is not a power
+    /// of ten: [`ratio`](Self::ratio) has every scale.
     pub fn scale(&self) -> Option<u32> {
-        self.decimals.map(|decimals| 10_u32.pow(u32::from(decimals)))
+        self.scale.filter(|scale| scale.is_decimal()).map(|scale| scale.as_ratio().0)
     }
 
-    /// Digits after the point.
+    /// So many counts are so many units, without a common divisor: (100, 1), or (4096, 25) where 16384 counts are 100 %.
+    /// `None` where the manuals do not say: then values are counts.
+    pub fn ratio(&self) -> Option<(u32, u32)> {
+        self.scale.map(Scale::as_ratio)
+    }
+
+    /// Digits after the point of every value.
     pub fn decimals(&self) -> u8 {
-        self.decimals.unwrap_or(0)
+        self.scale_or_one().decimals()
     }
 
-    /// How many words it takes: 1, or 2 of which the first is the low one.
+    /// How many words it takes: 1, or 2, whose order [`is_high_first`](Self::is_high_first) tells.
     pub fn words(&self) -> u16 {
         if self.wide { 2 } else { 1 }
+    }
+
+    /// Whether the high word comes first, where it takes two.
+    pub fn is_high_first(&self) -> bool {
+        self.high_first
     }
 
     /// The [variant](crate::Variant) that decides unit, scale and range, if one does.
@@ -54,7 +70,7 @@ impl Quantity {
 
     /// Whether a variant decides what it is, and nobody has said which: then values are counts, and none can be encoded.
     pub fn is_undecided(&self) -> bool {
-        self.variant.is_some() && self.decimals.is_none()
+        self.variant.is_some() && self.scale.is_none()
     }
 
     /// Whether words are two's complement.
@@ -64,7 +80,7 @@ impl Quantity {
 
     /// Whether its values are measures (with a unit or a fraction), as opposed to counts, choices and bits.
     pub fn measures(&self) -> bool {
-        self.decimals.is_some_and(|decimals| decimals > 0 || !self.unit.is_empty())
+        self.scale.is_some_and(|scale| scale != Scale::ONE || !self.unit.is_empty())
     }
 
     /// The lowest value allowed, where it is documented.
@@ -97,11 +113,12 @@ impl Quantity {
         self.value(if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) })
     }
 
-    /// The value of `words`, which has [as many](Self::words) as it takes, the low one first; `None` if it has not.
+    /// The value of `words`, which has [as many](Self::words) as it takes, in the order of their addresses; `None` if it has not.
     pub fn decode_words(&self, words: &[u16]) -> Option<Value> {
         match (self.wide, words) {
             (false, &[word]) => Some(self.decode(word)),
-            (true, &[low, high]) => {
+            (true, &[first, second]) => {
+                let (low, high) = if self.high_first { (second, first) } else { (first, second) };
                 let raw = u32::from(high) << 16 | u32::from(low);
                 Some(self.value(if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) }))
             }
@@ -164,7 +181,7 @@ impl Quantity {
             return Ok(Counts::Whole(i64::from(word)));
         }
         if let Some(number) = Decimal::parse(&text) {
-            return Ok(number.counts(self.decimals()));
+            return Ok(self.counts_of(&number));
         }
         if let Some(word) = parse_address(&text).filter(|_| !self.measures()) {
             return Ok(Counts::Whole(i64::from(word)));
@@ -182,8 +199,17 @@ impl Quantity {
         (self.low.unwrap_or(least), self.high.unwrap_or(most))
     }
 
+    /// The counts that are nearest to `number` of units, whatever the range.
+    pub(crate) fn counts_of(&self, number: &Decimal) -> Counts {
+        self.scale_or_one().count(number)
+    }
+
+    fn scale_or_one(&self) -> Scale {
+        self.scale.unwrap_or(Scale::ONE)
+    }
+
     fn value(&self, count: i64) -> Value {
-        Value::new(count, self.decimals())
+        Value::new(count, self.scale_or_one())
     }
 }
 

@@ -2,41 +2,47 @@
 
 use std::fmt;
 
-/// An exact value: `count / 10^decimals`. `Display` prints every decimal: `10.00`.
+use crate::scale::Scale;
+
+/// A value as a decimal number, and the counts that it is. `Display` prints every decimal: `10.00`.
+///
+/// It is exact where there are so many counts to a unit as a power of ten says. Else it has as many digits as tell it from
+/// the values of the counts beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Value {
     count: i64,
-    decimals: u8,
+    scale: Scale,
 }
 
 impl Value {
-    pub(crate) fn new(count: i64, decimals: u8) -> Self {
-        Self { count, decimals }
+    pub(crate) fn new(count: i64, scale: Scale) -> Self {
+        Self { count, scale }
     }
 
-    /// The counts, with their sign.
+    /// The counts of the drive, with their sign: what its word is, and not the value where there is a scale.
     pub fn count(self) -> i64 {
         self.count
     }
 
     /// The float closest to this value. It prints with no more digits than the value has.
     pub fn to_f64(self) -> f64 {
-        // 32 bits at most, so both are exact and the one division is correctly rounded.
-        #[expect(clippy::cast_precision_loss, reason = "a count has 32 bits at most")]
-        let count = self.count as f64;
-        count / f64::from(10_u32.pow(u32::from(self.decimals)))
+        // 49 bits at most, so both are exact and the one division is correctly rounded.
+        #[expect(clippy::cast_precision_loss, reason = "32 bits of counts, and at most 16 and a few for the scale")]
+        let digits = self.scale.digits(self.count) as f64;
+        digits / f64::from(10_u32.pow(u32::from(self.scale.decimals())))
     }
 }
 
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let scale = 10_u64.pow(u32::from(self.decimals));
-        let magnitude = self.count.unsigned_abs();
-        let sign = if self.count < 0 { "-" } else { "" };
-        if self.decimals == 0 {
+        let (digits, decimals) = (self.scale.digits(self.count), self.scale.decimals());
+        let tens = 10_u64.pow(u32::from(decimals));
+        let magnitude = digits.unsigned_abs();
+        let sign = if digits < 0 { "-" } else { "" };
+        if decimals == 0 {
             return write!(f, "{sign}{magnitude}");
         }
-        write!(f, "{sign}{}.{:0width$}", magnitude / scale, magnitude % scale, width = usize::from(self.decimals))
+        write!(f, "{sign}{}.{:0width$}", magnitude / tens, magnitude % tens, width = usize::from(decimals))
     }
 }
 

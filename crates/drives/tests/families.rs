@@ -63,6 +63,9 @@ struct Commands {
     /// What is written before a command: where, and the word.
     #[serde(default)]
     first: BTreeMap<String, (u32, u16)>,
+    /// Words that come before a run.
+    #[serde(default)]
+    sequence: Vec<u16>,
     other: BTreeMap<String, String>,
     moves: Vec<u32>,
     #[serde(flatten)]
@@ -129,7 +132,7 @@ fn the_table_has_every_family_and_every_command() {
     let names: Vec<String> = document().family.into_iter().map(|family| family.name).collect();
     let listed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     assert_eq!(listed, Profile::builtin_names().collect());
-    assert_eq!((names.len(), listed.len()), (21, 21));
+    assert_eq!((names.len(), listed.len()), (25, 25));
     for (family, profile) in families() {
         let commands: BTreeSet<&str> = family.commands.codes.keys().map(String::as_str).collect();
         assert_eq!(commands, Command::ALL.map(Command::name).into(), "{}", family.name);
@@ -172,8 +175,11 @@ fn every_command_of_every_family_is_that_of_the_table() {
             assert_eq!(profile.command_codes().get(&code), Some(&label.as_str()), "{name} {code}");
             defined.insert(code);
         }
+        let sequence: Vec<u16> = profile.start_sequence().iter().map(|step| step.word).collect();
+        assert_eq!(sequence, table.sequence, "{name}");
         assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
-        let places = (0..0x5_0000).filter_map(Place::of_number).filter(|place| place.address < 0x8000);
+        let is_plain = |place: &Place| profile.stored_address(*place).is_none();
+        let places = (0..0x5_0000).filter_map(Place::of_number).filter(is_plain);
         let moving: Vec<u32> = places.filter(|&place| profile.is_command(place)).map(Place::number).collect();
         assert_eq!(moving, table.moves, "{name}");
     }
@@ -287,7 +293,8 @@ fn values_are_those_of_the_worked_examples() {
     for example in document().example {
         let mut profile = (*Profile::builtin(&example.family).unwrap()).clone();
         if let Some(variant) = &example.variant {
-            profile = profile.with_variants([("speed_unit", variant.as_str())]).unwrap();
+            let name = profile.variants().keys().next().unwrap().clone();
+            profile = profile.with_variants([(name.as_str(), variant.as_str())]).unwrap();
         }
         let entry = profile.find(&example.name).unwrap();
         let what = format!("{} {} = {} ({})", example.family, example.name, example.value, example.source);

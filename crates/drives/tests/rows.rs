@@ -34,7 +34,7 @@ fn place(row: &Row) -> (String, u16) {
     match cell(row, "code") {
         "" => (cell(row, "name").to_owned(), listed()),
         // A family whose codes do not tell their addresses lists them.
-        code if row.contains_key("address") => (code.to_owned(), listed()),
+        code if !cell(row, "address").is_empty() => (code.to_owned(), listed()),
         code => {
             let (group, index) = code[1..].split_once('.').unwrap();
             (code.to_owned(), group.parse::<u16>().unwrap() * 256 + index.parse::<u16>().unwrap())
@@ -73,6 +73,14 @@ fn counts(text: &str, scale: i128) -> i128 {
     if text.starts_with('-') { -scaled / tens } else { scaled / tens }
 }
 
+/// `count` of which `counts` are `units`, with the fewest digits at which every count reads differently: the nearest number,
+/// and of two the one farther from zero.
+fn share(count: i128, (counts, units): (i128, i128)) -> String {
+    let scale = (0..9).map(|digits| 10_i128.pow(digits)).find(|tens| units * tens >= counts).unwrap();
+    let steps = (2 * count.abs() * units * scale + counts) / (2 * counts);
+    written(if count < 0 { -steps } else { steps }, scale)
+}
+
 /// `count` as a number of units, with every decimal of `scale`.
 fn written(count: i128, scale: i128) -> String {
     let sign = if count < 0 { "-" } else { "" };
@@ -86,8 +94,10 @@ fn written(count: i128, scale: i128) -> String {
 
 /// What a row says of its numbers.
 struct Numbers {
-    scale: i128,
+    /// So many counts are so many units.
+    ratio: (i128, i128),
     words: usize,
+    high_first: bool,
     /// The least and the most that the words can hold.
     holds: (i128, i128),
     low: i128,
@@ -96,12 +106,15 @@ struct Numbers {
 
 impl Numbers {
     fn new(scale: &str, signed: bool, words: &str, low: &str, high: &str) -> Self {
-        let scale = if scale.is_empty() { 1 } else { scale.parse().unwrap() };
+        let (counts, units) = scale.split_once('/').unwrap_or((scale, "1"));
+        let ratio = (if counts.is_empty() { 1 } else { counts.parse().unwrap() }, units.parse().unwrap());
         let words = if words == "2" { 2 } else { 1 };
         let size = 1_i128 << (16 * words);
         let holds = if signed { (-size / 2, size / 2 - 1) } else { (0, size - 1) };
-        let bound = |text: &str, end: i128| if text.is_empty() { end } else { counts(text, scale) };
-        Self { scale, words, holds, low: bound(low, holds.0), high: bound(high, holds.1) }
+        // The ranges of shares have whole counts at their ends.
+        let bound = |text: &str, end: i128| if text.is_empty() { end } else { self::counts(text, ratio.0) / ratio.1 };
+        let (low, high) = (bound(low, holds.0), bound(high, holds.1));
+        Self { ratio, words, high_first: false, holds, low, high }
     }
 
     fn of(row: &Row) -> Self {
@@ -111,13 +124,20 @@ impl Numbers {
             "coil" | "discrete" => ("0", "1"),
             _ => (cell(row, "low"), cell(row, "high")),
         };
-        Self::new(cell(row, "scale"), signed, cell(row, "words"), low, high)
+        let high_first = cell(row, "order") == "high first";
+        let numbers = Self::new(cell(row, "scale"), signed, cell(row, "words"), low, high);
+        Self { high_first, ..numbers }
     }
 
-    /// The words of `count`, the low one first: two's complement.
+    /// The words of `count` as they stand in the drive: two's complement.
     fn wire(&self, count: i128) -> Vec<u16> {
         let bits = count.rem_euclid(1_i128 << (16 * self.words));
-        (0..self.words).map(|word| u16::try_from(bits >> (16 * word) & 0xFFFF).unwrap()).collect()
+        let mut words: Vec<u16> =
+            (0..self.words).map(|word| u16::try_from(bits >> (16 * word) & 0xFFFF).unwrap()).collect();
+        if self.high_first {
+            words.reverse();
+        }
+        words
     }
 }
 
@@ -125,7 +145,7 @@ fn check(what: &str, entry: &Entry, numbers: &Numbers) -> usize {
     let (low, high) = (numbers.low, numbers.high);
     let mut checked = 0;
     for count in [low, high, 0, 1, -1, low - 1, high + 1, low + 1, high - 1] {
-        let text = written(count, numbers.scale);
+        let text = share(count, numbers.ratio);
         if numbers.holds.0 <= count && count <= numbers.holds.1 {
             let value = entry.quantity().decode_words(&numbers.wire(count)).unwrap();
             assert_eq!(value.to_string(), text, "{what}: {count} counts");
@@ -143,8 +163,9 @@ fn check(what: &str, entry: &Entry, numbers: &Numbers) -> usize {
         }
         checked += 1;
     }
-    // A tenth of a count is no count.
-    let finer = written(low * 10 + 1, numbers.scale * 10);
+    // A tenth of the last digit is too fine.
+    let at_low = share(low, numbers.ratio);
+    let finer = format!("{at_low}{}1", if at_low.contains('.') { "" } else { "." });
     assert!(entry.encode(Input::Decimal(&finer)).is_err(), "{what} = {finer}");
     checked
 }
@@ -170,10 +191,13 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
     // Rows without those of a variant, counted in the tables by hand.
     let expected = [
         ("a1000", 20),
+        ("acs355", 9),
+        ("atv312", 26),
         ("chf100a", 27),
         ("wj200", 14),
         ("chv100", 24),
         ("eds300", 16),
+        ("fc51", 23),
         ("gd10", 81),
         ("gd100", 94),
         ("gd20", 92),
@@ -189,6 +213,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("ms300", 17),
         ("saj8000m", 14),
         ("sunfar-e300", 6),
+        ("v20", 19),
         ("vfd500", 47),
     ];
     assert_eq!(all, expected.into());

@@ -23,7 +23,7 @@ use crate::{overhear, trace};
 pub(crate) const HOLDING: &str = Table::Holding.name();
 
 /// One line and its owner.
-#[pyclass(frozen, module = "drivebus._native")]
+#[pyclass(frozen, weakref, module = "drivebus._native")]
 #[derive(Debug)]
 pub(crate) struct Bus {
     /// Shared with the threads that work for it.

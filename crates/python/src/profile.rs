@@ -213,7 +213,10 @@ impl Profile {
         let both: u32 = raw
             .extract()
             .map_err(|_| not_allowed(format!("raw {} is not a number from 0 to 4294967295", shown(raw))))?;
-        let words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
+        let mut words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
+        if quantity.is_high_first() {
+            words.reverse();
+        }
         let value = quantity.decode_words(&words);
         value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| not_allowed("no words".to_owned()))
     }
@@ -296,6 +299,10 @@ impl Profile {
 
     fn command_registers(&self) -> std::collections::BTreeMap<u32, std::collections::BTreeMap<u16, &str>> {
         self.0.command_registers().into_iter().map(|(place, codes)| (place.number(), codes)).collect()
+    }
+
+    fn start_sequence<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        tables::start_sequence(py, &self.0)
     }
 
     #[getter]

@@ -16,7 +16,7 @@ pub(crate) fn known_as(entry: &Entry) -> &str {
     entry.alias().unwrap_or_else(|| entry.name())
 }
 
-/// `value` as a float where the drive measures, as an int where it counts or names.
+/// `value` as a float where the drive measures, as an int where it counts or names: then a count is the value.
 pub(crate) fn number<'py>(py: Python<'py>, quantity: &Quantity, value: Value) -> Bound<'py, PyAny> {
     if quantity.measures() {
         PyFloat::new(py, value.to_f64()).into_any()
@@ -43,7 +43,10 @@ pub(crate) fn description<'py>(py: Python<'py>, entry: &Entry) -> Table<'py> {
     dict.set_item("table", entry.table().name())?;
     dict.set_item("unit", quantity.unit())?;
     // Where the scale is not known the unit is "raw", and there is one count to it.
-    dict.set_item("scale", quantity.scale().unwrap_or(1))?;
+    match quantity.ratio().unwrap_or((1, 1)) {
+        (counts, 1) => dict.set_item("scale", counts)?,
+        (counts, units) => dict.set_item("scale", f64::from(counts) / f64::from(units))?,
+    }
     dict.set_item("signed", quantity.is_signed())?;
     dict.set_item("low", value(quantity.low()))?;
     dict.set_item("high", value(quantity.high()))?;
@@ -60,6 +63,7 @@ pub(crate) fn description<'py>(py: Python<'py>, entry: &Entry) -> Table<'py> {
     dict.set_item("evidence", entry.evidence().name())?;
     dict.set_item("note", entry.note())?;
     dict.set_item("words", entry.words())?;
+    dict.set_item("high_first", quantity.is_high_first())?;
     dict.set_item("listed", entry.is_listed())?;
     dict.set_item("variant", quantity.variant())?;
     Ok(dict)
@@ -157,6 +161,24 @@ pub(crate) fn items<'py>(py: Python<'py>, profile: &Profile, rows: &[Control]) -
         Ok(dict)
     });
     rows.collect()
+}
+
+/// The words before a run.
+pub(crate) fn start_sequence<'py>(py: Python<'py>, profile: &Profile) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let steps = profile.start_sequence().iter().map(|step| {
+        let until = PyDict::new(py);
+        for field in &step.until {
+            until.set_item(&field.field, field.value >> field.mask.trailing_zeros())?;
+        }
+        let dict = PyDict::new(py);
+        dict.set_item("word", step.word)?;
+        dict.set_item("label", &step.label)?;
+        dict.set_item("until", until)?;
+        dict.set_item("mask", step.until.iter().fold(0, |mask, field| mask | field.mask))?;
+        dict.set_item("value", step.until.iter().fold(0, |value, field| value | field.value))?;
+        Ok(dict)
+    });
+    steps.collect()
 }
 
 pub(crate) fn variants<'py>(py: Python<'py>, profile: &Profile) -> Table<'py> {

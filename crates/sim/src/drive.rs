@@ -74,6 +74,8 @@ pub(crate) struct Drive {
     writes: VecDeque<WriteRecord>,
     words_written: u64,
     frames: Frames,
+    /// How many of the words before a run have come.
+    led_up: usize,
 }
 
 /// Frames counted since the power came, over and over from 65 535.
@@ -108,6 +110,7 @@ impl Drive {
             writes: VecDeque::new(),
             words_written: 0,
             frames: Frames::default(),
+            led_up: 0,
         }
     }
 
@@ -126,6 +129,7 @@ impl Drive {
     /// Trips the drive with fault `code`, as a cause from outside that is gone at once.
     pub(crate) fn trip(&mut self, code: u16) {
         self.machine.trip(code);
+        self.led_up = 0;
         self.remember_fault(code);
     }
 
@@ -149,6 +153,7 @@ impl Drive {
         self.unlocked = false;
         self.last_heard = None;
         self.frames = Frames::default();
+        self.led_up = 0;
         self.machine = self.machine.after_power_loss(now);
         self.settings = settings::settings(self.map.family(), &self.store, 0);
     }
@@ -292,6 +297,7 @@ impl Drive {
 
     fn run_machine(&mut self, to: Instant) {
         if let Some(code) = self.machine.advance(to) {
+            self.led_up = 0;
             self.remember_fault(code);
         }
     }

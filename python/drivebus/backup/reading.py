@@ -85,9 +85,8 @@ class Reader:
 
     def _word(self, code: str, words: Sequence[int], address: int) -> int:
         place = self._unit.profile.address(code) - address
-        parts = words[place : place + self._unit.profile.describe(code).words]
-        # The low word comes first.
-        return sum(part << 16 * index for index, part in enumerate(parts))
+        known = self._unit.profile.describe(code)
+        return known.number(words[place : place + known.words])
 
 
 def _reason(error: Refused) -> str:

@@ -174,7 +174,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
         wanted: dict[str, Any] = {}
         words: dict[int, int] = {}
         for text, value in asked:
-            place = names.resolve(drive.profile, text)
+            place = names.resolve(drive.profile, text, written=True)
             if isinstance(place, int):
                 words[place] = _word(drive, place, value, force)
                 continue

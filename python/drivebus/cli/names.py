@@ -31,8 +31,10 @@ __all__ = [
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 
 
-def resolve(profile: drivebus.Profile, text: str) -> str | int:
+def resolve(profile: drivebus.Profile, text: str, *, written: bool = False) -> str | int:
     """The name that *text* stands for, or the address where the profile has no name for it.
+
+    An address stands for what is read there, or with *written* for what is written.
 
     An unknown name stays what it is: the profile refuses it and names the closest.
     """
@@ -43,7 +45,7 @@ def resolve(profile: drivebus.Profile, text: str) -> str | int:
     match = _ADDRESS.fullmatch(text)
     if match:
         address = int(match[1] or match[2], 16)
-        return profile.name_at(address) or address
+        return profile.name_at(address, written=written) or address
     return text
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import drivebus
 from drivebus import places
+from drivebus.line.write_guard import code_text
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
 
@@ -40,6 +41,7 @@ def known(profile: drivebus.Profile) -> dict[str, Any]:
         "commands": profile.commands(),
         "command_codes": profile.command_codes(),
         "command_registers": profile.command_registers(),
+        "start_sequence": profile.start_sequence(),
         "commands_not_usable": _reasons(profile),
         "states": _states(profile),
         "state_reason": profile.state_reason(),
@@ -126,9 +128,14 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     for address in sorted(registers, key=lambda address: address != profile.command_address):
         lines.append(f"written to {places.shown(address)}")
         for code, label in sorted(registers[address].items()):
-            for command in label.split(" or ") if label not in profile.commands() else [label]:
+            either = label.split(" or ")
+            for command in either if {*either} <= {*profile.commands()} else [label]:
                 doubt = " [unverified]" if command in reasons else ""
-                lines.append(f"{code:>3} {command.replace('_', ' ')}{_after(profile, command)}{doubt}")
+                lines.append(f"{_code(code, command)}{_after(profile, command)}{doubt}")
+    for number, step in enumerate(profile.start_sequence()):
+        until = ", ".join(f"{field} = {value}" for field, value in step["until"].items())
+        when = "before a run or jog from rest:" if number == 0 else "then"
+        lines.append(f"{when} {_code(step['word'], step['label']).lstrip()}, until {until}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
 
@@ -137,6 +144,12 @@ def _after(profile: drivebus.Profile, command: str) -> str:
     """What goes out before *command*, if anything does."""
     first = profile.command_first(command) if command in profile.commands() else None
     return "" if first is None else f", after {first[1]} at {places.shown(first[0])}"
+
+
+def _code(code: int, label: str) -> str:
+    """A code and what it means; words of bits as manuals print them too."""
+    printed = code_text(code)
+    return f"{code:>3} {label.replace('_', ' ')}" + ("" if printed == f"{code}" else f" ({printed})")
 
 
 def _reasons(profile: drivebus.Profile) -> dict[str, str]:

@@ -49,8 +49,10 @@ async def identify(read: Read, unit: int) -> Identification:
     if not candidates:
         reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
+    told_by = [signatures.listed()[name] for name in candidates]
+    telling = {place for signature in told_by for place in (*signature["answers"], *signature["refuses"])}
     seen = ", ".join(
-        f"{places.shown(place)} {'answered' if yes else 'refused'}" for place, yes in sorted(answered.items())
+        f"{places.shown(place)} {'answered' if answered[place] else 'refused'}" for place in sorted(telling)
     )
     return Identification(
         unit,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import places, rtu
 from drivebus.errors import DrivebusError
-from drivebus.line.write_guard import KnownUnits
+from drivebus.line.write_guard import KnownUnits, code_text
 from drivebus.profile import Profile
 from drivebus.values import Choice, Description
 
@@ -124,9 +124,9 @@ def _request(fields: rtu.Frame, profile: Profile | None) -> str:
         case "read":
             return f"read {_names(first, fields.count or 0, profile)}"
         case "write":
-            return f"write {_values(first, [fields.value or 0], profile)}"
+            return f"write {_values(first, [fields.value or 0], profile, written=True)}"
         case "write_many":
-            return f"write {_values(first, fields.words or [], profile)}"
+            return f"write {_values(first, fields.words or [], profile, written=True)}"
         case "echo":
             return f"echo {fields.data:04X}H"
     return f"function {fields.function:02X}H"
@@ -141,9 +141,9 @@ def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> 
                 return f"answers {' '.join(f'{word:04X}H' for word in words)}"
             return f"answers {_values(first, words[: _asked_for(asked)], profile)}"
         case "write":
-            return f"took {_values(_place(fields), [fields.value or 0], profile)}"
+            return f"took {_values(_place(fields), [fields.value or 0], profile, written=True)}"
         case "write_many_answer":
-            return f"took {_names(_place(fields), fields.count or 0, profile)}"
+            return f"took {_names(_place(fields), fields.count or 0, profile, written=True)}"
         case "echo":
             return f"returns {fields.data:04X}H"
         case "exception":
@@ -176,27 +176,28 @@ def _place(fields: rtu.Frame) -> int:
     return places.place(fields.table, fields.address or 0)
 
 
-def _names(first: int, count: int, profile: Profile | None) -> str:
+def _names(first: int, count: int, profile: Profile | None, *, written: bool = False) -> str:
     """What stands at *count* addresses from *first* on."""
     where = places.shown(first) if count == 1 else f"{count} {_many(first)} at {places.split(first)[1]:04X}H"
-    named = [_called(row) for address in range(first, first + count) if (row := _row(address, profile)) is not None]
+    rows = (_row(address, profile, written) for address in range(first, first + count))
+    named = [_called(row) for row in rows if row is not None]
     if not named:
         return where
     shown = ", ".join(named[:_SHOWN]) + (", …" if len(named) > _SHOWN else "")
     return f"{shown} ({where})"
 
 
-def _values(first: int, words: list[int], profile: Profile | None) -> str:
+def _values(first: int, words: list[int], profile: Profile | None, *, written: bool = False) -> str:
     """What *words* mean that stand at *first* and behind it."""
-    shown = [text for text, _ in zip(_each(first, words, profile), range(_SHOWN), strict=False)]
+    shown = [text for text, _ in zip(_each(first, words, profile, written), range(_SHOWN), strict=False)]
     return ", ".join(shown) + (", …" if len(words) > _SHOWN else "")
 
 
-def _each(first: int, words: list[int], profile: Profile | None) -> Iterator[str]:
+def _each(first: int, words: list[int], profile: Profile | None, written: bool) -> Iterator[str]:
     at = 0
     while at < len(words):
         address, word = first + at, words[at]
-        row = _row(address, profile)
+        row = _row(address, profile, written)
         count = 1 if row is None else min(row.words, len(words) - at)
         if profile is None or row is None:
             yield f"{places.shown(address)} = {word}"
@@ -206,10 +207,11 @@ def _each(first: int, words: list[int], profile: Profile | None) -> Iterator[str
 
 
 def _value(row: Description, words: list[int], profile: Profile) -> str:
-    codes = None if row.place is None else profile.command_registers().get(row.place)
+    is_state = row.access == "ro"
+    codes = None if row.place is None or is_state else profile.command_registers().get(row.place)
     if codes is not None:
         meant = codes.get(words[0])
-        return f"{words[0]}" if meant is None else f"{words[0]} ({meant.replace('_', ' ')})"
+        return code_text(words[0]) if meant is None else f"{code_text(words[0])} ({meant.replace('_', ' ')})"
     if row.bits:
         return f"{words[0]:04X}H"
     try:
@@ -234,9 +236,9 @@ def _many(place: int) -> str:
     return {"coil": "coils", "discrete": "discrete inputs", "input": "input registers"}.get(table, "words")
 
 
-def _row(address: int, profile: Profile | None) -> Description | None:
-    """What stands at *address*, whichever memory it is for."""
+def _row(address: int, profile: Profile | None, written: bool) -> Description | None:
+    """What is read or *written* at *address*, whichever memory it is for."""
     if profile is None:
         return None
-    name = profile.name_at(profile.plain_address(address))
+    name = profile.name_at(profile.plain_address(address), written=written)
     return None if name is None else profile.describe(name)

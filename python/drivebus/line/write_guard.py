@@ -14,9 +14,14 @@ from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.rtu import written
 
-__all__ = ["KnownUnits", "check_words"]
+__all__ = ["KnownUnits", "check_words", "code_text"]
 
 _HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
+
+
+def code_text(code: int) -> str:
+    """A command's code for people: as manuals print it, small numbers in decimal and words of bits in hexadecimal."""
+    return f"{code}" if code <= 0xFF else f"{code:04X}H"
 
 
 class KnownUnits:
@@ -61,7 +66,7 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
     """Raises `NotAllowed` if the words at *address* are a command that none of *families*, which *unit* may be, has."""
     known = list(families)
     for offset, word in enumerate([words] if isinstance(words, int) else words):
-        here = ((family, family.command_registers().get(_plain(family, address + offset))) for family in known)
+        here = ((family, _codes_at(family, address + offset)) for family in known)
         commanded = [(family, codes) for family, codes in here if codes is not None]
         if commanded:
             if not any(word in codes for _, codes in commanded):
@@ -71,10 +76,10 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 
 
 def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
-    codes = ", ".join(f"{code} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
+    codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return NotAllowed(
-        f"{word} at {places.shown(address)} is not a command of unit {unit}, which is known as {family.title}: its "
-        f"codes are {codes or 'not known'}; {_HINT}",
+        f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
+        f"{family.title}: its codes are {codes or 'not known'}; {_HINT}",
         unit=unit,
     )
 
@@ -82,7 +87,7 @@ def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: in
 def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None:
     """Nothing of its own stands there, but another family has its command register there."""
     foreign = _command_registers()
-    plain = {_plain(family, address) for family in families}
+    plain = {address, *(_plain(family, address) for family in families)}
     others = next((foreign[place] for place in plain if place in foreign), None)
     if others is None or any(family.name_at(place) is not None for family in families for place in plain):
         return
@@ -93,6 +98,12 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
         f"whose command register {where}; {_HINT}",
         unit=unit,
     )
+
+
+def _codes_at(family: Profile, address: int) -> Mapping[int, str] | None:
+    """The commands of *family* at *address*, or without the bit that may tell RAM from EEPROM; None: none are there."""
+    registers = family.command_registers()
+    return registers.get(address, registers.get(_plain(family, address)))
 
 
 def _plain(family: Profile, address: int) -> int:

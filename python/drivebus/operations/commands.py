@@ -8,14 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
+from drivebus import places
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
-from drivebus.operations import setpoints, state, words
+from drivebus.operations import halts, setpoints, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
-__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Proof", "confirm", "explained", "give", "send_once"]
+__all__ = [
+    "A_WORD",
+    "HALTS",
+    "POLL_INTERVAL",
+    "Proof",
+    "confirm",
+    "explained",
+    "give",
+    "prepared",
+    "send_once",
+    "send_whole",
+]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
@@ -46,22 +58,37 @@ HALTS = ("stop", "coast", "jog_stop")
 """Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
 
-async def give(unit: Unit, name: str, setpoint: int | None = None) -> None:
-    """Sends the command word once, with the setpoint behind it where the drive has both side by side.
+async def give(unit: Unit, name: str) -> None:
+    """Sends the command word once, after what comes before it."""
+    await send_whole(unit, name, *unit.profile.command(name))
 
-    Where another word says which way the motor turns, that goes out first, once too.
+
+async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, int | list[int]]:
+    """Where the command goes, and what goes there: the setpoint behind it, where the drive has both side by side.
+
+    Where it has not, the setpoint is sent now.
     """
     address, code = unit.profile.command(name)
-    first = unit.profile.command_first(name)
-    payload: int | list[int] = code
     if setpoint is not None:
         together = _WRITE_MANY in unit.profile.functions
         if together and unit.profile.address(setpoints.register_of(unit, "frequency")) == address + 1:
-            payload = [code, setpoint]
-        else:
-            await setpoints.write_word(unit, setpoint)
+            return address, [code, setpoint]
+        await setpoints.write_word(unit, setpoint)
+    return address, code
+
+
+async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
+    """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too."""
+    first = unit.profile.command_first(name)
     if first is not None:
+        before = halts.begun(unit)
         await send_once(unit, name, *first)
+        if name not in HALTS and halts.begun(unit) != before:
+            raise Unconfirmed(
+                f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
+                f"which comes before {name}; the rest of {name} was not sent",
+                unit=unit.address,
+            )
     await send_once(unit, name, address, payload)
 
 
@@ -70,6 +97,7 @@ async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence
     urgent = name in HALTS
     try:
         if urgent:
+            halts.begin(unit)
             await words.send(unit, address, payload, urgent=True)
             unit.memory.halts += 1
         else:

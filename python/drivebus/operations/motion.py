@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
-from drivebus.operations import commands, control, setpoints, speed, start_checks, state
+from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.program_end import before_start
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
@@ -46,7 +46,8 @@ async def run(
     Args:
         hz: Setpoint in Hz, 0 to the drive's own maximum; None keeps the one it has.
         reverse: Turn the other way.
-        confirm: Seconds until the state word must show it; 0 does not look.
+        confirm: Seconds until the state word must show it; 0 does not look. So too for each of the words that some
+            families want before it; those are looked at once in any case.
         force: Start although the link is bad. Then it may be impossible to stop the motor over the bus.
         unverified: Also where command, states or setpoint are not verified for the family. What ends it then needs
             no such word.
@@ -60,7 +61,8 @@ async def run(
             sent that moves it.
         Refused: The drive did not start.
         NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
-        Unconfirmed: The command was sent; the message names the state seen last. It is not repeated.
+        Unconfirmed: The command was sent; the message names the state seen last. It is not repeated. Or the family
+            wants other words before it, and the drive does not show one of them: then the command was not sent.
     """
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     command = "run_reverse" if reverse else "run_forward"
@@ -191,7 +193,10 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     # Before it is sent: whoever is interrupted from here on has to end it.
     unit.memory.starts += 1
     unit.memory.started_as = State.UNKNOWN if command.startswith("jog") else wanted
-    await commands.give(unit, command, setpoint)
+    address, payload = await commands.prepared(unit, command, setpoint)
+    if not before.state.running:
+        await start_sequence.lead_up(unit, command, confirm)
+    await commands.send_whole(unit, command, address, payload)
 
     async def shows(seen: Seen) -> bool:
         if "state" in seen.missing:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
-from drivebus.operations import control, state
+from drivebus.operations import control, start_sequence, state
 from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -22,6 +22,7 @@ _LOOKS_TO_PROVE = 10
 def may_be_given(unit: Unit, command: str) -> None:
     """Raises `NotAllowed` where *command* may not be given, or what it starts could not be stopped again."""
     unit.evidence.commands(command)
+    start_sequence.check_seen(unit)
     can_be_stopped(unit)
 
 

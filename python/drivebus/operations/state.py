@@ -49,6 +49,8 @@ class Seen(NamedTuple):
     in_fault: bool
     """Whether the state word says that the drive is in fault, or where it cannot, the fault number. It may run all the
     same."""
+    word: int | None
+    """The state word itself."""
 
     @property
     def source(self) -> ControlSource | None:
@@ -97,7 +99,7 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
     plan = planned(unit)
     if plan.plan is None:
-        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False)
+        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
     answers: list[list[int]] = []
     first = 0.0
     for place, count in plan.plan.reads:
@@ -111,16 +113,18 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     for word in plan.words:
         fields.update(unit.profile.fields(word, values[word]))
     number = unit.profile.fault_number(values[plan.fault]) if plan.fault is not None else 0
-    in_fault = plan.state is not None and (
-        unit.profile.is_in_fault(values[plan.state]) or (number != 0 and not unit.profile.state_tells_fault())
+    told = None if plan.state is None else values[plan.state]
+    in_fault = told is not None and (
+        unit.profile.is_in_fault(told) or (number != 0 and not unit.profile.state_tells_fault())
     )
     seen = Seen(
-        State.UNKNOWN if plan.state is None else state_of(unit, values[plan.state]),
+        State.UNKNOWN if told is None else state_of(unit, told),
         fields,
         unit.profile.fault(number) if number else None,
         first,
         plan.missing,
         in_fault,
+        told,
     )
     remember(unit, str(seen))
     return seen

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from drivebus import checks
 from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, NotStopped
-from drivebus.operations import commands, motion, words
+from drivebus.operations import commands, halts, motion, words
 from drivebus.operations.unit import Unit
 
 __all__ = ["stop_all"]
@@ -62,6 +62,7 @@ async def _tell(one: _Told) -> None:
     one.sent = unit.bus.now()
     try:
         unit.evidence.commands(_STOP)
+        halts.begin(unit)
         await words.send(unit, *unit.profile.command(_STOP), urgent=True)
         unit.memory.halts += 1
     except DrivebusError as error:

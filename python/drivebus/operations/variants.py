@@ -53,7 +53,8 @@ async def _chosen(unit: Unit, variant: str) -> str:
             unit.address,
         )
     unit.evidence.reads([parameter])
-    [raw] = await read_words(unit, unit.profile.address(parameter))
+    known = unit.profile.describe(parameter)
+    raw = known.number(await read_words(unit, unit.profile.address(parameter), known.words))
     for choice, value in choices.items():
         if value == raw:
             return str(choice)

@@ -24,7 +24,7 @@ _PLANS_KEPT = 256
 class Profile:
     """What one family of drives means by its words. Immutable, and shared freely between drives and threads."""
 
-    __slots__ = ("_descriptions", "_names", "_native", "_places", "_plans")
+    __slots__ = ("_descriptions", "_names", "_native", "_orders", "_places", "_plans")
 
     def __init__(self, native: _native.Profile) -> None:
         self._native = native
@@ -32,6 +32,7 @@ class Profile:
         self._descriptions: dict[str, Description] = {}
         self._plans: dict[tuple[str, ...], ReadPlan] = {}
         self._places: dict[int | None, str] = {}
+        self._orders: dict[int | None, str] = {}
 
     @classmethod
     def builtin(cls, name: str) -> Profile:
@@ -182,12 +183,18 @@ class Profile:
         """The registers that `Drive.monitor` reads when it is given no names."""
         return self._native.monitor_names()
 
-    def name_at(self, address: int, /) -> str | None:
-        """The register or parameter at *address* (0..0xFFFF, or the `place` of another table), or None."""
+    def name_at(self, address: int, /, *, written: bool = False) -> str | None:
+        """The register or parameter at *address* (0..0xFFFF, or the `place` of another table), or None.
+
+        Where a state is read and a command is written, that is the state; with *written*, the command.
+        """
         if not self._places:
             # The first of two names for one place is the one that is meant.
-            self._places = {self.describe(name).place: name for name in reversed(self._names)}
-        return self._places.get(address)
+            rows = [self.describe(name) for name in self._names]
+            named = list(zip(rows, self._names, strict=True))[::-1]
+            self._orders = {row.place: name for row, name in named if row.access == "wo"}
+            self._places = self._orders | {row.place: name for row, name in named if row.access != "wo"}
+        return (written and self._orders.get(address)) or self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
         """Everything that is known about one register or parameter. NotAllowed names the closest name."""
@@ -272,6 +279,14 @@ class Profile:
         Most families have one; some take the reset of a fault in another.
         """
         return self._native.command_registers()
+
+    def start_sequence(self) -> list[dict[str, Any]]:
+        """The words that come, in this order, before one that runs or jogs a motor at rest; none of most families.
+
+        Keys of each: `word`, `label`, `until` (fields of the state word, and what they must be before the next word is
+        sent), and the same as bits: `mask` and `value`.
+        """
+        return self._native.start_sequence()
 
     @property
     def command_address(self) -> int | None:

@@ -96,6 +96,7 @@ class Families:
     def values(self, request: bytes, answer: bytes | None) -> dict[str | int, Value]:
         """What *request* wrote or its *answer* carries: by names where the family is known, otherwise by addresses."""
         place, words = place_of(request), written_by(request)
+        written = words is not None
         if words is None and answer is not None and answer[1] == request[1]:
             words = carried(answer, request)
         if place is None or not words:
@@ -103,7 +104,7 @@ class Families:
         profile, first, found = self.of(request[0], request), place[0], dict[str | int, Value]()
         at = 0
         while at < len(words):
-            name = None if profile is None else profile.name_at(profile.plain_address(first + at))
+            name = None if profile is None else profile.name_at(profile.plain_address(first + at), written=written)
             if profile is None or name is None:
                 found[first + at] = words[at]
                 at += 1

@@ -117,8 +117,9 @@ class Recording:
 
     def _set(self, hz: float) -> None:
         # A sine falls between what the drive counts.
-        nearest = round(hz * self._counts) / self._counts
-        at_once(setpoints.write_word(self._unit, self._unit.profile.encode(self._register, nearest)))
+        profile = self._unit.profile
+        nearest = profile.decode(self._register, round(hz * self._counts))
+        at_once(setpoints.write_word(self._unit, profile.encode(self._register, nearest)))
 
     def _sample(self, moving: bool) -> tuple[float, Mapping[str, float]]:
         """Reads all once, keeps and judges it; its moment on the line's clock, and the values."""

@@ -10,7 +10,7 @@ use super::manifest::{self, AddressRule, Manifest, line};
 use super::motion;
 use super::placed::Placed;
 use super::problems::Problems;
-use super::{File, inherit, rows, sense, succeed};
+use super::{File, inherit, rows, sense, sequence, succeed};
 use crate::entry::Entry;
 use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
@@ -58,6 +58,7 @@ pub(super) fn profile(
     variants(file, manifest, &mut profile, &entries, problems);
     motion::commands(file, manifest, &mut profile, &mut entries, problems);
     motion::state(file, manifest, &mut profile, &mut entries, problems);
+    sequence::sequence(file, manifest, &mut profile, &mut entries, problems);
     roles(file, manifest, &mut profile.roles, &entries, problems);
     lists(file, manifest, &mut profile, &entries, problems);
     if let Some(identification) = &manifest.identification {
@@ -157,6 +158,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
             commands: BTreeMap::new(),
             other_commands: BTreeMap::new(),
             commands_note: String::new(),
+            start_sequence: Vec::new(),
             moving: Vec::new(),
             state: None,
             control: Vec::new(),
@@ -293,7 +295,7 @@ fn in_unit(
     problems: &mut Problems,
 ) -> Option<String> {
     let entry = entries.get(file, wanted, problems)?;
-    if entry.quantity.unit != unit || entry.quantity.decimals.is_none() {
+    if entry.quantity.unit != unit || entry.quantity.scale.is_none() {
         let reason = format!("{} must be in {unit}, with a scale that is known", wanted.get_ref());
         problems.add(file, line(file, wanted), reason);
     }

@@ -7,7 +7,7 @@ use super::manifest::line;
 use super::placed::Placed;
 use super::problems::Problems;
 use super::rows::Located;
-use crate::entry::{Entry, Kind, names};
+use crate::entry::{Access, Entry, Kind, names};
 use crate::parts::memory::Memory;
 use crate::place::{Place, Table};
 use crate::text::{closest, group, parse_code};
@@ -16,6 +16,7 @@ use crate::text::{closest, group, parse_code};
 #[derive(Debug, Default)]
 pub(super) struct Entries {
     pub(super) list: Vec<Entry>,
+    /// Of two at one place the one that is read.
     pub(super) by_address: BTreeMap<Place, usize>,
     /// Some rows were broken, so that a name that is missing may be theirs.
     pub(super) incomplete: bool,
@@ -34,7 +35,7 @@ impl Entries {
         for (file, Located { line, item }) in rows {
             if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| is_called(other, name))) {
                 problems.add(file, line, format!("{twice} is there twice"));
-            } else if let Some((other, place)) = own.iter().find_map(|other| Some((other, overlap(other, &item)?))) {
+            } else if let Some((other, place)) = own.iter().find_map(|other| Some((other, clash(other, &item)?))) {
                 let reason = format!("{} is at {place}, where {} is already", item.name, other.name);
                 problems.add(file, line, reason);
             } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
@@ -44,7 +45,7 @@ impl Entries {
             }
         }
         let replaced = |old: &Entry| {
-            own.iter().any(|new| overlap(old, new).is_some() || names(old).any(|name| is_called(new, name)))
+            own.iter().any(|new| clash(old, new).is_some() || names(old).any(|name| is_called(new, name)))
         };
         let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
         list.append(&mut own);
@@ -52,7 +53,10 @@ impl Entries {
             let place = |entry: &Entry| (entry.kind, entry.place.is_none(), entry.place);
             place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
         });
-        let by_address = list.iter().enumerate().filter_map(|(index, entry)| Some((entry.place?, index))).collect();
+        let placed = |index: usize| Some((list.get(index)?.place?, index));
+        let (written, read): (Vec<_>, Vec<_>) =
+            (0..list.len()).filter_map(placed).partition(|&(_, index)| list[index].access == Access::Wo);
+        let by_address = written.into_iter().chain(read).collect();
         Self { list, by_address, incomplete: false }
     }
 
@@ -136,8 +140,20 @@ fn is_called(entry: &Entry, name: &str) -> bool {
     names(entry).any(|own| own.eq_ignore_ascii_case(name))
 }
 
+/// A place that both have, and only one can.
+pub(super) fn clash(one: &Entry, other: &Entry) -> Option<Place> {
+    overlap(one, other).filter(|_| !is_other_way(one, other))
+}
+
+/// Whether one is what is read and the other what is written at the same place.
+pub(super) fn is_other_way(one: &Entry, other: &Entry) -> bool {
+    let ways = (one.access, other.access);
+    let same_word = one.place.is_some() && one.place == other.place && one.words() == other.words();
+    same_word && matches!(ways, (Access::Ro, Access::Wo) | (Access::Wo, Access::Ro))
+}
+
 /// A place that both have.
-pub(super) fn overlap(one: &Entry, other: &Entry) -> Option<Place> {
+fn overlap(one: &Entry, other: &Entry) -> Option<Place> {
     let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
     let (Place { table, address: first }, second) = (one.place?, other.place?);
     let meet = first.max(second.address);

@@ -7,7 +7,6 @@ use super::entries::Entries;
 use super::manifest::{self, Field, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use super::rows::decimals;
 use super::{File, ProfileError};
 use crate::bits::BitField;
 use crate::decimal::{Counts, Decimal};
@@ -20,6 +19,7 @@ use crate::parts::variant::{Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
 use crate::place::Place;
 use crate::quantity::{Quantity, limits};
+use crate::scale::Scale;
 use crate::text::parse_address;
 
 /// Checks that `low` ≤ `item` ≤ `high`.
@@ -238,21 +238,26 @@ pub(super) fn variant(
 }
 
 fn variant_quantity(row: &manifest::VariantChoice) -> Result<Quantity, String> {
-    let decimals =
-        decimals(row.scale).ok_or_else(|| format!("scale {} must be 1, 10, 100, 1000 or 10000", row.scale))?;
+    let scale = match &row.scale {
+        manifest::Scale::Number(counts) => Scale::decimal(*counts),
+        manifest::Scale::Ratio(text) => Scale::parse(text),
+    };
+    let right = "1, 10, 100, 1000 or 10000, or a ratio such as \"16384/100\"";
+    let scale = scale.ok_or_else(|| format!("scale {} must be {right}", row.scale))?;
     let (least, most) = limits(row.signed, false);
     let bound = |value: Option<f64>| {
         let Some(value) = value else { return Ok(None) };
-        match Decimal::parse(&format!("{value:?}")).map(|number| number.counts(decimals)) {
+        match Decimal::parse(&format!("{value:?}")).map(|number| scale.count(&number)) {
             Some(Counts::Whole(count)) if (least..=most).contains(&count) => Ok(Some(count)),
             _ => Err(format!("{value} does not fit a word with this scale and sign")),
         }
     };
     Ok(Quantity {
         unit: row.unit.clone(),
-        decimals: Some(decimals),
+        scale: Some(scale),
         signed: row.signed,
         wide: false,
+        high_first: false,
         low: bound(row.low)?,
         high: bound(row.high)?,
         low_from: None,

@@ -6,6 +6,7 @@
 use super::File;
 use super::manifest::{Manifest, line};
 use super::problems::Problems;
+use crate::bits::BitField;
 use crate::entry::{Access, Entry};
 use crate::parts::memory::Memory;
 use crate::parts::setpoint::Setpoint;
@@ -18,6 +19,7 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
     words(file, profile, problems);
     setpoints(file, profile, problems);
     functions(file, manifest, profile, problems);
+    sequence(file, profile, problems);
 }
 
 /// The bit that says where a write is kept is no part of any address.
@@ -48,7 +50,7 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
         }
     };
     for &place in profile.command_registers().keys() {
-        one_word("the command register", profile.entry_at(place), Access::Ro);
+        one_word("the command register", profile.written_entry_at(place), Access::Ro);
     }
     for setpoint in profile.setpoints.values() {
         one_word("a setpoint", profile.entry(&setpoint.register), Access::Ro);
@@ -64,6 +66,21 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
     let registers = profile.command_registers();
     for place in registers.into_keys().filter(|&place| profile.entry_at(place).is_none()) {
         problems.add(file, 1, format!("another row lies over the command register, {place}"));
+    }
+}
+
+/// What the words before a start wait for is still told by the state word.
+fn sequence(file: &File, profile: &Profile, problems: &mut Problems) {
+    // Without a state nothing is started that waits for it.
+    let Some(state) = profile.state.as_ref().and_then(|state| profile.entry(&state.register)) else { return };
+    for step in &profile.start_sequence {
+        for until in &step.until {
+            let is_there = |field: &BitField| field.name == until.field && field.mask() == until.mask;
+            if !state.bits.iter().any(is_there) {
+                let reason = format!("\"{}\" waits for {} of {}", step.label, until.field, state.name);
+                problems.add(file, 1, format!("{reason}, which has no such bits any more: say [commands] anew"));
+            }
+        }
     }
 }
 

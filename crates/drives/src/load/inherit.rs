@@ -1,10 +1,11 @@
 //! What a profile takes over from the one below it, and how much of it may then be trusted.
 
 use super::File;
+use super::entries::is_other_way;
 use super::manifest::{Extends, Manifest, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::entry::names;
+use crate::entry::{Access, names};
 use crate::evidence::Evidence;
 use crate::profile::Profile;
 use crate::text::closest;
@@ -40,6 +41,10 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
             continue;
         };
         let gone = base.entries.remove(index);
+        // Where the same address is written as something else, the commands stay.
+        let place = gone
+            .place
+            .filter(|_| gone.access != Access::Ro || !base.entries.iter().any(|other| is_other_way(&gone, other)));
         let stays = |name: &String| *name != gone.name;
         base.lists_mut().into_iter().for_each(|list| list.retain(stays));
         for role in base.roles.single_mut() {
@@ -52,15 +57,16 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.watchdog.take_if(|watchdog| {
             !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
         });
-        base.moving.retain(|&place| Some(place) != gone.place);
-        if base.command_address.is_some_and(|place| Some(place) == gone.place) {
+        base.moving.retain(|&at| Some(at) != place);
+        if base.command_address.is_some_and(|at| Some(at) == place) {
             base.command_address = None;
             base.commands.clear();
             base.other_commands.clear();
+            base.start_sequence.clear();
         }
         base.commands.retain(|_, known| {
-            let places = known.elsewhere.into_iter().chain(known.first.map(|(place, _)| place));
-            places.into_iter().all(|place| Some(place) != gone.place)
+            let places = known.elsewhere.into_iter().chain(known.first.map(|(at, _)| at));
+            places.into_iter().all(|at| Some(at) != place)
         });
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));

@@ -6,7 +6,9 @@ mod schema;
 
 use std::collections::BTreeMap;
 
-pub(super) use motion::{Commands, Control, Elsewhere, SetpointRole, States, Variant, VariantChoice, Watchdog};
+pub(super) use motion::{
+    Commands, Control, Elsewhere, Scale, SetpointRole, States, Variant, VariantChoice, Watchdog, Word,
+};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 

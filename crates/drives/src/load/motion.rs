@@ -5,15 +5,16 @@ use std::collections::BTreeMap;
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
-use super::manifest::{Commands, Elsewhere, Manifest, States, line};
+use super::manifest::{Elsewhere, Manifest, States, Word, line};
 use super::placed::Placed;
 use super::problems::Problems;
-use crate::entry::{Access, names};
+use super::words;
+use crate::entry::Access;
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
 use crate::parts::state::{StateRule, StateWord};
+use crate::place::Place;
 use crate::profile::Profile;
-use crate::text::closest;
 
 /// The command register, its codes, and what else moves a motor.
 pub(super) fn commands(
@@ -27,7 +28,7 @@ pub(super) fn commands(
     profile.commands.clear();
     profile.other_commands.clear();
     profile.commands_note.clear();
-    let mut all: Vec<(Command, &Placed<u16>, bool)> = Vec::new();
+    let mut all: Vec<(Command, &Placed<Word>, bool)> = Vec::new();
     all.extend(table.codes.iter().map(|(&command, code)| (command, code, true)));
     if let Some(assumed) = &table.assumed {
         all.extend(assumed.codes.iter().map(|(&command, code)| (command, code, false)));
@@ -36,12 +37,16 @@ pub(super) fn commands(
             problems.add(file, line(file, &assumed.reason), "\"reason\" is empty; say why these codes are assumed");
         }
     }
+    let before = |(&command, row)| (command, first(file, manifest, command, row, entries, problems));
+    let before: Before = table.first.iter().map(before).collect();
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
     profile.command_address = register.place;
     register.quantity.choices.clear();
+    let base = table.base.as_ref();
+    let base = base.map_or(0, |base| words::word(file, base, 0, register, manifest, problems));
     let mut choices: BTreeMap<u16, String> = BTreeMap::new();
     for (command, spanned, verified) in all {
-        let code = *spanned.get_ref();
+        let code = words::word(file, spanned, base, register, manifest, problems);
         if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
             let reason = format!("a rectifier feeds no motor: it has no {}", command.name());
             problems.add(file, line(file, spanned), reason);
@@ -51,7 +56,7 @@ pub(super) fn commands(
             continue;
         }
         let label = match choices.get(&code) {
-            Some(other) if told_apart(table, command, other) => format!("{other} or {}", command.name()),
+            Some(other) if told_apart(&before, command, other) => format!("{other} or {}", command.name()),
             other => {
                 if let Some(other) = other {
                     problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
@@ -65,7 +70,7 @@ pub(super) fn commands(
         }
     }
     for (key, label) in &table.other {
-        let Ok(code) = key.get_ref().parse::<u16>() else {
+        let Some(code) = number(key.get_ref()) else {
             let reason = format!("\"{}\" must be a number, the code of \"{label}\"", key.get_ref());
             problems.add(file, line(file, key), reason);
             continue;
@@ -77,10 +82,15 @@ pub(super) fn commands(
     }
     register.quantity.choices = choices;
     for (&command, other) in &table.elsewhere {
-        elsewhere(file, command, other, profile, entries, problems);
+        elsewhere(file, manifest, command, other, profile, entries, problems);
     }
-    for (&command, row) in &table.first {
-        first(file, command, row, profile, entries, problems);
+    for (command, row) in &table.first {
+        if let Some(known) = profile.commands.get_mut(command) {
+            known.first = before.get(command).copied().flatten();
+        } else {
+            let reason = format!("there is no {} that this could come before", command.name());
+            problems.add(file, line(file, &row.register), reason);
+        }
     }
     let moves = entries.names(file, &table.moves, problems);
     profile.moving = moves.iter().filter_map(|name| entries.find(name)?.place).collect();
@@ -89,14 +99,16 @@ pub(super) fn commands(
 /// A command in a register of its own.
 fn elsewhere(
     file: &File,
+    manifest: &Manifest,
     command: Command,
     table: &Elsewhere,
     profile: &mut Profile,
     entries: &mut Entries,
     problems: &mut Problems,
 ) {
-    let (place, code) = (line(file, &table.register), *table.code.get_ref());
+    let place = line(file, &table.register);
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
+    let code = words::word(file, &table.code, 0, register, manifest, problems);
     if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
         problems.add(file, place, format!("a rectifier feeds no motor: it has no {}", command.name()));
     }
@@ -127,48 +139,50 @@ fn elsewhere(
     }
 }
 
-/// Whether what is written before them tells `one` and the command called `other` apart, which have the same word.
-fn told_apart(table: &Commands, one: Command, other: &str) -> bool {
-    let before =
-        |command: Command| Some(table.first.get(&command)?).map(|row| (row.register.get_ref(), row.code.get_ref()));
-    let other = other.parse().ok().and_then(before);
-    matches!((before(one), other), (Some((here, code)), Some((there, word))) if here == there && code != word)
+/// What is written before commands: where, and the word. `None` is what cannot be read, which has a problem of its own.
+type Before = BTreeMap<Command, Option<(Place, u16)>>;
+
+/// Whether what is written `before` them tells `one` and the command called `other` apart, which have the same word.
+fn told_apart(before: &Before, one: Command, other: &str) -> bool {
+    let other = other.parse().ok().and_then(|other: Command| before.get(&other));
+    match (before.get(&one), other) {
+        (Some(Some((here, code))), Some(Some((there, word)))) => here == there && code != word,
+        (one, other) => one.is_some() && other.is_some(),
+    }
 }
 
-/// What is written before the word of a command.
+/// What is written before the word of a command: where, and the word.
 fn first(
     file: &File,
+    manifest: &Manifest,
     command: Command,
     table: &Elsewhere,
-    profile: &mut Profile,
     entries: &Entries,
     problems: &mut Problems,
-) {
-    let (place, code) = (line(file, &table.register), *table.code.get_ref());
-    let Some(register) = entries.get(file, &table.register, problems) else { return };
+) -> Option<(Place, u16)> {
+    let place = line(file, &table.register);
+    let register = entries.get(file, &table.register, problems)?;
+    let code = words::word(file, &table.code, 0, register, manifest, problems);
     let word = check(file, line(file, &table.code), &register.quantity, &register.name, code.into());
-    if problems.keep(word).is_none() {
-        return;
-    }
-    if register.access == Access::Ro || register.words() != 1 {
-        let reason = format!(
-            "{} is written before {}, so it must have one word that can be written",
-            register.name,
-            command.name()
-        );
+    problems.keep(word)?;
+    let mut needs = |what: &str| {
+        let reason = format!("{} is written before {}, so it {what}", register.name, command.name());
         problems.add(file, place, reason);
-    }
-    let Some(at) = register.place else {
-        problems.add(
-            file,
-            place,
-            format!("{} is written before {}, so it needs an address", register.name, command.name()),
-        );
-        return;
     };
-    match profile.commands.get_mut(&command) {
-        Some(known) => known.first = Some((at, code)),
-        None => problems.add(file, place, format!("there is no {} that this could come before", command.name())),
+    if register.access == Access::Ro || register.words() != 1 {
+        needs("must have one word that can be written");
+    }
+    if register.place.is_none() {
+        needs("needs an address");
+    }
+    Some((register.place?, code))
+}
+
+/// A word as a key of TOML has it, which is a text: `9`, or `0x0476`.
+fn number(key: &str) -> Option<u16> {
+    match key.strip_prefix("0x") {
+        Some(digits) if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) => u16::from_str_radix(digits, 16).ok(),
+        _ => key.parse().ok(),
     }
 }
 
@@ -227,27 +241,11 @@ fn by_bits(
     problems: &mut Problems,
 ) -> Vec<StateRule> {
     let Some(register) = entries.find(table.register.get_ref()) else { return Vec::new() };
-    let of_register = manifest.bits.iter().filter(|(name, _)| names(register).any(|own| own == name.get_ref()));
-    let declared: Vec<_> = of_register.flat_map(|(_, fields)| fields).collect();
     let mut rules = Vec::new();
     for spanned in &table.when {
         let when = spanned.get_ref();
         let mut rule = StateRule { state: when.state, mask: 0, value: 0 };
-        for (name, &value) in &when.fields {
-            let Some(field) = register.bits.iter().find(|field| field.name == *name) else {
-                // A field that is broken has a problem of its own.
-                if declared.iter().any(|field| field.get_ref().name == *name) {
-                    continue;
-                }
-                let closest = closest(name, register.bits.iter().map(|field| field.name.as_str())).unwrap_or("none");
-                let reason = format!("{} has no bit field \"{name}\"; the closest is \"{closest}\"", register.name);
-                problems.add(file, line(file, spanned), reason);
-                continue;
-            };
-            if field.extract(field.insert(0, value)) != value {
-                let reason = format!("{value} does not fit the {} bits of \"{name}\"", field.width);
-                problems.add(file, line(file, spanned), reason);
-            }
+        for (field, value) in words::fields(file, line(file, spanned), &when.fields, register, manifest, problems) {
             rule.mask |= field.mask();
             rule.value = field.insert(rule.value, value);
         }

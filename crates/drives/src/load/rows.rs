@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 
 use super::problems::Problems;
 use super::table::{self, Columns, Row};
+use super::table_cell;
 use super::{File, Files, ProfileError};
 use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
 use crate::parts::fault::Fault;
-use crate::place::{Place, Table};
+use crate::place::Place;
 use crate::quantity::{Quantity, limits, to_word};
+use crate::scale::Scale;
 use crate::text::{parameter_address, parse_address, parse_code};
 
 /// An item and the line it came from.
@@ -50,7 +52,7 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
             "note",
             "source",
         ],
-        optional: &["table", "words", "variant"],
+        optional: &["table", "words", "order", "variant"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let name = row.required("name")?;
@@ -60,16 +62,9 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
                 row.broken(format!("address \"{text}\" must be hex such as 0x3004, or empty if nobody knows it"))
             })?),
         };
-        let table = table_of(row)?;
-        let quantity = quantity(row, None, BTreeMap::new())?;
-        let quantity = if table.is_bits() { bit(row, quantity)? } else { quantity };
+        let table = table_cell::table(row)?;
+        let quantity = table_cell::quantity(row, table, quantity(row, None, BTreeMap::new())?)?;
         let place = address.map(|address| Place::new(table, address));
-        let row_access = row.text("access");
-        if matches!(table, Table::Input | Table::Discrete) && row_access != "ro" {
-            let reason =
-                format!("table \"{}\" is only read: its \"access\" is {row_access} and must be ro", table.name());
-            return Err(row.broken(reason));
-        }
         entry(row, Kind::Register, checked_name(row, name)?, None, place, quantity, None)
     })
 }
@@ -94,7 +89,7 @@ pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> 
             "note",
             "source",
         ],
-        optional: &["address", "name", "words"],
+        optional: &["address", "name", "words", "order"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let (code, address) = place(row, listed)?;
@@ -115,26 +110,6 @@ pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> 
         };
         entry(row, Kind::Parameter, code, alias, Some(address.into()), quantity, default)
     })
-}
-
-/// The table that a row of registers is in.
-fn table_of(row: &Row<'_>) -> Result<Table, ProfileError> {
-    match row.text("table") {
-        "" => Ok(Table::Holding),
-        text => Table::named(text).ok_or_else(|| {
-            let known = Table::ALL.map(Table::name).join(", ");
-            row.broken(format!("table \"{text}\" must be one of {known}, or empty for holding"))
-        }),
-    }
-}
-
-/// `quantity` as that of a bit: 0 or 1, and nothing else.
-fn bit(row: &Row<'_>, quantity: Quantity) -> Result<Quantity, ProfileError> {
-    let is_plain = quantity.unit.is_empty() && quantity.decimals.unwrap_or(0) == 0 && quantity.high_from.is_none();
-    if !is_plain || quantity.signed || quantity.wide || quantity.variant.is_some() {
-        return Err(row.broken("a bit has no unit, scale, sign, variant or second word: leave those cells empty"));
-    }
-    Ok(Quantity { decimals: Some(0), low: Some(0), high: Some(1), ..quantity })
 }
 
 /// The code of a parameter and its address: the one that the row says, or the one that follows from the code.
@@ -288,10 +263,11 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
             return Err(row.broken("what has a \"variant\" has one word"));
         }
     }
-    let decimals = match row.text("scale") {
+    let scale = match row.text("scale") {
         "" => None,
-        text => Some(text.parse().ok().and_then(decimals).ok_or_else(|| {
-            row.broken(format!("scale \"{text}\" must be 1, 10, 100, 1000 or 10000, or empty if unknown"))
+        text => Some(Scale::parse(text).ok_or_else(|| {
+            let right = "1, 10, 100, 1000 or 10000, a ratio such as 16384/100, or empty if unknown";
+            row.broken(format!("scale \"{text}\" must be {right}"))
         })?),
     };
     let wide = match row.text("words") {
@@ -301,9 +277,10 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     };
     let mut quantity = Quantity {
         unit: row.text("unit").to_owned(),
-        decimals,
+        scale,
         signed: row.flag("signed")?,
         wide,
+        high_first: high_first(row, wide)?,
         low: None,
         high: None,
         low_from,
@@ -321,9 +298,17 @@ fn quantity(row: &Row<'_>, low_from: Option<String>, choices: BTreeMap<u16, Stri
     }
 }
 
-/// Digits after the point for so many counts per unit.
-pub(super) fn decimals(scale: u32) -> Option<u8> {
-    (0..=4).find(|&decimals| 10_u32.pow(u32::from(decimals)) == scale)
+/// Which of two words comes first.
+fn high_first(row: &Row<'_>, wide: bool) -> Result<bool, ProfileError> {
+    match row.text("order") {
+        "" => Ok(false),
+        order if !wide => {
+            Err(row.broken(format!("\"order\" is \"{order}\", and only two words have an order: leave it empty")))
+        }
+        "low first" => Ok(false),
+        "high first" => Ok(true),
+        other => Err(row.broken(format!("\"order\" is \"{other}\" and must be low first or high first"))),
+    }
 }
 
 /// Whether the range of `quantity`, as far as it is known, holds `count`.
@@ -342,7 +327,7 @@ fn bound(row: &Row<'_>, column: &str, quantity: &Quantity) -> Result<Option<i64>
 fn count(row: &Row<'_>, column: &str, text: &str, quantity: &Quantity) -> Result<i64, ProfileError> {
     let counts = match parse_address(text) {
         Some(word) => Some(Counts::Whole(i64::from(word))),
-        None => Decimal::parse(text).map(|number| number.counts(quantity.decimals())),
+        None => Decimal::parse(text).map(|number| quantity.counts_of(&number)),
     };
     let (least, most) = limits(quantity.signed, quantity.wide);
     match counts {

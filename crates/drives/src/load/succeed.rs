@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::entry::{Entry, Kind, names};
+use crate::entry::{Access, Entry, Kind, names};
 use crate::evidence::Evidence;
 use crate::place::Place;
 use crate::profile::Profile;
@@ -27,6 +27,9 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
 
     let mut called = BTreeMap::new();
     let mut places = BTreeMap::new();
+    let only_read = |old: &Entry| {
+        old.access == Access::Ro && inherited.iter().any(|other| super::entries::is_other_way(old, other))
+    };
     for (old, new) in pairs.iter().filter_map(|(&old, &new)| Some((inherited.get(old)?, new))) {
         let Some(new) = rows.get_mut(new) else { continue };
         if new.bits.is_empty() {
@@ -37,7 +40,8 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
             new.quantity.choices.clone_from(&old.quantity.choices);
         }
         called.insert(old.name.clone(), new.name.clone());
-        places.extend(old.place.map(|place| (place, new.place)));
+        // What is written there stays, wherever what is read there goes.
+        places.extend(old.place.filter(|_| !only_read(old)).map(|place| (place, new.place)));
     }
     rename(base, &called);
     let follow = |place: Place| places.get(&place).copied().unwrap_or(Some(place));
@@ -62,7 +66,8 @@ fn pairs(inherited: &[Entry], rows: &[&mut Entry]) -> BTreeMap<usize, usize> {
     let same_place = |old: &Entry, new: &Entry| {
         let unnamed = new.kind == Kind::Parameter && new.alias.is_none();
         let known = old.evidence != Evidence::Assumed || unnamed;
-        known && (share_a_name(old, new) || (old.place.is_some() && old.place == new.place))
+        let same = old.place.is_some() && old.place == new.place && !super::entries::is_other_way(old, new);
+        known && (share_a_name(old, new) || same)
     };
     let mut pairs = BTreeMap::new();
     for same in [&same_word as &dyn Fn(&Entry, &Entry) -> bool, &same_place] {
@@ -87,7 +92,7 @@ fn share_a_name(old: &Entry, new: &Entry) -> bool {
 }
 
 fn overlaps(old: &Entry, new: &Entry) -> bool {
-    super::entries::overlap(old, new).is_some()
+    super::entries::clash(old, new).is_some()
 }
 
 /// Nothing of `base` relies any more on `name` for what the drive does. What writes to it do stays as it was.

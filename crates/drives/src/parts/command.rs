@@ -70,6 +70,30 @@ pub struct CommandCode {
     pub first: Option<(Place, u16)>,
 }
 
+/// A word that comes, with others in their order, before one that runs or jogs a motor at rest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StartWord {
+    /// The word.
+    pub word: u16,
+    /// What it does.
+    pub label: String,
+    /// What the state word must show before the next word goes out.
+    pub until: Vec<Until>,
+}
+
+/// A bit field of the state word, and what it must hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Until {
+    /// Its name.
+    pub field: String,
+    /// Its bits.
+    pub mask: u16,
+    /// What they must be.
+    pub value: u16,
+}
+
 impl std::str::FromStr for Command {
     type Err = ParseCommandError;
 

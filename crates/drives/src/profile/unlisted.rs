@@ -58,9 +58,10 @@ fn raw_word(code: String, address: u16, is_no_command: bool) -> Entry {
         label: LABEL.to_owned(),
         quantity: Quantity {
             unit: String::new(),
-            decimals: None,
+            scale: None,
             signed: false,
             wide: false,
+            high_first: false,
             low: None,
             high: None,
             low_from: None,

@@ -184,7 +184,9 @@ impl Drive {
         let family = self.family();
         let fits = match target {
             Word::Parameter(parameter) => parameter.bounds.allows(word, |bound| self.parameter(bound)),
-            Word::Register(_) if family.takes_commands(address) => family.command_at(address, word).is_some(),
+            Word::Register(_) if family.takes_commands(address) => {
+                family.command_at(address, self.control_word(address), word).is_some()
+            }
             Word::Register(register) => match register.range {
                 Range::Words(low, high) => (low..=high).contains(&word),
                 Range::UpTo(high, bound) => word <= high.min(self.parameter(bound)),
@@ -201,7 +203,7 @@ impl Drive {
 
     /// What `word` at `address` tells the machine. A run turns the way that another word says, where a family has one, and
     /// so does a motor that runs when that word changes.
-    fn command_at(&self, address: u32, word: u16) -> Option<Command> {
+    fn command_at(&self, address: u32, before: u16, word: u16) -> Option<Command> {
         let direction = self.family().roles.direction;
         let turns =
             direction.map(
@@ -210,7 +212,7 @@ impl Drive {
                 },
             );
         let runs = || matches!(self.machine.state(), RunState::Forward | RunState::Reverse);
-        match (self.family().command_at(address, word), turns) {
+        match (self.family().command_at(address, before, word), turns) {
             (Some(Command::Run(_)), Some(turns)) => Some(Command::Run(turns)),
             (None, Some(turns)) if direction.is_some_and(|(place, _)| place == address) && runs() => {
                 Some(Command::Run(turns))
@@ -232,6 +234,7 @@ impl Drive {
             self.unlocked = true;
             return;
         }
+        let before = self.control_word(address);
         match self.target(address) {
             Some(Target::Control) => {
                 if let Some(control) = self.map.control(address).and_then(|place| self.control.get_mut(place)) {
@@ -248,9 +251,32 @@ impl Drive {
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.obeys_bus()
-            && let Some(command) = self.command_at(address, word)
+            && let Some(command) = self.command_at(address, before, word)
         {
-            self.machine.command(command, &self.settings);
+            self.obey(address, word, command);
         }
+    }
+
+    /// Does a command, where a run needs words before it only if these came in their order.
+    ///
+    /// Assumption: while it runs, a word of those that means nothing else changes nothing, and a run that follows another is obeyed
+    /// at once.
+    fn obey(&mut self, address: u32, word: u16, command: Command) {
+        let family = self.map.family();
+        let handshake = family.roles.handshake.as_ref().filter(|_| family.command == Some(address));
+        if let Some(handshake) = handshake {
+            let is_running = self.machine.is_running();
+            match command {
+                Command::Run(_) | Command::Jog(_) if !is_running && !handshake.is_through(self.led_up) => return,
+                Command::Run(_) | Command::Jog(_) => {}
+                _ if self.machine.fault().is_some() && command != Command::ResetFault => return,
+                Command::Nothing if is_running => return,
+                _ => match handshake.after(self.led_up, word) {
+                    Some(led_up) => self.led_up = led_up,
+                    None => return,
+                },
+            }
+        }
+        self.machine.command(command, &self.settings);
     }
 }

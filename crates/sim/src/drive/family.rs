@@ -10,13 +10,17 @@
 //! What the manuals at hand leave open is marked "Assumption:" where it is decided.
 
 mod a1000;
+mod acs355;
+mod atv312;
 mod chf100a;
 mod eds300;
+mod fc51;
 mod gd200a;
 mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+mod handshake;
 mod ms300;
 pub(crate) mod own;
 mod register;
@@ -24,6 +28,7 @@ mod roles;
 mod saj8000m;
 mod sunfar;
 mod unlisted;
+mod v20;
 mod vfd500;
 mod wj200;
 
@@ -31,6 +36,7 @@ use std::borrow::Cow;
 
 use super::machine::Command;
 use super::refusal::Refusal;
+pub(crate) use handshake::Handshake;
 pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
 pub(crate) use roles::{OnSilence, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
 pub(crate) use unlisted::unlisted;
@@ -57,6 +63,8 @@ pub(crate) struct Family {
     /// The register that takes commands, and what each code does; codes it does not know are out of range.
     pub(crate) command: Option<u32>,
     pub(crate) commands: Vec<(u16, Command)>,
+    /// Where a command is bits and no code: what the word at the register does, by the word before it and itself.
+    pub(crate) control_word: Option<fn(u16, u16) -> Command>,
     /// Commands in registers of their own: address, code, and what it does.
     pub(crate) elsewhere: Vec<(u32, u16, Command)>,
     /// Its bus registers; a later one replaces an earlier one at the same address.
@@ -127,7 +135,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 21] = [
+const FAMILIES: [fn() -> Family; 25] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -148,6 +156,10 @@ const FAMILIES: [fn() -> Family; 21] = [
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
+    atv312::atv312,
+    v20::v20,
+    acs355::acs355,
+    fc51::fc51,
     wj200::wj200,
 ];
 
@@ -167,8 +179,11 @@ impl Family {
         self.command == Some(address) || self.elsewhere.iter().any(|&(place, ..)| place == address)
     }
 
-    /// What `code` does at `address`; `None` where it is out of range, or no command is taken there.
-    pub(crate) fn command_at(&self, address: u32, code: u16) -> Option<Command> {
+    /// What `code` does at `address`, where `before` stood; `None` where it is out of range, or no command is taken there.
+    pub(crate) fn command_at(&self, address: u32, before: u16, code: u16) -> Option<Command> {
+        if let Some(decode) = self.control_word.filter(|_| self.command == Some(address)) {
+            return Some(decode(before, code));
+        }
         let here = self.commands.iter().filter(|_| self.command == Some(address));
         let others = self.elsewhere.iter().filter(|&&(place, ..)| place == address);
         let mut known = here.copied().chain(others.map(|&(_, code, command)| (code, command)));

@@ -45,9 +45,13 @@ impl Map {
     pub(crate) fn new(family: Family, profile: &Profile) -> Self {
         let mut words = BTreeMap::new();
         for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
-            if let Some(address) = entry.address() {
-                words.insert(u32::from(address), Word::Parameter(parameter(&family, profile, entry, address)));
+            let Some((address, low)) = entry.address().zip(low_word(entry)) else { continue };
+            if entry.words() == 2 {
+                // A value of two words is only read, and its factory value fills no more than the low one.
+                let high = if low == address { address.wrapping_add(1) } else { address };
+                words.insert(high.into(), Word::Parameter(Parameter::shown(high)));
             }
+            words.insert(u32::from(low), Word::Parameter(parameter(&family, profile, entry, low)));
         }
         words.extend(family.parameters.iter().map(|&known| (known.address.into(), Word::Parameter(known))));
         words.extend(family.registers.iter().map(|register| (register.address, Word::Register(register.clone()))));
@@ -131,7 +135,9 @@ fn parameter(family: &Family, profile: &Profile, entry: &Entry, address: u16) ->
 
 /// The range of a quantity of the profile.
 pub(crate) fn bounds(profile: &Profile, quantity: &Quantity) -> Bounds {
-    let address_of = |code: &str| profile.find(code).ok().and_then(Entry::address);
+    // Counts are compared with counts: a parameter in others says nothing.
+    let same = |entry: &&Entry| entry.quantity().ratio() == quantity.ratio();
+    let address_of = |code: &str| profile.find(code).ok().filter(same).and_then(Entry::address);
     Bounds {
         low: quantity.low().map(Value::count),
         high: quantity.high().map(Value::count),
@@ -139,4 +145,10 @@ pub(crate) fn bounds(profile: &Profile, quantity: &Quantity) -> Bounds {
         high_from: quantity.high_from().and_then(address_of),
         signed: quantity.is_signed(),
     }
+}
+
+/// Where the low word of `entry` is, or its only one.
+pub(crate) fn low_word(entry: &Entry) -> Option<u16> {
+    let behind = entry.words() == 2 && entry.quantity().is_high_first();
+    entry.address().map(|address| address.wrapping_add(u16::from(behind)))
 }

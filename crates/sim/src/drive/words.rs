@@ -40,7 +40,9 @@ impl Drive {
                 let code = match self.machine.state() {
                     RunState::Forward => forward,
                     RunState::Reverse => reverse,
-                    RunState::Stopped => stopped,
+                    RunState::Stopped => {
+                        self.family().roles.handshake.as_ref().map_or(stopped, |words| words.shown(self.led_up))
+                    }
                     RunState::Fault => fault,
                 };
                 code | self.bits(bits)

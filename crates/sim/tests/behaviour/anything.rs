@@ -21,6 +21,9 @@ fn any_pdu() -> impl Strategy<Value = Vec<u8>> {
         0x1AFE..0x1B15_u16,
         0x1DFE..0x1E10_u16,
         0x6FFE..0x700D_u16,
+        0x0BD4..0x0BD8_u16,
+        0xC34E..0xC35B_u16,
+        0xC416..0xC423_u16,
         any::<u16>()
     ];
     let words = (prop_oneof![Just(0x03), Just(0x06), Just(0x08), Just(0x10)], address, vec(0..20_u16, 0..4));
@@ -38,7 +41,7 @@ proptest! {
 
     #[test]
     fn every_request_gets_a_right_frame_or_silence(
-        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "ms300", "a1000", "saj8000m", "eds300", "sunfar-e300"]),
+        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "ms300", "a1000", "saj8000m", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355"]),
         pdus in vec(any_pdu(), 1..30)
     ) {
         let mut bench = Bench::of(family);

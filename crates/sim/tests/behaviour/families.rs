@@ -189,6 +189,10 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "a1000",
         "saj8000m",
         "sunfar-e300",
+        "fc51",
+        "atv312",
+        "v20",
+        "acs355",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

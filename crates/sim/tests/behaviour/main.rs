@@ -11,6 +11,7 @@ mod bench;
 mod ears;
 mod families;
 mod faults;
+mod fc51;
 mod goodrives;
 mod memory;
 mod own_profiles;

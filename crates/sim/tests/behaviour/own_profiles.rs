@@ -216,3 +216,33 @@ fn a_shipped_profile_is_taken_for_its_family_and_goes_with_others_on_one_line() 
     assert_eq!(simulator.drive(3).unwrap().register(0x2101), Ok(0x0C01));
     assert_eq!(simulator.drive(4).unwrap().register(0xA000), Ok(0x0101));
 }
+
+/// 16384 counts are what S-3 says, 60 Hz; S-3 and the current have their high word first; 0008H goes both ways.
+#[test]
+fn it_counts_shares_of_a_range_and_takes_commands_where_it_tells_its_state() {
+    let profile = profile("share");
+    let simulator = Simulator::new([(1, &profile)], Options::default()).unwrap();
+    let mut bench = Bench { line: simulator.line(), simulator };
+    assert_eq!(bench.read(0x0103), [0, 60_000]);
+    bench.write(0x0101, 1);
+    bench.write(0x0009, 8_192); // half of 60 Hz
+    bench.refuses_write(0x0009, 16_385, 0x03);
+    bench.refuses_write(0x0008, 3, 0x03);
+    assert_eq!(word(&mut bench, 0x0008), 0);
+    bench.write(0x0008, 2);
+    pass(&bench, 5.0);
+    // A state, and not the command.
+    assert_eq!((word(&mut bench, 0x0008), word(&mut bench, 0x0010)), (1, 300));
+    let [high, low] = bench.read(0x0011);
+    assert!(high == 0 && low > 0, "{high} {low}");
+    let [low, high] = bench.read(0x0013);
+    assert!(high == 0 && low > 0, "{low} {high}");
+    bench.write(0x0008, 4);
+    pass(&bench, 10.0);
+    assert_eq!(word(&mut bench, 0x0008), 3);
+    bench.write(0x0008, 0);
+    pass(&bench, 5.0);
+    assert_eq!((word(&mut bench, 0x0008), word(&mut bench, 0x0010)), (2 & 1, 0));
+    bench.write(0x0106, (-16_384_i16).cast_unsigned());
+    bench.refuses_write(0x0106, (-16_385_i16).cast_unsigned(), 0x03);
+}

@@ -213,7 +213,7 @@ def _reads(typed: Typed, profile: drivebus.Profile, unverified: bool) -> tuple[R
 def _write(unit: int, text: str, profile: drivebus.Profile, unverified: bool) -> Request:
     """The write of *text*, a name and a value. A parameter goes to RAM."""
     name, value = names.parse_assignment(text)
-    place = names.resolve(profile, name)
+    place = names.resolve(profile, name, written=True)
     if isinstance(place, int):
         if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
             raise click.UsageError(f'"{value}" is not a word from 0 to 65535, which is what an address takes')

@@ -2,8 +2,10 @@
 //! happens when the bus falls silent.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
-use serde::Deserialize;
+use serde::de::{Error, MapAccess, Unexpected, Visitor, value::MapAccessDeserializer};
+use serde::{Deserialize, Deserializer};
 
 use super::{Placed, yes};
 use crate::parts::command::Command;
@@ -18,11 +20,16 @@ pub(in crate::load) struct Commands {
     pub(in crate::load) register: Placed<String>,
     /// Every register whose write can start a motor, that one among them.
     pub(in crate::load) moves: Vec<Placed<String>>,
+    /// What each word has that is given as a table of bit fields, beside those.
+    pub(in crate::load) base: Option<Placed<Word>>,
     /// The words.
     #[serde(default)]
-    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, u16>"))]
-    pub(in crate::load) codes: BTreeMap<Command, Placed<u16>>,
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Word>"))]
+    pub(in crate::load) codes: BTreeMap<Command, Placed<Word>>,
     pub(in crate::load) assumed: Option<AssumedCommands>,
+    /// The words that come, in this order, before one that runs or jogs a motor at rest.
+    #[serde(default)]
+    pub(in crate::load) sequence: Vec<Placed<SequenceWord>>,
     /// Commands that another register takes.
     #[serde(default)]
     #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Elsewhere>"))]
@@ -40,6 +47,53 @@ pub(in crate::load) struct Commands {
     _source: String,
 }
 
+/// A whole word: a number, or what its bit fields hold. Bits that no field names are 0, or those of `base`.
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(untagged))]
+pub(in crate::load) enum Word {
+    /// The word itself.
+    Number(u16),
+    /// Names of bits, and what they hold.
+    Fields(BTreeMap<String, u16>),
+}
+
+impl<'de> Deserialize<'de> for Word {
+    fn deserialize<D: Deserializer<'de>>(word: D) -> Result<Self, D::Error> {
+        struct Either;
+
+        impl<'de> Visitor<'de> for Either {
+            type Value = Word;
+
+            fn expecting(&self, what: &mut fmt::Formatter<'_>) -> fmt::Result {
+                what.write_str("a number, 0 to 65535, or a table of bit fields")
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Word, E> {
+                let whole = u16::try_from(number);
+                whole.map(Word::Number).map_err(|_| E::invalid_value(Unexpected::Signed(number), &"u16"))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Word, A::Error> {
+                BTreeMap::deserialize(MapAccessDeserializer::new(fields)).map(Word::Fields)
+            }
+        }
+
+        word.deserialize_any(Either)
+    }
+}
+
+/// A word that comes before one that runs the motor.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct SequenceWord {
+    /// The word.
+    pub(in crate::load) word: Placed<Word>,
+    /// What it does.
+    pub(in crate::load) label: String,
+    /// Bits of the state word, and what they must hold before the next word goes out.
+    pub(in crate::load) until: BTreeMap<String, u16>,
+}
+
 /// A command in a register of its own, or what comes before one.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -48,7 +102,7 @@ pub(in crate::load) struct Elsewhere {
     /// Where it is written; it must stand in `moves` too.
     pub(in crate::load) register: Placed<String>,
     /// The word.
-    pub(in crate::load) code: Placed<u16>,
+    pub(in crate::load) code: Placed<Word>,
 }
 
 /// Commands that no document of the family prints.
@@ -59,8 +113,8 @@ pub(in crate::load) struct AssumedCommands {
     /// Why they are thought to be right.
     pub(in crate::load) reason: Placed<String>,
     /// The words.
-    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, u16>"))]
-    pub(in crate::load) codes: BTreeMap<Command, Placed<u16>>,
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Word>"))]
+    pub(in crate::load) codes: BTreeMap<Command, Placed<Word>>,
 }
 
 /// What the motor does: by a number, or by bits.
@@ -159,8 +213,8 @@ pub(in crate::load) struct VariantChoice {
     /// The unit; empty for a plain number.
     #[serde(default)]
     pub(in crate::load) unit: String,
-    /// Counts in one unit.
-    pub(in crate::load) scale: u32,
+    /// Counts in one unit: 1, 10, 100, 1000 or 10000; or so many counts in so many units, as text: `"16384/100"`.
+    pub(in crate::load) scale: Scale,
     /// Whether the word is two's complement.
     #[serde(default)]
     pub(in crate::load) signed: bool,
@@ -168,6 +222,25 @@ pub(in crate::load) struct VariantChoice {
     pub(in crate::load) low: Option<f64>,
     /// The highest value, in the unit.
     pub(in crate::load) high: Option<f64>,
+}
+
+/// Counts in one unit, or in several.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[cfg_attr(test, schemars(inline))]
+#[serde(untagged, expecting = "scale must be a number, or a ratio as text such as \"16384/100\"")]
+pub(in crate::load) enum Scale {
+    Number(u32),
+    Ratio(String),
+}
+
+impl fmt::Display for Scale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(counts) => write!(f, "{counts}"),
+            Self::Ratio(text) => write!(f, "\"{text}\""),
+        }
+    }
 }
 
 /// What makes the drive act by itself when the bus falls silent.

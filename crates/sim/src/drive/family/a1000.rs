@@ -42,6 +42,7 @@ pub(crate) fn a1000() -> Family {
         parameters: vec![set_up(FREQUENCY_SOURCE, 2), set_up(COMMAND_SOURCE, 2), set_up(SPEED_UNIT, 0)],
         factory: &[],
         elsewhere: Vec::new(),
+        control_word: None,
         capped: &[],
         roles: Roles {
             obeys: vec![(COMMAND_SOURCE, 2)],

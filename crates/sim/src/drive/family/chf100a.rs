@@ -40,6 +40,7 @@ pub(crate) fn chv100() -> Family {
         registers: gd350::MONITOR.to_vec(),
         parameters: Vec::new(),
         factory: &[],
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[],
         roles: Roles::NONE,

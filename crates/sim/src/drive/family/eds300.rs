@@ -29,6 +29,7 @@ pub(crate) fn eds300() -> Family {
         parameters: Vec::new(),
         factory: &[],
         elsewhere: Vec::new(),
+        control_word: None,
         capped: &[],
         roles: Roles { speed: Some(Speed::hertz(0x2001)), ..Roles::NONE },
         delay: USUAL_DELAY,

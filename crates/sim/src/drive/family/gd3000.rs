@@ -57,6 +57,7 @@ pub(crate) fn gd3000() -> Family {
             Parameter::new(0x0E04, 0, 600, 0),
         ],
         factory: &[],
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[],
         roles: Roles {

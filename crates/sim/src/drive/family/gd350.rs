@@ -35,14 +35,15 @@ pub(crate) fn gd350() -> Family {
         parameters: Vec::new(),
         factory: FACTORY,
         // Assumption: no frequency can be set above P00.03, whether or not its row in the manual says so.
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
         roles: Roles {
             // Assumption: 0 in P00.02 is Modbus; the digit is not printed.
             obeys: vec![(0x0001, 2), (0x0002, 0)],
             channel: Some(0x0001),
-            // Assumption: any source but 8 means the frequency set at the keypad.
             direction: None,
+            // Assumption: any source but 8 means the frequency set at the keypad.
             speed_source: Some(vec![(0x0006, 8)]),
             speed: Some(Speed::hertz(0x2001)),
             keypad_frequency: Some(Scaled::hundredths(KEYPAD_FREQUENCY)),
@@ -61,6 +62,7 @@ pub(crate) fn gd350() -> Family {
             response_delay: Some(0x0E03),
             bus_timeout: Some(Scaled::tenths(0x0E04)),
             on_silence: Some(Silence::at(0x0E05)),
+            handshake: None,
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,

@@ -62,6 +62,7 @@ pub(crate) fn gd600() -> Family {
             Parameter::new(0x0A01, 0, 1, 0),
         ],
         factory: &[],
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[],
         roles: Roles {

@@ -39,6 +39,7 @@ pub(crate) fn ms300() -> Family {
         parameters: PARAMETERS.to_vec(),
         factory: &[],
         elsewhere: vec![(0x2002, 0, Command::Nothing), (0x2002, 2, Command::ResetFault)],
+        control_word: None,
         capped: &[],
         roles: Roles {
             obeys: vec![(COMMAND_SOURCE, 2)],

@@ -18,11 +18,11 @@ use drivebus_drives::{
 };
 
 use super::{
-    Bit, Family, Faults, Flag, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled, Shows,
-    Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Bit, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled,
+    Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::map::{Access, bounds};
+use crate::drive::map::{Access, bounds, low_word};
 use crate::drive::refusal::Refusal;
 
 /// What the bus reads at a register that has this name and this unit.
@@ -49,6 +49,8 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
     let obeys = own.conditions(profile.control());
     let needs = profile.setpoints().get(&Setpoint::Frequency).map(|setpoint| setpoint.needs.as_slice());
     let needs = own.conditions(needs.unwrap_or_default());
+    let [_, _, stopped, _] = states;
+    let handshake = Handshake::of(profile, stopped).map_err(|lack| own.missing.push(lack)).unwrap_or_default();
     if !own.missing.is_empty() {
         return Err(own.missing);
     }
@@ -58,6 +60,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         obeys,
         speed,
         max_frequency,
+        handshake,
         ..own.roles()
     };
     let delay = profile.serial().map(|serial| u16::try_from(serial.response_delay.as_millis()).unwrap_or(u16::MAX));
@@ -82,6 +85,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
         factory: &[],
+        control_word: None,
         elsewhere: own.elsewhere(),
         capped: &[],
         roles,
@@ -203,7 +207,8 @@ impl Own<'_> {
             self.miss(PLACE, &what);
             return None;
         };
-        let parameter = variant.and_then(|variant| self.address_of(&variant.parameter));
+        // Of two words the low one tells: a choice has one word.
+        let parameter = variant.and_then(|variant| self.profile.find(&variant.parameter).ok()).and_then(low_word);
         Some(Speed { register, unit: parameter.map(|parameter| (parameter, choices)), usual })
     }
 
@@ -294,7 +299,7 @@ impl Own<'_> {
         let kept: Vec<u32> = self.kept_registers().map(u32::from).collect();
         let placed = entries.filter_map(|entry| Some((entry, entry.place()?.number())));
         let placed = placed.filter(|(_, address)| !kept.contains(address));
-        placed
+        let registers = placed
             .flat_map(|(entry, address)| {
                 let access = match entry.access() {
                     ProfileAccess::Ro => Access::ReadOnly,
@@ -305,12 +310,18 @@ impl Own<'_> {
                     Some(_) if self.has_role(entry, "setpoints.frequency") => Range::Speed,
                     _ => Range::Within(bounds(self.profile, entry.quantity())),
                 };
-                let register = Register { address, access, range, shows: self.shows(entry, states) };
-                let second = (entry.words() == 2).then(|| Register::read(address + 1, Shows::Zero));
-                [Some(register), second]
+                let shows = self.shows(entry, states);
+                let beside = entry.place().zip(low_word(entry)).filter(|_| entry.words() == 2);
+                let Some((place, low)) = beside else {
+                    return vec![Register { address, access, range, shows }];
+                };
+                // Two words are only read, and nothing that is shown fills the high one.
+                let high = if low == place.address { place.address.wrapping_add(1) } else { place.address };
+                let at = |address| Place { address, ..place }.number();
+                vec![Register::read(at(low), shows), Register::read(at(high), Shows::Zero)]
             })
-            .flatten()
-            .collect()
+            .collect();
+        register::joined(registers)
     }
 
     fn has_role(&self, entry: &Entry, role: &str) -> bool {
@@ -356,7 +367,8 @@ impl Own<'_> {
 
 /// Counts in one unit of `quantity`.
 fn counts(quantity: &Quantity) -> f64 {
-    f64::from(quantity.scale().unwrap_or(1))
+    let (counts, units) = quantity.ratio().unwrap_or((1, 1));
+    f64::from(counts) / f64::from(units)
 }
 
 /// What a command does to the motor.

@@ -235,3 +235,20 @@ impl Parameter {
         Self { bounds: Bounds { high_from: Some(address), ..self.bounds }, ..self }
     }
 }
+
+/// `registers`, with one for what is read and what is written at the same address: it is written as one and shows the other.
+pub(crate) fn joined(registers: Vec<Register>) -> Vec<Register> {
+    let mut all: Vec<Register> = Vec::new();
+    for new in registers {
+        match all.iter_mut().find(|old| old.address == new.address) {
+            Some(old) if old.access == Access::WriteOnly && new.access == Access::ReadOnly => {
+                (old.access, old.shows) = (Access::Always, new.shows);
+            }
+            Some(old) if old.access == Access::ReadOnly && new.access == Access::WriteOnly => {
+                (old.access, old.range) = (Access::Always, new.range);
+            }
+            _ => all.push(new),
+        }
+    }
+    all
+}

@@ -1,6 +1,6 @@
 //! The parameters and registers at which a family behaves: who is obeyed, how fast, along which ramps.
 
-use super::Bounds;
+use super::{Bounds, Handshake};
 
 /// The places at which a family behaves, by address; `None` where it has no such parameter or nobody knows which.
 #[derive(Debug, Clone)]
@@ -37,6 +37,8 @@ pub(crate) struct Roles {
     pub(crate) bus_timeout: Option<Scaled>,
     /// What is then done. Without it the drive trips.
     pub(crate) on_silence: Option<Silence>,
+    /// The words that the command register must get before a run. `None`: a run is obeyed at once.
+    pub(crate) handshake: Option<Handshake>,
 }
 
 /// A parameter that holds a quantity.
@@ -150,5 +152,6 @@ impl Roles {
         response_delay: None,
         bus_timeout: None,
         on_silence: None,
+        handshake: None,
     };
 }

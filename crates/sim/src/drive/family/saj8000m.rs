@@ -31,6 +31,7 @@ pub(crate) fn saj8000m() -> Family {
         parameters: Vec::new(),
         factory: &[],
         elsewhere: Vec::new(),
+        control_word: None,
         capped: &[],
         roles: Roles { speed_source: Some(vec![NEVER]), ..Roles::NONE },
         delay: USUAL_DELAY,

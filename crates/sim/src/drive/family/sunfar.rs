@@ -33,6 +33,7 @@ pub(crate) fn e300() -> Family {
         parameters: Vec::new(),
         factory: &[],
         elsewhere: Vec::new(),
+        control_word: None,
         capped: &[],
         roles: Roles { speed: Some(speed()), ..Roles::NONE },
         delay: USUAL_DELAY,

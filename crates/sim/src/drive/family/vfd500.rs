@@ -47,6 +47,7 @@ pub(crate) fn vfd500() -> Family {
         registers: [CONTROL, MONITOR].concat(),
         parameters: PARAMETERS.to_vec(),
         factory: &[],
+        control_word: None,
         elsewhere: Vec::new(),
         capped: &[],
         roles: Roles {

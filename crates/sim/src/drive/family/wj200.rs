@@ -39,6 +39,7 @@ pub(crate) fn wj200() -> Family {
         registers: registers(),
         parameters: Vec::new(),
         factory: &[],
+        control_word: None,
         capped: &[],
         roles: Roles { speed: Some(Speed::hertz(FREQUENCY)), direction: Some((DIRECTION, 1)), ..Roles::NONE },
         delay: USUAL_DELAY,

@@ -1,0 +1,111 @@
+//! Schneider Altivar 312: led through the states of CiA 402 by the bits of CMD (8501), which ETA (3201) shows.
+//!
+//! Registers as programs that name the manual BBV51701 have them (dmatscheko/modbus_connect); the words and the states behind them
+//! as nobrega8/mbmap-library has them of the Altivar 12 manual BBV28590: 06H, 07H and then 0FH; ETA shows 0050H, 0031H, 0033H and
+//! 0037H. 080FH runs in reverse.
+//!
+//! - Assumption: 06H and 00H take the voltage off a motor that runs, 07H brings it down its ramp; 80H resets a fault, whatever
+//!   the word before it. A fault and its reset lead back to the beginning.
+//! - Assumption: CMD takes these words only, and 04H (quick stop) is none of them. Other words are out of range.
+//! - Assumption: it obeys the bus while Fr1 is 164, and is at AI1 from the factory: the setpoint is then that of the keypad.
+//! - Assumption: 50.0 Hz is the highest frequency from the factory and 500.0 Hz the end of its range; ACC and dEC are 3.0 s.
+//! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H.
+//! - Assumption: a silent bus is not watched here: no value of ttO that switches it off is at hand.
+
+use super::{
+    Bit, Bounds, Family, Faults, Handshake, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows,
+    Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+};
+use crate::drive::machine::{Command, Direction};
+use crate::drive::refusal::Refusal;
+
+const COMMAND: u32 = 8501;
+const MAX_FREQUENCY: u16 = 3103;
+const HIGH_SPEED: u16 = 3104;
+const SETPOINT_SOURCE: u16 = 8413;
+const ACCELERATION: u16 = 9001;
+const DECELERATION: u16 = 9002;
+/// In Fr1.
+const MODBUS: u16 = 164;
+
+pub(crate) fn atv312() -> Family {
+    Family {
+        name: "atv312".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x10],
+        max_words: 29,
+        across_groups: true,
+        exception,
+        memory: Memory::EepromOnly,
+        identification: 0,
+        command: Some(COMMAND),
+        commands: COMMANDS.to_vec(),
+        control_word: None,
+        elsewhere: Vec::new(),
+        registers: REGISTERS.to_vec(),
+        parameters: PARAMETERS.to_vec(),
+        factory: &[],
+        capped: &[],
+        roles: Roles {
+            obeys: vec![(SETPOINT_SOURCE, MODBUS)],
+            speed: Some(Speed { register: 8502, unit: None, usual: SPEED }),
+            max_frequency: Some(Scaled::tenths(MAX_FREQUENCY)),
+            upper_frequency: Some(Scaled::tenths(HIGH_SPEED)),
+            acceleration: Some(Scaled::tenths(ACCELERATION)),
+            deceleration: Some(Scaled::tenths(DECELERATION)),
+            handshake: Some(Handshake { idle: 0x0050, words: vec![(0x06, 0x0031), (0x07, 0x0033)] }),
+            ..Roles::NONE
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(0x1000), silent_bus: None },
+    }
+}
+
+/// In tenths of a hertz; a negative one turns the other way (assumed).
+const SPEED: SpeedScale =
+    SpeedScale { unit: SpeedUnit::Hertz, counts: 10.0, bounds: Bounds { signed: true, ..Bounds::new(-5_000, 5_000) } };
+
+fn exception(refusal: Refusal) -> u8 {
+    match refusal {
+        Refusal::Function => 0x01,
+        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
+        Refusal::Structure | Refusal::Value => 0x03,
+        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
+    }
+}
+
+const COMMANDS: &[(u16, Command)] = &[
+    (0x0000, Command::Coast),
+    (0x0006, Command::Coast),
+    (0x0007, Command::Stop),
+    (0x000F, Command::Run(Direction::Forward)),
+    (0x080F, Command::Run(Direction::Reverse)),
+    (0x0080, Command::ResetFault),
+];
+
+const REGISTERS: &[Register] = &[
+    Register::read(3201, Shows::State([0x0037, 0x8037, 0x0050, 0x0008], std::borrow::Cow::Borrowed(&[]))),
+    Register::read(3202, Shows::Measured(Measure::SignedFrequency, 10.0)),
+    Register::read(3203, Shows::Measured(Measure::Setpoint, 10.0)),
+    Register::read(3204, Shows::Measured(Measure::Current, 10.0)),
+    Register::read(3205, Shows::Measured(Measure::Torque, 100.0)),
+    Register::read(3206, Shows::bits(&[Bit::Running(4)])),
+    Register::read(3207, Shows::Zero),
+    Register::read(3209, Shows::Zero),
+    Register::read(3211, Shows::Measured(Measure::Power, 100.0)),
+    Register::read(3231, Shows::Zero),
+    Register::read(7121, Shows::Zero),
+    Register::set(8501, Range::Words(0, u16::MAX)),
+    Register::set(8502, Range::Speed),
+    Register::read(8606, Shows::Fault),
+    Register::read(9630, Shows::Zero),
+];
+
+const PARAMETERS: &[Parameter] = &[
+    Parameter::new(MAX_FREQUENCY, 100, 5_000, 600).at_standstill(),
+    Parameter::new(HIGH_SPEED, 0, 5_000, 500).not_above(MAX_FREQUENCY),
+    Parameter::new(SETPOINT_SOURCE, 1, 167, 1).at_standstill(),
+    Parameter::new(ACCELERATION, 1, 32_760, 30),
+    Parameter::new(DECELERATION, 1, 32_760, 30),
+];

@@ -1,0 +1,113 @@
+//! Siemens SINAMICS V20, over its process data: control word at 0063H (40100), setpoint at 0064H, status word at 006DH.
+//!
+//! The registers up to 001DH are those of its manual's page 112 (easymanua.ls siemens sinamics-v20-series). The bits of both words
+//! are FluidNC's (SiemensV20Protocol.cpp), and those of the G120C manual (p. 235): bit 11 turns the setpoint round, so 047FH
+//! runs forward and 0C7FH in reverse.
+//!
+//! - Assumption: a run is obeyed only behind 047EH (OFF1), which 047CH (OFF2), 04FEH (a reset) and the power take back.
+//! - Assumption: other words are out of range, and so are those at 0003H to 0006H, which set single bits of the control word: they are
+//!   taken and do nothing here.
+//! - Assumption: it obeys the bus always (P0700 and P1000 are 5), and 50.00 Hz are both its reference and its highest frequency.
+//! - Assumption: an overload is fault 11; no register at hand shows its number.
+//! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
+
+use super::{
+    Bounds, Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Scaled,
+    Shows, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+};
+use crate::drive::machine::{Command, Direction};
+use crate::drive::refusal::Refusal;
+
+const COMMAND: u32 = 0x0063;
+const REFERENCE: u16 = 0x000F;
+const ACCELERATION: u16 = 0x000A;
+const DECELERATION: u16 = 0x000B;
+
+pub(crate) fn v20() -> Family {
+    Family {
+        name: "v20".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x10],
+        max_words: MAX_WORDS,
+        across_groups: true,
+        exception,
+        memory: Memory::EepromOnly,
+        identification: 0,
+        command: Some(COMMAND),
+        commands: COMMANDS.to_vec(),
+        control_word: None,
+        elsewhere: Vec::new(),
+        registers: REGISTERS.to_vec(),
+        parameters: PARAMETERS.to_vec(),
+        factory: &[],
+        capped: &[],
+        roles: Roles {
+            speed: Some(Speed {
+                register: 0x0064,
+                unit: Some((REFERENCE, vec![(6_000, hertz(60.0))])),
+                usual: hertz(50.0),
+            }),
+            acceleration: Some(Scaled::hundredths(ACCELERATION)),
+            deceleration: Some(Scaled::hundredths(DECELERATION)),
+            handshake: Some(Handshake { idle: 0x0240, words: vec![(0x047E, 0x0231)] }),
+            ..Roles::NONE
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(11), silent_bus: None },
+    }
+}
+
+/// 4000H counts are the reference frequency; below zero it turns the other way.
+const fn hertz(reference: f64) -> SpeedScale {
+    SpeedScale {
+        unit: SpeedUnit::Hertz,
+        counts: 16_384.0 / reference,
+        bounds: Bounds { signed: true, ..Bounds::new(-0x7FFF, 0x7FFF) },
+    }
+}
+
+fn exception(refusal: Refusal) -> u8 {
+    match refusal {
+        Refusal::Function => 0x01,
+        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
+        Refusal::Structure | Refusal::Value => 0x03,
+        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
+    }
+}
+
+const COMMANDS: &[(u16, Command)] = &[
+    (0x047C, Command::Coast),
+    (0x047E, Command::Stop),
+    (0x0C7E, Command::Stop),
+    (0x047F, Command::Run(Direction::Forward)),
+    (0x0C7F, Command::Run(Direction::Reverse)),
+    (0x04FE, Command::ResetFault),
+];
+
+const REGISTERS: &[Register] = &[
+    Register::set(0x0000, Range::Words(0, u16::MAX)),
+    Register::set(0x0001, Range::Words(0, u16::MAX)),
+    Register::set(0x0002, Range::Words(0, 10_000)),
+    Register::set(0x0003, Range::Words(0, 1)),
+    Register::set(0x0004, Range::Words(0, 1)),
+    Register::set(0x0005, Range::Words(0, 1)),
+    Register::set(0x0006, Range::Words(0, 1)),
+    Register::read(0x0017, Shows::Measured(Measure::SignedFrequency, 100.0)),
+    Register::read(0x0018, Shows::Measured(Measure::Speed, 1.0)),
+    Register::read(0x0019, Shows::Measured(Measure::Current, 100.0)),
+    Register::read(0x001A, Shows::Zero),
+    Register::read(0x001B, Shows::Zero),
+    Register::read(0x001C, Shows::Zero),
+    Register::read(0x001D, Shows::Measured(Measure::BusVoltage, 1.0)),
+    Register::set(0x0063, Range::Words(0, u16::MAX)),
+    Register::set(0x0064, Range::Speed),
+    Register::read(0x006D, Shows::State([0x4237, 0x0237, 0x0240, 0x0208], std::borrow::Cow::Borrowed(&[]))),
+    Register::read(0x006E, Shows::Measured(Measure::SignedFrequency, 16_384.0 / 50.0)),
+];
+
+const PARAMETERS: &[Parameter] = &[
+    Parameter::new(ACCELERATION, 0, 65_000, 1_000),
+    Parameter::new(DECELERATION, 0, 65_000, 1_000),
+    Parameter::new(REFERENCE, 100, 59_900, 5_000),
+];

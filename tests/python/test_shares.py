@@ -1,0 +1,125 @@
+"""A drive that counts shares of a range, puts the high word first, and takes commands where it tells its state.
+
+The drive is that of `crates/sim/tests/profiles/share`, which does not exist: 16384 counts are what S-3 says, 60 Hz from
+the factory; S-5 counts 16384 for 100 %. Words and values are worked out by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import drivebus
+from drivebus import Bus, Drive, Profile, Simulator, State, rtu, trial
+from drivebus.line.trace import meaning
+
+SHARE = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/share"
+STATUS, SPEED, TORQUE = 0x0008, 0x0009, 0x0106
+
+
+@pytest.fixture
+def line() -> Iterator[Simulator]:
+    with Simulator({1: SHARE}, transport="process", clock="virtual") as line:
+        yield line
+
+
+@pytest.fixture
+def drive(line: Simulator) -> Iterator[Drive]:
+    with Bus(line) as bus:
+        drive = bus.drive(1, profile=SHARE)
+        drive.prepare_control(store=True)
+        yield drive
+
+
+def sent(line: Simulator) -> list[str]:
+    return [data[:-2].hex(" ").upper() for _, who, data in line.line.trace() if who == "master"]
+
+
+def test_a_whole_job_in_hertz(line: Simulator, drive: Drive) -> None:
+    # 10 Hz of 60 Hz are 2730.67 counts of 16384; command and speed stand side by side, and so go out together.
+    drive.run(hz=10.0)
+    assert "01 10 00 08 00 02 04 00 02 0A AB" in sent(line)
+    assert drive.setpoint == 10.001  # 2731 / 16384 of 60 is 10.00122
+    line.advance(5.0)
+    assert (drive.state(), drive.read("hertz")) == (State.FORWARD, 10.0)
+    drive.setpoint = 30
+    assert line.drive(1).register(SPEED) == 8192
+    drive.stop()
+    line.advance(5.0)
+    assert (drive.state(), line.drive(1).state) == (State.STOPPED, "stopped")
+
+
+def test_too_fine_and_too_much_are_refused_before_anything_is_sent(drive: Drive) -> None:
+    for hz, said in (
+        (10.0001, "the nearest allowed are 9.998 and 10.001 Hz"),
+        (60.5, "allowed is 0.000 to 60.000 Hz"),
+    ):
+        with pytest.raises(drivebus.NotAllowed, match=said):
+            drive.run(hz=hz)
+    assert drive.state() is State.STOPPED
+
+
+def test_the_parameter_of_the_drive_decides_what_a_count_is(line: Simulator, drive: Drive) -> None:
+    assert drive.describe("speed").unit == "raw"
+    drive.setpoint = 60
+    assert line.drive(1).register(SPEED) == 16384
+    profile = Profile.load(SHARE)
+    assert profile.with_variants({"base_frequency": "50 Hz"}).encode("speed", 50) == 16384
+    known = profile.with_variants({"base_frequency": "50 Hz"}).describe("speed")
+    assert (known.scale, known.unit, known.high, known.text(10.001)) == (327.68, "Hz", 50.0, "10.001")
+
+
+def test_scales_words_and_texts_of_a_share(line: Simulator, drive: Drive) -> None:
+    known = drive.describe("S-5")
+    assert (known.scale, known.default, known.low, known.text(33.331)) == (163.84, 25.0, -100.0, "33.331")
+    drive.write("S-5", 33.333, store=True)
+    assert (line.drive(1).register(TORQUE), drive.read("S-5")) == (5461, 33.331)  # 5461 / 163.84 = 33.3313
+    drive.write("S-5", -100, store=True)
+    assert (line.drive(1).register(TORQUE), drive.read("S-5")) == (0xC000, -100.0)
+    assert drive.describe("reference").high_first
+    assert not drive.describe("bus_voltage").high_first
+    assert drive.read("reference") == 60.0
+    assert drive.profile.decode("reference", 0x0001_86A0) == 100.0
+    # The simulated high words are 0: with the order mistaken these would be thousands.
+    assert 0 < drive.read("bus_voltage") < 1000
+    assert 0 <= drive.read("output_current") < 30
+
+
+def test_a_backup_of_shares_goes_around(line: Simulator, drive: Drive, tmp_path: Path) -> None:
+    drive.write("S-5", 33.333, store=True)
+    kept = tmp_path / "share.toml"
+    drive.backup().save(kept)
+    lines = kept.read_text(encoding="utf-8").splitlines()
+    assert 'S-5 = { value = 33.331, unit = "%", raw = 5461 }  # Torque limit' in lines
+    taken = drivebus.Backup.load(kept, Profile.load(SHARE))
+    assert (taken.raw["S-5"], taken.raw["S-3"]) == (5461, 60000)
+    drive.write("S-5", 12, store=True)
+    assert [difference.code for difference in drive.diff(taken)] == ["S-5"]
+    drive.restore(taken)
+    assert line.drive(1).register(TORQUE) == 5461
+
+
+def test_a_sine_falls_on_what_the_drive_counts(drive: Drive) -> None:
+    measured = trial.sine(drive, 10, 20, period=4, duration=16, max_current=40)
+    assert measured.aborted is None
+
+
+def test_a_command_is_no_state_in_a_trace(drive: Drive) -> None:
+    profile = drive.profile
+    write, read = rtu.encode_write(1, STATUS, 2), rtu.encode_read(1, STATUS, 1)
+    told = bytes.fromhex("01 03 02 00 03")
+    answer = told + drivebus.crc16(told).to_bytes(2, "little")
+    assert meaning(write, True, profile=profile) == "unit 1: write order = 2 (run forward)"
+    assert meaning(write, False, write, profile) == "unit 1 took order = 2 (run forward)"
+    assert meaning(read, True, profile=profile) == "unit 1: read status (0008H)"
+    assert meaning(answer, False, read, profile) == "unit 1 answers status = 0003H"
+    assert (profile.name_at(STATUS), profile.name_at(STATUS, written=True)) == ("status", "order")
+
+
+def test_a_raw_write_is_judged_as_a_command(drive: Drive) -> None:
+    with pytest.raises(drivebus.NotAllowed, match="3 at 0008H is not a command"):
+        drive.write_words(STATUS, 3)
+    with pytest.raises(drivebus.NotAllowed):
+        drive.write("order", 2)
