@@ -66,7 +66,7 @@ UNSAFE_ALLOWED = "crates/line/src/ports/tty/low_latency.rs"
 
 # The rooms of the Python package, from the ground up: each may import those of the rows above its own.
 ROOMS: list[set[str]] = [
-    {"errors", "later", "named"},
+    {"errors", "later", "named", "places"},
     {"values", "checks", "rtu"},
     {"attributes"},
     {"profile", "site", "capture"},
@@ -105,7 +105,21 @@ ON_THE_CORE = {
 
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
-    "cli": {"capture", "drivebus", "hal", "later", "line", "plot", "record", "rtu", "sim", "site", "sniffer", "trial"},
+    "cli": {
+        "capture",
+        "drivebus",
+        "hal",
+        "later",
+        "line",
+        "places",
+        "plot",
+        "record",
+        "rtu",
+        "sim",
+        "site",
+        "sniffer",
+        "trial",
+    },
     "__main__": {"cli"},
 }
 

@@ -119,7 +119,7 @@ fn answer(echo: Echo, request: &[u8]) -> Option<Vec<u8>> {
     let answer = match (request, echo) {
         (Request::Echo { .. }, Echo::Unheard) => return None,
         (Request::Echo { .. }, Echo::Refused) => Answer::exception(8, ExceptionCode::ILLEGAL_FUNCTION),
-        (Request::ReadHolding { address, count, .. }, _) => {
+        (Request::Read { address, count, .. }, _) => {
             words = (address..address + count).collect();
             Answer::read(&words).unwrap()
         }

@@ -98,7 +98,12 @@ fn check_meaning(bytes: &[u8]) {
     assert_eq!(Answer::parse(pdu).is_ok(), oracle::is_answer(pdu));
     let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
     match Request::parse(pdu) {
-        Ok(Request::ReadHolding { address, count, .. }) => assert_eq!((address, count), (word(1), word(3))),
+        Ok(Request::Read { table, address, count, .. }) => {
+            assert_eq!((table.function(), address, count), (pdu[0], word(1), word(3)));
+        }
+        Ok(Request::WriteCoil { address, on, .. }) => {
+            assert_eq!((address, if on { 0xFF00 } else { 0 }), (word(1), word(3)));
+        }
         Ok(Request::WriteSingle { address, value, .. }) => assert_eq!((address, value), (word(1), word(3))),
         Ok(Request::Echo { data, .. }) => assert_eq!(data, word(3)),
         Ok(Request::WriteMultiple { address, words, .. }) => {
@@ -109,6 +114,9 @@ fn check_meaning(bytes: &[u8]) {
         Err(_) => {}
     }
     match Answer::parse(pdu) {
+        Ok(Answer::Read { table, words, .. }) if table.is_bits() => {
+            assert!(words.iter().enumerate().all(|(n, bit)| bit == u16::from(pdu[2 + n / 8] >> (n % 8) & 1)));
+        }
         Ok(Answer::Read { words, .. }) => {
             assert!(words.iter().enumerate().all(|(n, value)| value == word(2 + 2 * n)));
         }

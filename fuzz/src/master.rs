@@ -171,7 +171,7 @@ impl Run {
             }
             (begun, _) => assert_eq!(begun, Ok(())),
         }
-        let other_read = matches!(request, Request::ReadHolding { .. })
+        let other_read = matches!(request, Request::Read { .. })
             && !known.is_strange(self.now)
             && !known.owes_read_like(self.now, &pdu_of(&request), destination.to_wire(), &self.stream);
         assert!(!doubtful || is_echo || in_doubt || other_read, "a unit in quarantine was asked {request:?}");

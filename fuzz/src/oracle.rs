@@ -40,7 +40,9 @@ pub(crate) fn is_request(pdu: &[u8]) -> bool {
     let in_range = |max: usize| (1..=max).contains(&word(pdu, 3)) && word(pdu, 1) + word(pdu, 3) <= 65_536;
     match (pdu.first(), pdu.len()) {
         (None | Some(0 | 0x80..), _) | (_, 254..) => false,
-        (Some(3), len) => len == 5 && in_range(125),
+        (Some(1 | 2), len) => len == 5 && in_range(2000),
+        (Some(3 | 4), len) => len == 5 && in_range(125),
+        (Some(5), len) => len == 5 && matches!(word(pdu, 3), 0 | 0xFF00),
         (Some(6), len) => len == 5,
         (Some(8), len) => len < 3 || word(pdu, 1) != 0 || len == 5,
         (Some(16), len) => {
@@ -55,7 +57,9 @@ pub(crate) fn is_answer(pdu: &[u8]) -> bool {
     match (pdu.first(), pdu.len()) {
         (None, _) | (_, 254..) => false,
         (Some(0x80..), len) => len == 2,
-        (Some(3), len) => len >= 4 && len % 2 == 0 && usize::from(pdu[1]) == len - 2,
+        (Some(1 | 2), len) => (3..=252).contains(&len) && usize::from(pdu[1]) == len - 2,
+        (Some(3 | 4), len) => len >= 4 && len % 2 == 0 && usize::from(pdu[1]) == len - 2,
+        (Some(5), len) => len == 5 && matches!(word(pdu, 3), 0 | 0xFF00),
         (Some(6 | 16), len) => len == 5,
         (Some(8), len) => len < 3 || word(pdu, 1) != 0 || len == 5,
         _ => true,
@@ -76,7 +80,7 @@ pub(crate) enum Verdict {
 /// What is known of the length of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Length {
-    /// The function says it: 03H, 06H, 08H or 10H.
+    /// The function says it: 01H to 06H, 08H or 10H.
     Named,
     /// The PDU is the caller's own, and the caller said how many bytes its answer has.
     Given(u8),
@@ -103,8 +107,9 @@ impl Asked {
             (Some(_), Length::Any) => fits(&self.pdu, answer),
             // Who gives a length knows better.
             (Some(_), Length::Given(len)) => usize::from(len) == answer.len(),
-            (Some(3), Length::Named) => {
-                let bytes = 2 * word(&self.pdu, 3);
+            (Some(read @ 1..=4), Length::Named) => {
+                let count = word(&self.pdu, 3);
+                let bytes = if *read < 3 { count.div_ceil(8) } else { 2 * count };
                 answer.len() == 2 + bytes && usize::from(answer[1]) == bytes
             }
             (Some(16), Length::Named) => answer == &self.pdu[..5],
@@ -158,9 +163,13 @@ pub(crate) fn lengths(here: &[u8]) -> Vec<usize> {
     let even = |at: usize, most: u8| here.get(at).filter(|&&bytes| bytes >= 2 && bytes <= most && bytes % 2 == 0);
     let mut lengths = match here {
         [248..=255, ..] => vec![],
-        [_, 3, ..] => vec![Some(8), even(2, 250).map(|&bytes| 5 + usize::from(bytes))],
+        [_, 1 | 2, ..] => {
+            let bytes = here.get(2).filter(|&&bytes| (1..=250).contains(&bytes));
+            vec![Some(8), bytes.map(|&bytes| 5 + usize::from(bytes))]
+        }
+        [_, 3 | 4, ..] => vec![Some(8), even(2, 250).map(|&bytes| 5 + usize::from(bytes))],
         [_, 16, ..] => vec![Some(8), even(6, 246).map(|&bytes| 9 + usize::from(bytes))],
-        [_, 6 | 8, ..] => vec![Some(8)],
+        [_, 5 | 6 | 8, ..] => vec![Some(8)],
         [_, 0x81..=0xFF, ..] => vec![Some(5)],
         _ => vec![],
     };

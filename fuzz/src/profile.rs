@@ -125,7 +125,7 @@ fn check_profile(profile: &Profile) {
     for command in Command::ALL {
         if let Some((address, code)) = profile.command(command) {
             let registers = profile.command_registers();
-            assert_eq!(registers[&address].get(&code), Some(&command.name()), "{address:04X}H");
+            assert_eq!(registers[&address].get(&code), Some(&command.name()), "{address}");
             assert!(profile.written_entry_at(address).is_some());
         }
     }

@@ -101,9 +101,11 @@ fn expected(unit: UnitAddress, found: Result<&[u8], u8>) -> Heard {
 fn check_answer(unit: UnitAddress, request: &Request<'_>, asked: &[u8]) {
     let words: Vec<u16>;
     let answer = match *request {
-        Request::ReadHolding { address, count, .. } => {
-            words = (0..count).map(|n| address.wrapping_add(n)).collect();
-            Answer::read(&words).ok()
+        Request::Read { table, address, count, .. } => {
+            // Whole bytes of bits: of the others an answer by itself does not tell.
+            let whole = if table.is_bits() { count.next_multiple_of(8) } else { count };
+            words = (0..whole).map(|n| if table.is_bits() { n & 1 } else { address.wrapping_add(n) }).collect();
+            Answer::read_of(table, &words).ok()
         }
         Request::Custom { pdu, .. } => Answer::custom(pdu).ok(),
         _ => Answer::confirming(request),
@@ -121,5 +123,9 @@ fn check_answer(unit: UnitAddress, request: &Request<'_>, asked: &[u8]) {
     let is_right = asked.judge(came) == Verdict::Right;
     // Of a function without a name the request itself is an answer, where the specification does not say otherwise.
     assert!(is_right || matches!(request, Request::Custom { .. }), "{request:?} confirmed by {came:02X?}");
-    assert_eq!((address, request.judge(came) == Ok(answer)), (unit.get(), is_right));
+    let asked_for = match *request {
+        Request::Read { count, .. } => answer.shortened(count),
+        _ => answer,
+    };
+    assert_eq!((address, request.judge(came) == Ok(asked_for)), (unit.get(), is_right));
 }

@@ -1,6 +1,6 @@
 //! What a master says, kept, and the PDUs of requests and answers, put together without the crate that is judged.
 
-use drivebus_rtu::{Answer, AnswerError, Event, Request};
+use drivebus_rtu::{Answer, AnswerError, Event, Request, Table};
 
 /// An event, kept.
 #[derive(Debug, PartialEq)]
@@ -37,7 +37,8 @@ fn four(function: u8, first: u16, second: u16) -> Vec<u8> {
 /// The PDU of a request, put together here.
 pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
     match *request {
-        Request::ReadHolding { address, count, .. } => four(3, address, count),
+        Request::Read { table, address, count, .. } => four(table.function(), address, count),
+        Request::WriteCoil { address, on, .. } => four(5, address, if on { 0xFF00 } else { 0 }),
         Request::WriteSingle { address, value, .. } => four(6, address, value),
         Request::Echo { data, .. } => four(8, 0, data),
         Request::WriteMultiple { address, words, .. } => {
@@ -54,9 +55,16 @@ pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
 /// The PDU that an answer must have been told by, put together here.
 pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
     match *answer {
-        Answer::Read { words, .. } => {
+        Answer::Read { table: table @ (Table::Coil | Table::Discrete), words, .. } => {
+            let bits: Vec<u8> = words.iter().map(|word| u8::from(word != 0)).collect();
+            let bytes: Vec<u8> =
+                bits.chunks(8).map(|byte| byte.iter().rev().fold(0, |all, bit| all << 1 | bit)).collect();
+            [&[table.function(), u8::try_from(bytes.len()).unwrap_or(0)][..], &bytes].concat()
+        }
+        Answer::WriteCoil { address, on, .. } => four(5, address, if on { 0xFF00 } else { 0 }),
+        Answer::Read { table, words, .. } => {
             let count = u8::try_from(2 * words.len()).unwrap_or(0);
-            [3, count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
+            [table.function(), count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
         }
         Answer::WriteSingle { address, value, .. } => four(6, address, value),
         Answer::Echo { data, .. } => four(8, 0, data),

@@ -214,13 +214,23 @@ class Bus:
         retries: int | None = None,
         urgent: bool = False,
         verify: bool = False,
+        table: str = "holding",
     ) -> list[int]:
         """03H: *count* words (1..=125) of *unit* (1..=247) from *address*.
 
+        *table*: `holding`, `input` (04H), `coil` (01H), `discrete` (02H); of the last two 1..=2000 bits, each 0 or 1.
         *urgent*: before all who wait. *verify*: until the same words came twice in a row.
         """
     def read_stamped(
-        self, unit: int, address: int, count: int, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and the answer was complete."""
     def write(
@@ -233,8 +243,9 @@ class Bus:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        table: str = "holding",
     ) -> None:
-        """06H (an int) or 10H (a sequence). Sent once; *urgent* before all who wait, whatever is in doubt.
+        """06H (int) or 10H (sequence); a `coil` 05H. Sent once, *urgent* before all who wait, whatever is in doubt.
 
         With *read_back*, the address where the words can be read, a missing confirmation is looked for there, and the
         write is repeated only while the unit shows other words. With *connection*, the `reconnects` that the caller
@@ -300,9 +311,18 @@ class Requests:
         retries: int | None = None,
         urgent: bool = False,
         verify: bool = False,
+        table: str = "holding",
     ) -> Asked[list[int]]: ...
     def read_stamped(
-        self, unit: int, address: int, count: int, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> Asked[tuple[list[int], float, float]]: ...
     def write(
         self,
@@ -314,6 +334,7 @@ class Requests:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        table: str = "holding",
     ) -> Asked[None]: ...
     def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked[None]: ...
     def echo(self, unit: int, word: int | None = None, /) -> Asked[float]: ...
@@ -446,6 +467,8 @@ class Profile:
         Commands are `run_forward`, `run_reverse`, `jog_forward`, `jog_reverse`, `stop`, `coast`, `reset_fault`,
         `jog_stop`.
         """
+    def command_first(self, name: str, /) -> tuple[int, int] | None:
+        """Place and word of what is written before a command, or None."""
     def command_reason(self, name: str, /) -> str | None:
         """Why a command is not verified."""
     def commands(self) -> dict[str, int]: ...

@@ -141,8 +141,8 @@ class Bus(BusFace, Requests):
         return self._scan(scan.units(units), scan.time_for(timeout, self._opening.timeout))
 
     def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
-        async def read(unit: int, address: int) -> list[int]:
-            return self._native.read(unit, address, 1, timeout=timeout, retries=0)
+        async def read(unit: int, address: int, table: str = "holding") -> list[int]:
+            return self._native.read(unit, address, 1, timeout=timeout, retries=0, table=table)
 
         for unit in units:
             found = at_once(scan.look_for(read, self.now, unit))

@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
+from drivebus import places
 from drivebus.errors import NotAllowed
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "digits",
     "flag",
     "number",
+    "of_table",
     "one_of",
     "path",
     "payload",
@@ -70,6 +72,17 @@ def payload(value: object) -> int | list[int]:
     words = [whole(f"value {index} of the sequence:", word, 0, 0xFFFF) for index, word in enumerate(value)]
     whole("number of values", len(words), 1, 123)
     return words
+
+
+def of_table(table: object, value: object) -> int | list[int]:
+    """What a write to *table* carries: words, or of a coil 0 or 1."""
+    if table == "holding":
+        return payload(value)
+    if one_of("table", table, places.TABLES) not in places.WRITABLE:
+        raise NotAllowed(f"table {shown(table)} can only be read; {' and '.join(places.WRITABLE)} can be written")
+    if isinstance(value, Iterable):
+        raise NotAllowed(f"value {shown(value)} is not allowed: one coil is written at a time, to 0 or 1")
+    return int(value) if isinstance(value, bool) else whole("value of a coil", value, 0, 1)
 
 
 def number(what: str, value: object, low: float, high: float = math.inf, *, above: bool = False) -> float:

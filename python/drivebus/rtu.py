@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-from drivebus import _native
+from drivebus import _native, places
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
 
 __all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write", "written"]
@@ -26,10 +26,11 @@ class Frame:
         unit: Unit address, 0 for a broadcast.
         function: Function code; of an exception, the one that was refused.
         crc: The CRC it carries, which is right.
+        table: `"input"`, `"coil"` or `"discrete"`; None where it is the holding registers.
         address: First register address.
-        count: Number of registers.
-        value: The word of a single write.
-        words: The words read, or written by a 10H request.
+        count: Number of registers, or of bits; of an answer with bits, all that its bytes have room for.
+        value: The word of a single write; of a coil 0 or 1.
+        words: The words read, or written by a 10H request; of bits 0 or 1 each.
         data: The word of an echo.
         code: Exception code.
         pdu: The PDU of a frame that is none of the above.
@@ -39,6 +40,7 @@ class Frame:
     unit: int
     function: int
     crc: int
+    table: str | None = None
     address: int | None = None
     count: int | None = None
     value: int | None = None
@@ -83,8 +85,15 @@ def decode(frame: bytes | bytearray | memoryview) -> Frame:
 def written(pdu: bytes) -> tuple[int, list[int]] | None:
     """The first address that the request *pdu* writes to, and the words; None if it writes none.
 
-    Also of a 10H request whose counts are wrong, in which `decode` sees none: a drive may not look at them.
+    Also of a 10H request whose counts are wrong, in which `decode` sees none: a drive may not look at them. Of a coil
+    (05H, 0FH) the address is its place, 0x1_0000 above it, and the words are 0 or 1.
     """
+    if pdu[:1] == b"\x05" and len(pdu) == 5:
+        return places.place("coil", _words(pdu[1:3])[0]), [int(pdu[3:5] != b"\x00\x00")]
+    if pdu[:1] == b"\x0f" and len(pdu) > 6:
+        bits = int.from_bytes(pdu[6:], "little")
+        count = min(_words(pdu[3:5])[0], 8 * len(pdu[6:]))
+        return places.place("coil", _words(pdu[1:3])[0]), [bits >> at & 1 for at in range(count)]
     if pdu[:1] == b"\x06" and len(pdu) == 5:
         return _words(pdu[1:3])[0], _words(pdu[3:5])
     if pdu[:1] == b"\x10" and len(pdu) > 7:

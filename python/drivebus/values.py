@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from drivebus import places
 from drivebus.named import Named
 
 __all__ = [
@@ -233,6 +234,7 @@ class Description:
         label: What it is, in words.
         kind: `"register"` or `"parameter"`.
         address: Where it is read, 0..0xFFFF; None where nobody knows that, and it cannot be used.
+        table: The table it is in: `"holding"`, `"input"`, `"coil"` or `"discrete"`.
         unit: Engineering unit, empty for a plain number.
         scale: Raw counts per unit; no whole number where a share is counted: 163.84 where 16384 counts are 100 %.
         signed: Whether the word is two's complement.
@@ -279,6 +281,12 @@ class Description:
     unverified_bits: tuple[str, ...] = ()
     listed: bool = True
     high_first: bool = False
+    table: str = "holding"
+
+    @property
+    def place(self) -> int | None:
+        """Table and address as one number: of a holding register its address, of a coil 0x1_0000 above it."""
+        return None if self.address is None else places.place(self.table, self.address)
 
     def number(self, words: Sequence[int]) -> int:
         """What *words* are together, as they stand one behind the other: the raw number that `decode` takes."""

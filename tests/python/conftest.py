@@ -155,7 +155,7 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     read = drivebus.Bus.read
 
     def refuse(address: int) -> None:
-        def refusing(bus: drivebus.Bus, unit: int, first: int, count: int = 1, /, **how: bool) -> list[int]:
+        def refusing(bus: drivebus.Bus, unit: int, first: int, count: int = 1, /, **how: Any) -> list[int]:
             # 6300H is nowhere: the drive itself refuses.
             return read(bus, unit, 0x6300 if first <= address < first + count else first, count, **how)
 

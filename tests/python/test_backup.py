@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -115,7 +116,7 @@ def test_nothing_is_taken_of_another_drive_behind_the_port(
     drive.backup(path)
     read, count = Bus.read, [0]
 
-    def elsewhere(bus: Bus, unit: int, first: int, words: int = 1, /, **how: bool) -> list[int]:
+    def elsewhere(bus: Bus, unit: int, first: int, words: int = 1, /, **how: Any) -> list[int]:
         count[0] += 1
         found = read(bus, unit, first, words, **how)
         return [0x01A2] if first == 0x2103 and count[0] > 8 else found

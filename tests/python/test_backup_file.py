@@ -300,7 +300,7 @@ def test_a_value_that_no_document_allows_is_kept_as_the_drive_told_it(
     """P01.21 is 0 or 1 by the manual; this drive has 7."""
     read = Bus.read
 
-    def told(bus: Bus, unit: int, address: int, count: int = 1, /, **how: bool) -> list[int]:
+    def told(bus: Bus, unit: int, address: int, count: int = 1, /, **how: Any) -> list[int]:
         words = read(bus, unit, address, count, **how)
         return [7 if address + index == 0x0115 else word for index, word in enumerate(words)]
 

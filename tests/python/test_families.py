@@ -30,9 +30,18 @@ COMMANDS = [
 
 
 def place_of(family: dict[str, Any], command: str) -> int | None:
-    """Where a command goes: most have one register for all."""
+    """Where a command goes: most families have one register for all."""
     elsewhere: dict[str, int] = family["commands"].get("elsewhere", {})
     return elsewhere.get(command, given(family["commands"]["register"]))
+
+
+def words_of(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
+    """All that a command writes, in order: which way the motor turns may go first."""
+    first: dict[str, list[int]] = family["commands"].get("first", {})
+    before: list[tuple[int | None, int | None]] = (
+        [(place, word) for place, word in [first[command]]] if command in first else []
+    )
+    return [*before, (place_of(family, command), given(family["commands"][command]))]
 
 
 every_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family["name"])
@@ -51,7 +60,7 @@ def words(section: dict[str, Any]) -> dict[int, str]:
 
 def test_the_table_has_every_family() -> None:
     assert {family["name"] for family in FAMILIES} == set(drivebus.profiles())
-    assert len(FAMILIES) == 24
+    assert len(FAMILIES) == 25
 
 
 @every_family
@@ -65,6 +74,7 @@ def test_a_command_is_that_of_the_table(family: dict[str, Any], command: str) ->
         assert command not in profile.commands()
         return
     assert profile.command(command) == (place_of(family, command), code)
+    assert [*filter(None, [profile.command_first(command)]), profile.command(command)] == words_of(family, command)
     assert profile.commands()[command] == code
     assert (profile.command_reason(command) is not None) == (command in table["needs_unverified"])
 
@@ -73,19 +83,24 @@ def test_a_command_is_that_of_the_table(family: dict[str, Any], command: str) ->
 def test_no_other_code_is_defined(family: dict[str, Any]) -> None:
     profile, table = Profile.builtin(family["name"]), family["commands"]
     here = [command for command in COMMANDS if command not in table.get("elsewhere", {})]
-    codes: dict[int | None, str] = {given(table[command]): command for command in here}
+    codes: dict[int | None, str] = {}
+    for command in here:
+        code = given(table[command])
+        # Two that another word tells apart have one code.
+        codes[code] = f"{codes[code]} or {command}" if command in table.get("first", {}) and code in codes else command
     codes.pop(None, None)
     codes.update({int(code): label for code, label in table["other"].items()})
     assert profile.command_codes() == codes
     assert [step["word"] for step in profile.start_sequence()] == table.get("sequence", [])
     assert profile.command_address == given(table["register"])
     others: dict[int, dict[int, str]] = {}
-    for command, address in table.get("elsewhere", {}).items():
-        others.setdefault(address, {})[table[command]] = command
+    for command, place in table.get("elsewhere", {}).items():
+        others.setdefault(place, {})[table[command]] = command
     assert {place: words for place, words in profile.command_registers().items() if place in others} == others
     assert set(profile.command_registers()) == {*others, given(table["register"])} - {None}
-    plain = [address for address in range(0x10000) if profile.plain_address(address) == address]
-    assert [address for address in plain if profile.is_command(address)] == table["moves"]
+    tables = [range(first, first + 0x10000) for first in (0, 0x1_0000, 0x2_0000, 0x4_0000)]
+    plain = [place for table in tables for place in table if profile.plain_address(place) == place]
+    assert [place for place in plain if profile.is_command(place)] == table["moves"]
     assert profile.kind == family["kind"]
 
 

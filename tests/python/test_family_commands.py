@@ -13,7 +13,7 @@ import pytest
 
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator
 
-from .test_families import COMMANDS, FAMILIES, given, place_of
+from .test_families import COMMANDS, FAMILIES, given, place_of, words_of
 
 STARTS = {"run_forward", "run_reverse", "jog_forward", "jog_reverse"}
 
@@ -31,7 +31,7 @@ BEFORE = {"stop": "run_forward", "coast": "run_forward", "jog_stop": "jog_forwar
 """What must go on for a command to have something to end."""
 
 EVERY = [(family, command) for family in FAMILIES for command in COMMANDS]
-REGISTERS = {place_of(family, command) for family, command in EVERY} - {None}
+REGISTERS = {place for family, command in EVERY for place, _ in words_of(family, command)} - {None}
 KNOWN = [(family, command) for family, command in EVERY if given(family["commands"][command]) is not None]
 
 
@@ -62,12 +62,11 @@ def prepare(drive: Drive) -> None:
     drive.prepare_control(store=drive.profile.memory() is None)
 
 
-def words_of(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
-    """Address and word of all that *command* takes from rest: some families want words before a run."""
+def from_rest(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
+    """Place and word of all that *command* takes from rest: some families want words before a run."""
     table = family["commands"]
-    before: list[int] = table.get("sequence", []) if command in STARTS else []
-    first = [(given(table["register"]), word) for word in before]
-    return [*first, (place_of(family, command), given(table[command]))]
+    sequence: list[int] = table.get("sequence", []) if command in STARTS else []
+    return [*((given(table["register"]), word) for word in sequence), *words_of(family, command)]
 
 
 def commanded(simulator: Simulator) -> list[tuple[int, int]]:
@@ -77,6 +76,10 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
     registers = REGISTERS - {row.address for row in rows if row.kind == "parameter"}
     found = []
     for _, sender, frame in simulator.line.trace():
+        if sender == "master" and frame[1] == 0x05:
+            found.append(
+                (0x1_0000 + int.from_bytes(frame[2:4], "big"), {0xFF00: 1, 0: 0}[int.from_bytes(frame[4:6], "big")])
+            )
         if sender != "master" or frame[1] not in (0x06, 0x10):
             continue
         address = int.from_bytes(frame[2:4], "big")
@@ -105,11 +108,11 @@ def test_the_code_on_the_line_is_the_familys_own(
     expected: list[tuple[int | None, int | None]] = []
     if command in BEFORE:
         DO[BEFORE[command]](drive)
-        expected += words_of(family, BEFORE[command])
+        expected += from_rest(family, BEFORE[command])
     elif command == "reset_fault":
         simulator.drive(1).trip(1)
     DO[command](drive)
-    assert commanded(simulator) == [*expected, *words_of(family, command)]
+    assert commanded(simulator) == [*expected, *from_rest(family, command)]
 
 
 @each(KNOWN)
@@ -132,7 +135,7 @@ def test_what_no_document_prints_is_not_sent_unasked(
         assert commanded(simulator) == []
     else:
         DO[command](plain)
-        assert commanded(simulator) == [(place_of(family, command), table[command])]
+        assert commanded(simulator) == from_rest(family, command)
 
 
 def test_what_a_vfd500_may_take_for_disable_is_sent_only_if_it_is_forced() -> None:

@@ -6,6 +6,7 @@ import asyncio
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -298,7 +299,7 @@ class TestAfterThePortWasOpenedAgain:
         self.reopen(simulator, bus)
         read = bus.read
 
-        def other(unit: int, address: int, *rest: int, **how: bool) -> list[int]:
+        def other(unit: int, address: int, *rest: int, **how: Any) -> list[int]:
             if address == 0x2100:
                 raise drivebus.Refused("no such address", code=2)
             return read(unit, address, *rest, **how)

@@ -30,10 +30,10 @@ VARIANTS = {
 READ_ONLY = {
     "vfd500": 0x04,
     "eds300": 0x05,
-    **dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"], 0x02),
+    **dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200"], 0x02),
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
-OUT_OF_RANGE = dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "v20"], 0x03)
+OUT_OF_RANGE = dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200"], 0x03)
 """And a value that is out of range, where it is not their 04H."""
 
 WITHOUT = {"vfd500": {"jog_stop"}, "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"}}
@@ -53,6 +53,10 @@ COMMANDS = {
 }
 
 
+COILS = 0x01
+"""What stands above the address of a coil; the function that reads it."""
+
+
 class Bench:
     """One drive of a family, and its profile."""
 
@@ -67,14 +71,22 @@ class Bench:
         self.bus.close()
         self.simulator.close()
 
-    def write(self, address: int, word: int) -> None:
-        request = bytes([0x06]) + address.to_bytes(2, "big") + word.to_bytes(2, "big")
-        if 0x06 not in self.profile.functions and 0x10 in self.profile.functions:
-            request = bytes([0x10]) + address.to_bytes(2, "big") + bytes([0, 1, 2]) + word.to_bytes(2, "big")
+    def write(self, place: int, word: int) -> None:
+        address, data = (place & 0xFFFF).to_bytes(2, "big"), word.to_bytes(2, "big")
+        request = bytes([0x06]) + address + data
+        if place >> 16 == COILS:
+            request = bytes([0x05]) + address + bytes([0xFF * word, 0])
+        elif 0x06 not in self.profile.functions and 0x10 in self.profile.functions:
+            request = bytes([0x10]) + address + bytes([0, 1, 2]) + data
         self.bus.transact(1, request)
 
-    def read(self, address: int, count: int = 1) -> list[int]:
-        answer = self.bus.transact(1, bytes([0x03]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
+    def read(self, place: int, count: int = 1) -> list[int]:
+        function = place >> 16 or 0x03
+        answer = self.bus.transact(
+            1, bytes([function]) + (place & 0xFFFF).to_bytes(2, "big") + count.to_bytes(2, "big")
+        )
+        if function == COILS:
+            return [answer[2] >> bit & 1 for bit in range(count)]
         return [int.from_bytes(answer[place : place + 2], "big") for place in range(2, len(answer), 2)]
 
     def refusal(self, address: int, word: int) -> int:
@@ -86,7 +98,7 @@ class Bench:
         """The word that has this role."""
         name = self.profile.role(role)
         assert name is not None
-        address = self.profile.describe(name).address
+        address = self.profile.describe(name).place
         assert address is not None
         return self.read(address)[0]
 
@@ -121,33 +133,36 @@ def test_every_row_that_can_be_read_is_answered(bench: Bench) -> None:
             continue
         if row.access == "wo":
             continue
-        assert len(bench.read(row.address, row.words)) == row.words, name
+        assert row.place is not None
+        assert len(bench.read(row.place, row.words)) == row.words, name
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_register_has_the_range_that_the_drive_has(bench: Bench) -> None:
-    commands = bench.profile.command_address
+    commands = bench.profile.command_registers()
     for name in bench.profile.names():
         row = bench.profile.describe(name)
         bound = row.low_from or row.high_from or row.variant or row.low is None or row.high is None
-        if row.kind != "register" or row.address is None or row.access == "ro" or row.address == commands or bound:
+        if row.kind != "register" or row.place is None or row.access == "ro" or row.place in commands or bound:
             continue
         low, high = bench.profile.encode(name, row.low), bench.profile.encode(name, row.high)
         for word in (low, high):
-            bench.write(row.address, word)
+            bench.write(row.place, word)
+        if row.table == "coil":  # 05H says on or off, and nothing else
+            continue
         below = [(low - 1) & 0xFFFF] if low or row.signed else []
         above = [high + 1] if high < 0xFFFF else []
         for word in (*below, *above):
             refused = OUT_OF_RANGE.get(bench.profile.name, 0x04)
-            assert bench.refusal(row.address, word) == refused, f"{name} {word:04X}"
+            assert bench.refusal(row.place, word) == refused, f"{name} {word:04X}"
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
     for name in bench.profile.names():
         row = bench.profile.describe(name)
-        if row.access == "ro" and row.address is not None:
-            assert bench.refusal(row.address, 1) == READ_ONLY.get(bench.profile.name, 0x07), name
+        if row.access == "ro" and row.place is not None:
+            assert bench.refusal(row.place, 1) == READ_ONLY.get(bench.profile.name, 0x07), name
 
 
 @pytest.mark.parametrize("family", [*RUN, "fc51"])
@@ -232,7 +247,14 @@ def test_a_family_is_known_by_what_its_profile_says(bench: Bench) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_functions_of_the_profile_are_there(bench: Bench) -> None:
-    requests = {0x03: "03 2100 0001", 0x06: "06 2100 0001", 0x08: "08 0000 12AB", 0x10: "10 2100 0001 02 0001"}
+    requests = {
+        0x01: "01 0000 0001",
+        0x05: "05 2100 FF00",
+        0x03: "03 2100 0001",
+        0x06: "06 2100 0001",
+        0x08: "08 0000 12AB",
+        0x10: "10 2100 0001 02 0001",
+    }
     refused = []
     for function in bench.profile.functions:
         try:

@@ -38,6 +38,7 @@ FAMILIES = {
     22: "v20",
     23: "acs355",
     24: "fc51",
+    25: "wj200",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

@@ -84,7 +84,13 @@ def test_importing_the_package_loads_next_to_nothing() -> None:
 
 def test_a_name_loads_what_it_stands_on() -> None:
     modules = loaded("import sys; from drivebus import State; before = set(sys.modules)")
-    assert ours(modules) == {"drivebus", "drivebus.later", "drivebus.named", "drivebus.values"}
+    assert ours(modules) == {
+        "drivebus",
+        "drivebus.later",
+        "drivebus.named",
+        "drivebus.places",
+        "drivebus.values",
+    }
 
 
 def test_the_version_is_told_without_the_commands() -> None:

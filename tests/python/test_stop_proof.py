@@ -217,7 +217,7 @@ class TestAFallThatProvesNothing:
         drive.write(OTHER_BUS, unverified=True)
         read, wobble = drive.bus.read, itertools.cycle([3, -2, 2, -3])
 
-        def wobbling(unit: int, address: int, *rest: int, **how: bool) -> list[int]:
+        def wobbling(unit: int, address: int, *rest: int, **how: Any) -> list[int]:
             words = read(unit, address, *rest, **how)
             return [words[0] + next(wobble), *words[1:]] if address == FREQUENCY else words
 
@@ -377,7 +377,7 @@ class TestAMotorThatRunsInAFault:
             self.told: list[object] = []
             self.obeys = False
 
-            def answer(unit: int, address: int, *rest: int, **how: bool) -> tuple[list[int], float, float]:
+            def answer(unit: int, address: int, *rest: int, **how: Any) -> tuple[list[int], float, float]:
                 words, *times = read(unit, address, *rest, **how)
                 if address == self.STATUS:
                     words[0] |= self.RUNS_ON & 0x0038

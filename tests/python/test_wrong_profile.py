@@ -45,10 +45,11 @@ SILENT_ON_CODES = [
     "atv312",
     "v20",
     "acs355",
+    "wj200",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355"]
+SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200"]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -69,6 +70,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
+    # This one has coils, which no other has.
+    "wj200": ["wj200"],
     # And this one 2104H and 2106H.
     "ms300": ["ms300"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
@@ -156,7 +159,7 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 def test_the_table_has_every_family() -> None:
     assert set(TAKEN_FOR) == set(drivebus.profiles())
-    assert len(PAIRS) == 576
+    assert len(PAIRS) == 625
 
 
 @every_pair
@@ -418,7 +421,7 @@ class TestWhatTells:
         drive = bus.drive(1, "vfd500", unverified=True)
         read = bus.read
 
-        def other(unit: int, place: int, *rest: int, **how: bool) -> list[int]:
+        def other(unit: int, place: int, *rest: int, **how: Any) -> list[int]:
             # 6300H is nowhere: the drive itself refuses.
             return read(unit, 0x6300 if place == address else place, *rest, **how)
 

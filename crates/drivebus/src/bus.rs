@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus_drives::Place;
 use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
 use drivebus_rtu::{Answer, Destination, Instant, Request};
 
@@ -85,7 +86,7 @@ impl Bus {
     /// # Errors
     ///
     /// [`Error`]: a read changes nothing in a drive, whatever became of it.
-    pub fn read(&self, unit: u8, address: u16, count: u16) -> Result<Vec<u16>, Error> {
+    pub fn read(&self, unit: u8, address: impl Into<Place>, count: u16) -> Result<Vec<u16>, Error> {
         self.read_with(unit, address, count, CallOptions::new())
     }
 
@@ -94,14 +95,20 @@ impl Bus {
     /// # Errors
     ///
     /// Those of [`read`](Self::read).
-    pub fn read_with(&self, unit: u8, address: u16, count: u16, options: CallOptions) -> Result<Vec<u16>, Error> {
-        let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
+    pub fn read_with(
+        &self,
+        unit: u8,
+        address: impl Into<Place>,
+        count: u16,
+        options: CallOptions,
+    ) -> Result<Vec<u16>, Error> {
+        let (unit, request) = (checks::unit(unit)?, checks::read(address.into(), count)?);
         let mut words = Vec::new();
         self.call(unit.into(), &request, options.of(&request)?, &mut |answer| words = replies::words(&answer))?;
         Ok(words)
     }
 
-    /// Writes a word (06H) or a sequence of words (10H) to `unit`. Sent once, never repeated.
+    /// Writes a word (06H) or a sequence of words (10H) to `unit`, or 0 or 1 to a coil (05H). Sent once, never repeated.
     ///
     /// A word in a command register moves the motor. A unit that may still owe another answer is first asked for an echo,
     /// or for a read that cannot be mistaken; if it answers neither, the write is not sent.
@@ -109,7 +116,7 @@ impl Bus {
     /// # Errors
     ///
     /// [`Error`]: unless [`may_have_acted`](Error::may_have_acted) says so, the unit has not taken it.
-    pub fn write<'a>(&self, unit: u8, address: u16, value: impl Into<Payload<'a>>) -> Result<(), Error> {
+    pub fn write<'a>(&self, unit: u8, address: impl Into<Place>, value: impl Into<Payload<'a>>) -> Result<(), Error> {
         self.write_with(unit, address, value, CallOptions::new())
     }
 
@@ -121,12 +128,12 @@ impl Bus {
     pub fn write_with<'a>(
         &self,
         unit: u8,
-        address: u16,
+        address: impl Into<Place>,
         value: impl Into<Payload<'a>>,
         options: CallOptions,
     ) -> Result<(), Error> {
         let (unit, payload) = (checks::unit(unit)?, value.into());
-        let request = checks::write(address, &payload)?;
+        let request = checks::write(address.into(), &payload)?;
         self.call(unit.into(), &request, options.of(&request)?, &mut |_| ())?;
         Ok(())
     }
@@ -138,7 +145,7 @@ impl Bus {
     /// [`Error`]: the units may have taken it where [`may_have_acted`](Error::may_have_acted) says so.
     pub fn broadcast<'a>(&self, address: u16, value: impl Into<Payload<'a>>) -> Result<(), Error> {
         let payload = value.into();
-        let request = checks::write(address, &payload)?;
+        let request = checks::write(address.into(), &payload)?;
         self.call(Destination::Broadcast, &request, LineOptions::default(), &mut |_| ())?;
         Ok(())
     }
@@ -177,8 +184,8 @@ impl Bus {
     pub fn values(&self, unit: u8, reading: &Reading) -> Result<Values, Error> {
         let unit = checks::unit(unit)?;
         let mut words = Vec::with_capacity(reading.words());
-        for (address, count) in reading.reads() {
-            let request = checks::read(address, count)?;
+        for (place, count) in reading.spans() {
+            let request = checks::read(place, count)?;
             let mut take = |answer: Answer<'_>| words.extend(replies::words(&answer));
             self.call(unit.into(), &request, LineOptions::default(), &mut take)?;
         }

@@ -5,8 +5,9 @@
 use std::fmt::Display;
 use std::time::Duration;
 
+use drivebus_drives::Place;
 use drivebus_line::url::UnitError;
-use drivebus_rtu::{MAX_READ, MAX_WRITE, Request, UnitAddress};
+use drivebus_rtu::{MAX_WRITE, Request, Table, UnitAddress};
 
 use crate::error::Error;
 use crate::payload::Payload;
@@ -18,18 +19,30 @@ pub(crate) fn unit(unit: u8) -> Result<UnitAddress, Error> {
     Ok(UnitError::check(unit.into())?)
 }
 
-pub(crate) fn read(address: u16, count: u16) -> Result<Request<'static>, Error> {
-    within("count", count, 1, MAX_READ)?;
-    Ok(Request::read(address, count)?)
+pub(crate) fn read(place: Place, count: u16) -> Result<Request<'static>, Error> {
+    let table = table(place.table);
+    within("count", count, 1, table.max_read())?;
+    Ok(Request::read_of(table, place.address, count)?)
 }
 
-pub(crate) fn write<'a>(address: u16, payload: &'a Payload<'_>) -> Result<Request<'a>, Error> {
-    match payload {
-        Payload::Word(word) => Ok(Request::write(address, *word)),
-        Payload::Words(words) => {
+/// A profile's table as the line has it.
+pub(crate) fn table(table: drivebus_drives::Table) -> Table {
+    Table::of_function(table.function()).unwrap_or_default()
+}
+
+pub(crate) fn write<'a>(place: Place, payload: &'a Payload<'_>) -> Result<Request<'a>, Error> {
+    match (table(place.table), payload) {
+        (Table::Holding, Payload::Word(word)) => Ok(Request::write(place.address, *word)),
+        (Table::Holding, Payload::Words(words)) => {
             within("number of values", words.len(), 1, usize::from(MAX_WRITE))?;
-            Ok(Request::write_many(address, words)?)
+            Ok(Request::write_many(place.address, words)?)
         }
+        (Table::Coil, Payload::Word(word)) => {
+            within("value of a coil", *word, 0, 1)?;
+            Ok(Request::write_coil(place.address, *word == 1))
+        }
+        (Table::Coil, Payload::Words(_)) => Err(Error::not_allowed(format!("{place}: one coil is written at a time"))),
+        (Table::Input | Table::Discrete, _) => Err(Error::not_allowed(format!("{place} can only be read"))),
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_line::{Bus as Core, Poll as Polled, PollBatch, PollCounts, PollSample, PollTarget};
-use drivebus_rtu::{Instant, UnitAddress};
+use drivebus_rtu::{Instant, Table, UnitAddress};
 
 use crate::checks;
 use crate::error::Error;
@@ -37,15 +37,17 @@ impl Target {
         Self { unit, what: What::Words(reads.into_iter().collect()) }
     }
 
-    fn reads(&self) -> Vec<(u16, u16)> {
+    fn reads(&self) -> Vec<(Table, u16, u16)> {
         match &self.what {
-            What::Values(reading) => reading.reads().collect(),
-            What::Words(reads) => reads.clone(),
+            What::Values(reading) => {
+                reading.spans().map(|(place, count)| (checks::table(place.table), place.address, count)).collect()
+            }
+            What::Words(reads) => reads.iter().map(|&(address, count)| (Table::Holding, address, count)).collect(),
         }
     }
 
     fn length(&self) -> usize {
-        self.reads().iter().map(|&(_, count)| usize::from(count)).sum()
+        self.reads().iter().map(|&(.., count)| usize::from(count)).sum()
     }
 }
 
@@ -62,7 +64,7 @@ impl Poll {
     pub(crate) fn start(bus: &Arc<Core>, targets: Vec<Target>, interval: Option<Duration>) -> Result<Self, Error> {
         let asked = targets.iter().map(|target| {
             let unit: UnitAddress = checks::unit(target.unit)?;
-            Ok(PollTarget::new(unit, target.reads()))
+            Ok(PollTarget::of_tables(unit, target.reads()))
         });
         let core = Polled::start(Arc::clone(bus), asked.collect::<Result<_, Error>>()?, interval, KEPT)?;
         let with_length = |target: Target| {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::{Evidence, Profile, ReadPlan, Value};
+use drivebus_drives::{Evidence, Place, Profile, ReadPlan, Value};
 
 use crate::error::Error;
 
@@ -74,7 +74,12 @@ impl Reading {
 
     /// What is read, in this order: address and number of words.
     pub fn reads(&self) -> impl Iterator<Item = (u16, u16)> {
-        self.0.plan.reads().iter().map(|read| (read.address, read.count))
+        self.spans().map(|(place, count)| (place.address, count))
+    }
+
+    /// The same with the table of each.
+    pub(crate) fn spans(&self) -> impl Iterator<Item = (Place, u16)> {
+        self.0.plan.reads().iter().map(|read| (read.place(), read.count))
     }
 
     /// How many words all reads bring.

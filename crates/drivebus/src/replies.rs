@@ -11,9 +11,9 @@ pub(crate) fn words(answer: &Answer<'_>) -> Vec<u16> {
     }
 }
 
-/// The words of a reply to a read.
-pub(crate) fn words_of(reply: &Reply) -> Vec<u16> {
-    Answer::parse(&reply.pdu).map(|answer| words(&answer)).unwrap_or_default()
+/// The words of a reply to a read of `count`: bits come in whole bytes.
+pub(crate) fn words_of(reply: &Reply, count: u16) -> Vec<u16> {
+    Answer::parse(&reply.pdu).map(|answer| words(&answer.shortened(count))).unwrap_or_default()
 }
 
 /// The answer's PDU as it came.

@@ -2,6 +2,7 @@
 
 use crate::bits::BitField;
 use crate::evidence::Evidence;
+use crate::place::{Place, Table};
 use crate::quantity::Quantity;
 use crate::value::{Input, Value, ValueError};
 
@@ -66,7 +67,7 @@ pub struct Entry {
     /// The name that a parameter has beside its code.
     pub(crate) alias: Option<String>,
     pub(crate) kind: Kind,
-    pub(crate) address: Option<u16>,
+    pub(crate) place: Option<Place>,
     pub(crate) label: String,
     pub(crate) quantity: Quantity,
     pub(crate) bits: Vec<BitField>,
@@ -106,7 +107,17 @@ impl Entry {
     /// The address to read from. `None` where it is known that there is such a word, and not where: then it cannot be
     /// used.
     pub fn address(&self) -> Option<u16> {
-        self.address
+        self.place.map(|place| place.address)
+    }
+
+    /// The address and its table; `None` as for the [`address`](Self::address).
+    pub fn place(&self) -> Option<Place> {
+        self.place
+    }
+
+    /// The table that it is in.
+    pub fn table(&self) -> Table {
+        self.place.map_or(Table::Holding, |place| place.table)
     }
 
     /// How many words it takes from its address on: 1 or 2.

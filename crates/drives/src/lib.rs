@@ -20,7 +20,7 @@
 //! assert_eq!(gd350.find("set_frequency")?.encode("12.34")?, 1234);
 //! assert!(gd350.find("set_frequency")?.encode(10.005).is_err(), "the drive counts hundredths");
 //!
-//! assert_eq!(gd350.command(Command::Coast), Some((0x2000, 6)));
+//! assert_eq!(gd350.command(Command::Coast), Some((0x2000.into(), 6)));
 //! assert_eq!(gd350.state(3), State::Stopped);
 //! assert_eq!(gd350.fault(11).label, "Motor overload");
 //! # Ok(())
@@ -40,6 +40,7 @@
 //! | --- | --- |
 //! | `decimal`, `text`, `evidence` | exact numbers, text as people write it, how well a fact is proved |
 //! | `value`, `quantity`, `bits`, `entry` | what a word means, and the register or parameter that holds it |
+//! | `place` | an address, and which of a drive's tables it is one of |
 //! | `plan` | many words in the cheapest reads |
 //! | `parts` | what a profile is made of beside its entries: commands, states, faults, … |
 //! | `profile` | all that is known of a family, and the questions it answers |
@@ -62,6 +63,7 @@ mod entry;
 mod evidence;
 mod load;
 mod parts;
+mod place;
 mod plan;
 mod profile;
 mod quantity;
@@ -83,6 +85,7 @@ pub use parts::setpoint::{Setpoint, SetpointRole};
 pub use parts::state::{State, StateRule, StateWord};
 pub use parts::variant::{Variant, VariantChoice, VariantError};
 pub use parts::watchdog::Watchdog;
+pub use place::{Place, Table};
 pub use plan::{ReadCost, ReadSpan, plan_reads};
 pub use profile::Profile;
 pub use profile::counts::Counts;

@@ -22,6 +22,7 @@ mod sequence;
 mod shape;
 mod succeed;
 mod table;
+mod table_cell;
 mod words;
 
 use std::io::Read;
@@ -141,7 +142,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 24] = [
+static BUILTINS: [Builtin; 25] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -166,6 +167,7 @@ static BUILTINS: [Builtin; 24] = [
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

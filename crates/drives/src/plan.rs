@@ -2,13 +2,24 @@
 //!
 //! Knows addresses and costs; knows nothing of what a word means.
 
-/// One read: `count` words from `address`.
+use crate::place::{Place, Table};
+
+/// One read: `count` words, or bits, of `table` from `address`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ReadSpan {
+    /// Where.
+    pub table: Table,
     /// The first address.
     pub address: u16,
     /// How many words, at least 1.
     pub count: u16,
+}
+
+impl ReadSpan {
+    /// Where it begins.
+    pub const fn place(&self) -> Place {
+        Place::new(self.table, self.address)
+    }
 }
 
 /// What a read costs, in any unit of time.
@@ -37,19 +48,28 @@ pub(crate) struct ReadRules {
 ///
 /// `wanted` may be in any order and repeat itself.
 pub fn plan_reads(wanted: &[u16], max_words: u16, cost: ReadCost, readable: impl Fn(u16) -> bool) -> Vec<ReadSpan> {
-    let wanted: Vec<_> = wanted.iter().map(|&address| ReadSpan { address, count: 1 }).collect();
-    plan_spans(&wanted, ReadRules { max_words, across_groups: true, cost }, readable)
+    let wanted: Vec<_> = wanted.iter().map(|&address| ReadSpan { table: Table::Holding, address, count: 1 }).collect();
+    plan_spans(&wanted, ReadRules { max_words, across_groups: true, cost }, |place| readable(place.address))
 }
 
 /// As [`plan_reads`], for values of one word or more, none of which is cut in two. Those wanted must not overlap.
-pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(u16) -> bool) -> Vec<ReadSpan> {
+pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(Place) -> bool) -> Vec<ReadSpan> {
     let mut wanted = wanted.to_vec();
     wanted.sort_unstable();
     wanted.dedup();
+    let tables = wanted.chunk_by(|one, other| one.table == other.table);
+    tables.flat_map(|wanted| plan_table(wanted, rules, &readable)).collect()
+}
+
+/// As [`plan_spans`], for values of one table in address order: no read runs from one into another.
+fn plan_table(wanted: &[ReadSpan], rules: ReadRules, readable: impl Fn(Place) -> bool) -> Vec<ReadSpan> {
+    let table = wanted.first().map_or(Table::Holding, |span| span.table);
     let last_of = |span: &ReadSpan| span.address + (span.count - 1);
 
     // Whether the drive answers for all that lies before a value, from the end of the one before.
-    let joined = |pair: &[ReadSpan]| (last_of(&pair[0]) + 1..pair[1].address).all(&readable);
+    let joined = |pair: &[ReadSpan]| {
+        (last_of(&pair[0]) + 1..pair[1].address).all(|address| readable(Place::new(table, address)))
+    };
     let joins: Vec<bool> = std::iter::once(false).chain(wanted.windows(2).map(joined)).collect();
 
     // best[n] is the cheapest way to read the first n values: its cost, its number of reads, and where the last read
@@ -83,7 +103,7 @@ pub(crate) fn plan_spans(wanted: &[ReadSpan], rules: ReadRules, readable: impl F
     while end > 0 {
         let (_, _, start) = best[end];
         let address = wanted[start].address;
-        spans.push(ReadSpan { address, count: last_of(&wanted[end - 1]) - address + 1 });
+        spans.push(ReadSpan { table, address, count: last_of(&wanted[end - 1]) - address + 1 });
         end = start;
     }
     spans.reverse();

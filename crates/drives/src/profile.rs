@@ -27,6 +27,7 @@ use crate::parts::setpoint::{Setpoint, SetpointRole};
 use crate::parts::state::{State, StateWord};
 use crate::parts::variant::Variant;
 use crate::parts::watchdog::Watchdog;
+use crate::place::{Place, Table};
 use crate::plan::{ReadRules, ReadSpan, plan_spans};
 use crate::profile::roles::Roles;
 
@@ -54,11 +55,11 @@ pub struct Profile {
     /// Registers first, then parameters, each in address order.
     pub(crate) entries: Vec<Entry>,
     /// Where in `entries` an address is.
-    pub(crate) by_address: BTreeMap<u16, usize>,
+    pub(crate) by_address: BTreeMap<Place, usize>,
     pub(crate) roles: Roles,
     pub(crate) identifications: Vec<Identification>,
     pub(crate) signature: Option<Signature>,
-    pub(crate) command_address: Option<u16>,
+    pub(crate) command_address: Option<Place>,
     pub(crate) commands: BTreeMap<Command, CommandCode>,
     /// Codes that the family defines and that have no name here.
     pub(crate) other_commands: BTreeMap<u16, String>,
@@ -66,7 +67,7 @@ pub struct Profile {
     pub(crate) commands_note: String,
     /// What comes before a word that runs or jogs.
     pub(crate) start_sequence: Vec<StartWord>,
-    pub(crate) moving: Vec<u16>,
+    pub(crate) moving: Vec<Place>,
     pub(crate) state: Option<StateWord>,
     pub(crate) control: Vec<Control>,
     pub(crate) setpoints: BTreeMap<Setpoint, SetpointRole>,
@@ -148,9 +149,9 @@ impl Profile {
         self.entries.iter()
     }
 
-    /// The entry that is read at `address`, or that is only written there.
-    pub fn entry_at(&self, address: u16) -> Option<&Entry> {
-        self.by_address.get(&address).and_then(|&index| self.entries.get(index))
+    /// The entry that is read at `place`, or that is only written there; an address alone is that of a holding register.
+    pub fn entry_at(&self, place: impl Into<Place>) -> Option<&Entry> {
+        self.by_address.get(&place.into()).and_then(|&index| self.entries.get(index))
     }
 
     /// The entry whose name or code is `name`, letter by letter.
@@ -167,8 +168,8 @@ impl Profile {
     /// # Errors
     ///
     /// [`AccessError::NoAddress`]: nobody knows where it is.
-    pub fn read_address(&self, entry: &Entry) -> Result<u16, AccessError> {
-        entry.address.ok_or_else(|| AccessError::NoAddress {
+    pub fn read_address(&self, entry: &Entry) -> Result<Place, AccessError> {
+        entry.place.ok_or_else(|| AccessError::NoAddress {
             name: entry.name.clone(),
             label: entry.label.clone(),
             note: entry.note.clone(),
@@ -181,7 +182,7 @@ impl Profile {
     ///
     /// [`AccessError`]: the entry can only be read, its address is not known, it is a register and EEPROM is asked for,
     /// or the family knows no write to RAM only.
-    pub fn write_address(&self, entry: &Entry, store: Store) -> Result<u16, AccessError> {
+    pub fn write_address(&self, entry: &Entry, store: Store) -> Result<Place, AccessError> {
         let (name, label) = (entry.name.clone(), entry.label.clone());
         let plain = self.read_address(entry)?;
         if entry.access == Access::Ro {
@@ -196,7 +197,7 @@ impl Profile {
         match (self.memory.as_ref().map(|memory| (memory.means, memory.mask())), store) {
             (None, Store::Ram) => Err(AccessError::NoRam { name, label }),
             (Some((MemoryBit::Ram, bit)), Store::Ram) | (Some((MemoryBit::Eeprom, bit)), Store::Eeprom) => {
-                Ok(plain | bit)
+                Ok(Place { address: plain.address | bit, ..plain })
             }
             (None | Some((MemoryBit::Ram, _)), Store::Eeprom) | (Some((MemoryBit::Eeprom, _)), Store::Ram) => Ok(plain),
         }
@@ -206,9 +207,9 @@ impl Profile {
     ///
     /// `None` where that would not tell: it cannot be read, or its write does something, so that something else may
     /// stand there afterwards.
-    pub fn read_back(&self, entry: &Entry) -> Option<u16> {
+    pub fn read_back(&self, entry: &Entry) -> Option<Place> {
         let acts = self.groups.acts.contains(&entry.name);
-        entry.address.filter(|&address| entry.access != Access::Wo && !acts && !self.is_command(address))
+        entry.place.filter(|&place| entry.access != Access::Wo && !acts && !self.is_command(place))
     }
 
     /// The bit of a parameter's address that is about memory, and not about where it is; 0 where there is none.
@@ -217,15 +218,23 @@ impl Profile {
     }
 
     /// The plain address behind one with the memory bit (000BH for 800BH), whether or not something is there. `None` if
-    /// `address` is no such address.
-    pub fn stored_address(&self, address: u16) -> Option<u16> {
-        (address & self.memory_mask() != 0).then_some(address & !self.memory_mask())
+    /// `place` is no such address.
+    pub fn stored_address(&self, place: impl Into<Place>) -> Option<u16> {
+        let Place { table, address } = place.into();
+        let has_bit = table == Table::Holding && address & self.memory_mask() != 0;
+        has_bit.then_some(address & !self.memory_mask())
     }
 
-    /// Whether `address`, or its plain form, is in a parameter group that the maker keeps closed.
-    pub fn is_closed(&self, address: u16) -> bool {
-        let [group, _] = (address & !self.memory_mask()).to_be_bytes();
-        self.groups.closed.contains(&group)
+    /// `place` without the memory bit.
+    fn plain(&self, place: Place) -> Place {
+        self.stored_address(place).map_or(place, Place::from)
+    }
+
+    /// Whether `place`, or its plain form, is in a parameter group that the maker keeps closed.
+    pub fn is_closed(&self, place: impl Into<Place>) -> bool {
+        let Place { table, address } = self.plain(place.into());
+        let [group, _] = address.to_be_bytes();
+        table == Table::Holding && self.groups.closed.contains(&group)
     }
 
     /// The groups in which a code is its own address: P05.06 is at 0506H. Empty where the profile lists the addresses.
@@ -238,7 +247,8 @@ impl Profile {
     /// Whether `group` is one of them.
     pub(crate) fn is_parameter_group(&self, group: u8) -> bool {
         let is_register = |entry: &Entry| {
-            entry.kind == Kind::Register && entry.address.is_some_and(|address| address.to_be_bytes()[0] == group)
+            let is_there = |place: Place| place.table == Table::Holding && place.address.to_be_bytes()[0] == group;
+            entry.kind == Kind::Register && entry.place.is_some_and(is_there)
         };
         group <= LAST_NUMBER
             && !self.groups.listed
@@ -261,10 +271,15 @@ impl Profile {
         self.signature.as_ref()
     }
 
-    /// Address and word of a command, whether or not it is verified; `None` if the family has no such command.
-    pub fn command(&self, command: Command) -> Option<(u16, u16)> {
+    /// Place and word of a command, whether or not it is verified; `None` if the family has no such command.
+    pub fn command(&self, command: Command) -> Option<(Place, u16)> {
         let known = self.commands.get(&command)?;
         Some((known.elsewhere.or(self.command_address)?, known.code))
+    }
+
+    /// Place and word of what is written before a command, where one word does not say which way the motor turns.
+    pub fn command_first(&self, command: Command) -> Option<(Place, u16)> {
+        self.commands.get(&command)?.first
     }
 
     /// The commands of the family, with their words.
@@ -275,7 +290,9 @@ impl Profile {
     /// Every word that the family defines at its command register, and what it means.
     pub fn command_codes(&self) -> BTreeMap<u16, &str> {
         let here = self.commands.iter().filter(|(_, known)| known.elsewhere.is_none());
-        let named = here.map(|(command, known)| (known.code, command.name()));
+        // Two that another word tells apart share theirs, and the row has both names.
+        let label = |code| self.entry_at(self.command_address?)?.quantity.choices.get(&code).map(String::as_str);
+        let named = here.map(|(command, known)| (known.code, label(known.code).unwrap_or(command.name())));
         let others = self.other_commands.iter().map(|(&code, label)| (code, label.as_str()));
         // A word of the sequence that stops as well is called a stop.
         let sequence = self.start_sequence.iter().map(|step| (step.word, step.label.as_str()));
@@ -289,12 +306,12 @@ impl Profile {
     }
 
     /// Every register that takes commands, with the words that the family defines there and what they mean.
-    pub fn command_registers(&self) -> BTreeMap<u16, BTreeMap<u16, &str>> {
-        let mut registers: BTreeMap<u16, BTreeMap<u16, &str>> = BTreeMap::new();
+    pub fn command_registers(&self) -> BTreeMap<Place, BTreeMap<u16, &str>> {
+        let mut registers: BTreeMap<Place, BTreeMap<u16, &str>> = BTreeMap::new();
         registers.extend(self.command_address.map(|address| (address, self.command_codes())));
         for (command, known) in &self.commands {
             if let Some(address) = known.elsewhere {
-                registers.entry(address).or_default().insert(known.code, command.name());
+                registers.entry(address).or_default().entry(known.code).or_insert(command.name());
             }
         }
         registers
@@ -306,14 +323,14 @@ impl Profile {
     }
 
     /// Where commands are written.
-    pub fn command_address(&self) -> Option<u16> {
+    pub fn command_address(&self) -> Option<Place> {
         self.command_address
     }
 
-    /// Whether a write to `address` can start a motor or put current into it. Setpoints cannot: they change the speed of
+    /// Whether a write to `place` can start a motor or put current into it. Setpoints cannot: they change the speed of
     /// a motor that runs already.
-    pub fn is_command(&self, address: u16) -> bool {
-        self.moving.contains(&(address & !self.memory_mask()))
+    pub fn is_command(&self, place: impl Into<Place>) -> bool {
+        self.moving.contains(&self.plain(place.into()))
     }
 
     /// How the family says what its motor does, where that is known.
@@ -431,15 +448,17 @@ impl Profile {
             if entry.access == Access::Wo {
                 return Err(AccessError::WriteOnly { name: entry.name.clone(), label: entry.label.clone() });
             }
-            let span = ReadSpan { address: self.read_address(entry)?, count: entry.words() };
+            let Place { table, address } = self.read_address(entry)?;
+            let span = ReadSpan { table, address, count: entry.words() };
             // Whether there is such a parameter is not known, and a drive refuses a read as a whole.
             if entry.is_listed() { &mut wanted } else { &mut alone }.push(span);
         }
         // The second word of a wide entry is nobody's own.
-        let covers = |address: u16| {
-            let (_, &index) = self.by_address.range(..=address).next_back()?;
+        let covers = |place: Place| {
+            let (first, &index) = self.by_address.range(..=place).next_back()?;
             self.entries.get(index).filter(|entry| {
-                entry.address.is_some_and(|first| u32::from(address) < u32::from(first) + u32::from(entry.words()))
+                first.table == place.table
+                    && u32::from(place.address) < u32::from(first.address) + u32::from(entry.words())
             })
         };
         let rules = ReadRules {
@@ -447,7 +466,7 @@ impl Profile {
             across_groups: self.requests.across_groups,
             cost: self.serial.as_ref().map_or(USUAL_READ_COST, SerialDefaults::read_cost),
         };
-        let mut reads = plan_spans(&wanted, rules, |address| covers(address).is_some_and(Entry::is_known_readable));
+        let mut reads = plan_spans(&wanted, rules, |place| covers(place).is_some_and(Entry::is_known_readable));
         reads.extend(alone);
         reads.sort_unstable();
         reads.dedup();

@@ -128,10 +128,10 @@ until = { ready = 1, on = 1, fault = 0 }
 fn a_word_is_made_of_its_bits_and_those_that_nobody_names_are_0() {
     let profile = Folder::new("words", "", CODES, "", STATE).load().unwrap();
     let word = |command| profile.command(command).unwrap();
-    assert_eq!(word(Command::RunForward), (0x2000, 0x000F));
-    assert_eq!(word(Command::RunReverse), (0x2000, 0x080F));
-    assert_eq!(word(Command::Stop), (0x2000, 0x0007));
-    assert_eq!(word(Command::Coast), (0x2000, 0x0000));
+    assert_eq!(word(Command::RunForward), (0x2000.into(), 0x000F));
+    assert_eq!(word(Command::RunReverse), (0x2000.into(), 0x080F));
+    assert_eq!(word(Command::Stop), (0x2000.into(), 0x0007));
+    assert_eq!(word(Command::Coast), (0x2000.into(), 0x0000));
     assert_eq!(profile.command_of(0x080F), Some(Command::RunReverse));
     assert_eq!(profile.find("control").unwrap().quantity().choices()[&0x080F], "run_reverse");
     assert!(profile.start_sequence().is_empty());
@@ -153,7 +153,7 @@ fn a_base_says_what_each_word_of_bits_has_and_a_number_is_whole_by_itself() {
     }
     // A field of the word itself goes over the base.
     let over = Folder::new("over", "base = { mode = 5 }", "stop = { mode = 2 }", "", STATE).load().unwrap();
-    assert_eq!(over.command(Command::Stop), Some((0x2000, 0x0020)));
+    assert_eq!(over.command(Command::Stop), Some((0x2000.into(), 0x0020)));
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn a_sequence_is_kept_in_its_order_with_what_it_waits_for() {
     let codes = profile.command_codes();
     assert_eq!(codes.keys().copied().collect::<Vec<_>>(), [0x0000, 0x0006, 0x0007, 0x000F, 0x080F]);
     assert_eq!((codes[&6], codes[&7]), ("shutdown", "stop"));
-    assert_eq!(profile.command_registers()[&0x2000], codes);
+    assert_eq!(profile.command_registers()[&0x2000.into()], codes);
     assert_eq!(profile.command_of(6), None);
     assert_eq!(profile.state(0x8037), State::Reverse);
 }

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use drivebus_drives::{Command, Entry, Evidence, Input, Profile, Store, UnitKind, Value};
+use drivebus_drives::{Command, Entry, Evidence, Input, Place, Profile, Store, UnitKind, Value};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -36,12 +36,12 @@ struct Family {
 #[derive(Deserialize, Clone)]
 #[serde(untagged)]
 enum Word {
-    Is(u16),
+    Is(u32),
     None(String),
 }
 
 impl Word {
-    fn get(&self) -> Option<u16> {
+    fn get(&self) -> Option<u32> {
         match self {
             Self::Is(word) => Some(*word),
             Self::None(text) => {
@@ -59,12 +59,15 @@ struct Commands {
     needs_unverified: Vec<String>,
     /// Commands that another register takes.
     #[serde(default)]
-    elsewhere: BTreeMap<String, u16>,
+    elsewhere: BTreeMap<String, u32>,
+    /// What is written before a command: where, and the word.
+    #[serde(default)]
+    first: BTreeMap<String, (u32, u16)>,
     /// Words that come before a run.
     #[serde(default)]
     sequence: Vec<u16>,
     other: BTreeMap<String, String>,
-    moves: Vec<u16>,
+    moves: Vec<u32>,
     #[serde(flatten)]
     codes: BTreeMap<String, Word>,
 }
@@ -129,7 +132,7 @@ fn the_table_has_every_family_and_every_command() {
     let names: Vec<String> = document().family.into_iter().map(|family| family.name).collect();
     let listed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     assert_eq!(listed, Profile::builtin_names().collect());
-    assert_eq!((names.len(), listed.len()), (24, 24));
+    assert_eq!((names.len(), listed.len()), (25, 25));
     for (family, profile) in families() {
         let commands: BTreeSet<&str> = family.commands.codes.keys().map(String::as_str).collect();
         assert_eq!(commands, Command::ALL.map(Command::name).into(), "{}", family.name);
@@ -143,13 +146,16 @@ fn the_table_has_every_family_and_every_command() {
 fn every_command_of_every_family_is_that_of_the_table() {
     for (family, profile) in families() {
         let (name, table) = (&family.name, &family.commands);
-        assert_eq!(profile.command_address(), table.register.get(), "{name}");
+        assert_eq!(profile.command_address().map(Place::number), table.register.get(), "{name}");
         let mut defined: BTreeSet<u16> = BTreeSet::new();
         for command in Command::ALL {
-            let code = table.codes[command.name()].get();
+            let code = table.codes[command.name()].get().map(|code| u16::try_from(code).unwrap());
             let elsewhere = table.elsewhere.get(command.name()).copied();
             let expected = code.map(|code| (elsewhere.or(table.register.get()).unwrap(), code));
-            assert_eq!(profile.command(command), expected, "{name} {}", command.name());
+            let known = profile.command(command).map(|(place, code)| (place.number(), code));
+            assert_eq!(known, expected, "{name} {}", command.name());
+            let before = profile.command_first(command).map(|(place, code)| (place.number(), code));
+            assert_eq!(before, table.first.get(command.name()).copied(), "{name} {}", command.name());
             let in_doubt = profile.command_reason(command).is_some();
             assert_eq!(
                 in_doubt,
@@ -157,7 +163,10 @@ fn every_command_of_every_family_is_that_of_the_table() {
                 "{name} {command:?}"
             );
             if let (Some(code), None) = (code, elsewhere) {
-                assert_eq!(profile.command_of(code), Some(command), "{name} {code}");
+                // Two that another word tells apart have one word.
+                let shares = |other: &Command| table.first.contains_key(other.name());
+                let named = Command::ALL.into_iter().find(shares).filter(|_| shares(&command)).unwrap_or(command);
+                assert_eq!(profile.command_of(code), Some(named), "{name} {code}");
                 defined.insert(code);
             }
         }
@@ -169,8 +178,9 @@ fn every_command_of_every_family_is_that_of_the_table() {
         let sequence: Vec<u16> = profile.start_sequence().iter().map(|step| step.word).collect();
         assert_eq!(sequence, table.sequence, "{name}");
         assert_eq!(profile.command_codes().keys().copied().collect::<BTreeSet<u16>>(), defined, "{name}");
-        let is_plain = |address: &u16| profile.stored_address(*address).is_none();
-        let moving: Vec<u16> = (0..=u16::MAX).filter(is_plain).filter(|&address| profile.is_command(address)).collect();
+        let is_plain = |place: &Place| profile.stored_address(*place).is_none();
+        let places = (0..0x5_0000).filter_map(Place::of_number).filter(is_plain);
+        let moving: Vec<u32> = places.filter(|&place| profile.is_command(place)).map(Place::number).collect();
         assert_eq!(moving, table.moves, "{name}");
     }
 }
@@ -212,8 +222,8 @@ fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
         };
         let entry = profile.find(&table.parameter).unwrap();
         let ram = profile.write_address(entry, Store::Ram);
-        assert_eq!(ram.as_ref().ok().copied(), table.ram.get(), "{}: {ram:?}", family.name);
-        let eeprom = profile.write_address(entry, Store::Eeprom).ok();
+        assert_eq!(ram.as_ref().ok().copied().map(Place::number), table.ram.get(), "{}: {ram:?}", family.name);
+        let eeprom = profile.write_address(entry, Store::Eeprom).ok().map(Place::number);
         assert_eq!(eeprom, table.eeprom.get(), "{}: {}", family.name, table.source);
         let in_doubt = profile.memory().is_some_and(|memory| !memory.verified);
         assert_eq!(in_doubt, table.needs_unverified, "{}", family.name);
@@ -226,8 +236,8 @@ fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
 fn the_memory_bit_is_never_set_on_a_register() {
     for (family, profile) in families() {
         for entry in profile.entries().filter(|entry| entry.code().is_none()) {
-            if let Ok(address) = profile.write_address(entry, Store::Ram) {
-                assert_eq!(Some(address), entry.address(), "{} {}", family.name, entry.name());
+            if let Ok(place) = profile.write_address(entry, Store::Ram) {
+                assert_eq!(Some(place), entry.place(), "{} {}", family.name, entry.name());
             }
             assert!(profile.write_address(entry, Store::Eeprom).is_err(), "{} {}", family.name, entry.name());
         }

@@ -209,7 +209,7 @@ fn commands_and_states_are_those_of_section_9_4_5() {
         (Command::ResetFault, 7),
         (Command::JogStop, 8),
     ] {
-        assert_eq!(profile.command(command), Some((0x2000, code)));
+        assert_eq!(profile.command(command), Some((0x2000.into(), code)));
         assert_eq!(profile.command_of(code), Some(command));
         assert_eq!(command.name().parse(), Ok(command));
         assert_eq!(profile.find("control_command").unwrap().encode(command.name()), Ok(code));
@@ -267,12 +267,12 @@ fn rules_are_those_of_the_manual() {
     assert_eq!((serial.unit, serial.bits_per_char(), serial.verified), (Some(1), 11, false));
 
     let acceleration = profile.find("P00.11").unwrap();
-    assert_eq!(profile.write_address(acceleration, Store::Ram), Ok(0x800B));
-    assert_eq!(profile.write_address(acceleration, Store::Eeprom), Ok(0x000B));
+    assert_eq!(profile.write_address(acceleration, Store::Ram), Ok(0x800B.into()));
+    assert_eq!(profile.write_address(acceleration, Store::Eeprom), Ok(0x000B.into()));
     assert_eq!(profile.stored_address(0x8007), Some(0x0007));
     assert_eq!(profile.stored_address(0x0007), None);
     let setpoint = profile.find("set_frequency").unwrap();
-    assert_eq!(profile.write_address(setpoint, Store::Ram), Ok(0x2001));
+    assert_eq!(profile.write_address(setpoint, Store::Ram), Ok(0x2001.into()));
     let refused = profile.write_address(setpoint, Store::Eeprom).unwrap_err().to_string();
     assert!(refused.contains("set_frequency") && refused.contains("EEPROM"), "{refused}");
     let current = profile.find("output_current").unwrap();
@@ -360,8 +360,8 @@ fn the_watchdog_is_p14_04_and_p14_05() {
 fn what_acts_cannot_be_read_back() {
     let profile = gd350();
     let read_back = |name| profile.read_back(profile.find(name).unwrap());
-    assert_eq!(read_back("P00.11"), Some(0x000B));
-    assert_eq!(read_back("set_frequency"), Some(0x2001));
+    assert_eq!(read_back("P00.11"), Some(0x000B.into()));
+    assert_eq!(read_back("set_frequency"), Some(0x2001.into()));
     for name in ["P00.15", "P07.00", "control_command", "virtual_input"] {
         assert_eq!(read_back(name), None, "{name}");
     }

@@ -85,7 +85,7 @@ fn each_row_says_its_own_address() {
     }
     let acceleration = profile.find("0200H").unwrap();
     assert_eq!((acceleration.code(), acceleration.encode(2.5)), (Some("C1-01"), Ok(25)));
-    assert_eq!(profile.write_address(acceleration, Store::Ram), Ok(0x8200));
+    assert_eq!(profile.write_address(acceleration, Store::Ram), Ok(0x8200.into()));
     let group =
         |entries: Vec<&drivebus_drives::Entry>| entries.iter().map(|entry| entry.name()).collect::<Vec<_>>().join(" ");
     assert_eq!(group(profile.serial_parameters().collect()), "H5-01");

@@ -106,13 +106,13 @@ fn a_sister_family_is_trusted_as_far_as_its_own_documents_go() {
     assert!(current.note().starts_with("The leaflet calls it compatible with the GD350."), "{}", current.note());
     assert!(profile.find("rev_upper_frequency").is_err());
 
-    assert_eq!(profile.command(Command::Stop), Some((0x2000, 5)));
+    assert_eq!(profile.command(Command::Stop), Some((0x2000.into(), 5)));
     assert_eq!(profile.command_reason(Command::Stop), Some("The leaflet calls it compatible with the GD350."));
     assert!(!profile.state_word().unwrap().verified);
     assert_eq!(profile.state(3), State::Stopped);
     assert!(profile.control().iter().all(|item| !item.verified));
     assert!(profile.memory().unwrap().verified, "it is confirmed");
-    assert_eq!(profile.write_address(profile.find("P00.11").unwrap(), Store::Ram), Ok(0x800B));
+    assert_eq!(profile.write_address(profile.find("P00.11").unwrap(), Store::Ram), Ok(0x800B.into()));
     assert_eq!((profile.identifications(), profile.family()), ([].as_slice(), "gd999"));
     assert_eq!(profile.reports_as(), ["gd999", "gd350"], "it lists no code of its own");
 
@@ -259,7 +259,7 @@ fn a_row_keeps_the_roles_of_the_one_in_whose_place_it_stands() {
     assert_eq!(profile.state(8), State::Fault);
     assert_eq!(profile.find("status").unwrap().bits().len(), 1);
     assert_eq!(profile.find("control_command").unwrap().quantity().choices().len(), 2);
-    assert_eq!(profile.command_address(), Some(0x7100));
+    assert_eq!(profile.command_address(), Some(0x7100.into()));
     assert!(profile.is_command(0x7100) && !profile.is_command(0x7000), "the old place is no command register any more");
     assert!(profile.last_parameters().map(drivebus_drives::Entry::name).eq(["P06.02"]));
 }
@@ -280,7 +280,7 @@ fn two_rows_that_changed_places_keep_each_its_own_role() {
     let rows = "0x2001,control_command,x,,1,no,,,1,8,,rw,yes,,x\n0x2000,set_frequency,x,Hz,100,no,,,,,,rw,yes,,x\n\
                 0x2110,status_word_1,x,,1,no,,,,,,ro,yes,,x\n0x2100,oil,x,,1,no,,,,,,ro,yes,,x\n";
     let profile = over("places", "gd350", "", rows, "").load().unwrap();
-    assert_eq!(profile.command(Command::Stop), Some((0x2001, 5)));
+    assert_eq!(profile.command(Command::Stop), Some((0x2001.into(), 5)));
     assert!(profile.is_command(0x2001) && !profile.is_command(0x2000));
     assert_eq!(profile.role("setpoints.frequency").unwrap().address(), Some(0x2000));
     assert_eq!(profile.role("state").unwrap().address(), Some(0x2110));
@@ -409,15 +409,15 @@ fn a_command_can_stand_in_another_register() {
     };
     let both = r#""control_command", "fault_reset""#;
     let profile = files("fault_reset", both, "").load().unwrap();
-    assert_eq!(profile.command(Command::Stop), Some((0x2000, 1)));
-    assert_eq!(profile.command(Command::ResetFault), Some((0x2002, 2)));
+    assert_eq!(profile.command(Command::Stop), Some((0x2000.into(), 1)));
+    assert_eq!(profile.command(Command::ResetFault), Some((0x2002.into(), 2)));
     assert!(profile.is_command(0x2002));
     // 2 means nothing at 2000H, and 1 nothing at 2002H.
     assert_eq!((profile.command_of(1), profile.command_of(2)), (Some(Command::Stop), None));
     let registers = profile.command_registers();
-    assert_eq!(registers.keys().copied().collect::<Vec<_>>(), [0x2000, 0x2002]);
-    assert_eq!(registers[&0x2000].keys().copied().collect::<Vec<_>>(), [1, 18]);
-    assert_eq!(registers[&0x2002], [(2, "reset_fault")].into());
+    assert_eq!(registers.keys().copied().collect::<Vec<_>>(), [0x2000.into(), 0x2002.into()]);
+    assert_eq!(registers[&0x2000.into()].keys().copied().collect::<Vec<_>>(), [1, 18]);
+    assert_eq!(registers[&0x2002.into()], [(2, "reset_fault")].into());
 
     let wrong = |reset: &str, moves: &str, rest: &str, says: &str| {
         let reasons = files(reset, moves, rest).reasons();

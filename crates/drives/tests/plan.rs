@@ -1,7 +1,7 @@
 //! The planner against a search through every possible plan.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use drivebus_drives::{Access, Entry, Profile, ReadCost, ReadSpan, plan_reads};
+use drivebus_drives::{Access, Entry, Profile, ReadCost, ReadSpan, Table, plan_reads};
 use proptest::prelude::*;
 
 /// The least cost and, at that cost, the fewest reads that cover `wanted`, by trying every read that could cover the
@@ -33,7 +33,7 @@ fn check(wanted: u16, readable: u16, max_words: u16, cost: ReadCost) {
     let plan = plan_reads(&addresses(wanted), max_words, cost, |address| readable & (1 << address) != 0);
     let mut covered = 0_u16;
     let mut total = 0;
-    for ReadSpan { address, count } in &plan {
+    for ReadSpan { address, count, .. } in &plan {
         assert!((1..=max_words).contains(count));
         for word in *address..address + count {
             assert_eq!(covered & (1 << word), 0, "{word} is read twice");
@@ -82,7 +82,13 @@ proptest! {
 fn the_ends_of_the_address_space_are_reached() {
     let cost = ReadCost { request: 316, word: 22 };
     let plan = plan_reads(&[0xFFFF, 0xFFF0, 0x0000], 16, cost, |_| true);
-    assert_eq!(plan, [ReadSpan { address: 0, count: 1 }, ReadSpan { address: 0xFFF0, count: 16 }]);
+    assert_eq!(
+        plan,
+        [
+            ReadSpan { table: Table::Holding, address: 0, count: 1 },
+            ReadSpan { table: Table::Holding, address: 0xFFF0, count: 16 }
+        ]
+    );
 }
 
 #[test]

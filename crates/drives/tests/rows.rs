@@ -43,11 +43,11 @@ fn place(row: &Row) -> (String, u16) {
 }
 
 /// The rows of `family`: those of the family that it extends, under its own.
-fn rows(family: &str) -> BTreeMap<u16, Row> {
+fn rows(family: &str) -> BTreeMap<(String, u16), Row> {
     let manifest = std::fs::read_to_string(folder(family).join("profile.toml")).unwrap();
-    let own = |family: &str| -> BTreeMap<u16, Row> {
+    let own = |family: &str| -> BTreeMap<(String, u16), Row> {
         let all = ["registers.csv", "parameters.csv"].into_iter().flat_map(|file| table(family, file));
-        all.map(|row| (place(&row).1, row)).collect()
+        all.map(|row| ((cell(&row, "table").to_owned(), place(&row).1), row)).collect()
     };
     let mut rows = if manifest.contains("\n[extends]\n") { own("gd350") } else { BTreeMap::new() };
     let manifest: toml::Table = manifest.parse().unwrap();
@@ -119,8 +119,13 @@ impl Numbers {
 
     fn of(row: &Row) -> Self {
         let signed = cell(row, "signed") == "yes";
+        // A bit is 0 or 1, and its row says so by its table.
+        let (low, high) = match cell(row, "table") {
+            "coil" | "discrete" => ("0", "1"),
+            _ => (cell(row, "low"), cell(row, "high")),
+        };
         let high_first = cell(row, "order") == "high first";
-        let numbers = Self::new(cell(row, "scale"), signed, cell(row, "words"), cell(row, "low"), cell(row, "high"));
+        let numbers = Self::new(cell(row, "scale"), signed, cell(row, "words"), low, high);
         Self { high_first, ..numbers }
     }
 
@@ -173,7 +178,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         let rows = rows(family);
         assert_eq!(profile.entries().count(), rows.len(), "{family}");
         let mut checked = 0;
-        for (address, row) in rows {
+        for ((_, address), row) in rows {
             let (name, _) = place(&row);
             let entry = profile.find(&name).unwrap();
             assert_eq!(entry.address(), Some(address), "{family} {name}");
@@ -189,6 +194,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("acs355", 9),
         ("atv312", 26),
         ("chf100a", 27),
+        ("wj200", 14),
         ("chv100", 24),
         ("eds300", 16),
         ("fc51", 23),

@@ -106,10 +106,10 @@ fn what_is_read_there_and_what_is_written_there_are_two_rows() {
     assert_eq!(profile.find("0008H").unwrap().name(), "status", "an address is what is read there");
     assert_eq!((order.access(), status.access()), (Access::Wo, Access::Ro));
 
-    assert_eq!(profile.command(Command::RunForward), Some((0x0008, 2)));
+    assert_eq!(profile.command(Command::RunForward), Some((0x0008.into(), 2)));
     assert_eq!((profile.is_command(0x0008), profile.command_reason(Command::Stop)), (true, None));
     assert_eq!((profile.state(3), profile.state_word().unwrap().register.as_str()), (State::Forward, "status"));
-    assert_eq!(profile.write_address(order, Store::Ram), Ok(0x0008));
+    assert_eq!(profile.write_address(order, Store::Ram), Ok(0x0008.into()));
     assert!(matches!(profile.write_address(status, Store::Ram), Err(AccessError::ReadOnly { .. })));
     // A command that could be read back would be the state.
     assert_eq!(profile.read_back(order), None);
@@ -152,11 +152,11 @@ fn a_row_of_an_overlay_takes_the_place_of_the_one_that_goes_its_way() {
     let read = base().under("", &row("state_word", "ro"));
     assert_eq!(names_at(&read, 0x0008), ("state_word", "order"));
     assert_eq!(read.state_word().unwrap().register, "state_word");
-    assert_eq!(read.command(Command::RunForward), Some((0x0008, 2)));
+    assert_eq!(read.command(Command::RunForward), Some((0x0008.into(), 2)));
 
     let written = base().under("", &row("new_order", "wo"));
     assert_eq!(names_at(&written, 0x0008), ("status", "new_order"));
-    assert_eq!((written.command(Command::Stop), written.is_command(0x0008)), (Some((0x0008, 0)), true));
+    assert_eq!((written.command(Command::Stop), written.is_command(0x0008)), (Some((0x0008.into(), 0)), true));
 
     // One that goes both ways leaves no room for either.
     let both = base().under("", &row("status", "rw"));
@@ -168,10 +168,10 @@ fn a_row_of_an_overlay_takes_the_place_of_the_one_that_goes_its_way() {
 fn where_the_state_moves_to_the_commands_do_not_follow() {
     let moved = Folder::new("moved", TOML, ROWS).under("", "0x0030,status,State,,1,no,,,,,ro,yes,,p. 90\n");
     assert_eq!(moved.find("status").unwrap().address(), Some(0x0030));
-    assert_eq!((moved.command(Command::RunForward), moved.is_command(0x0008)), (Some((0x0008, 2)), true));
+    assert_eq!((moved.command(Command::RunForward), moved.is_command(0x0008)), (Some((0x0008.into(), 2)), true));
     assert!(!moved.is_command(0x0030));
     let order = Folder::new("order", TOML, ROWS).under("", "0x0031,order,Command,,1,no,,0,7,,wo,yes,,p. 90\n");
-    assert_eq!((order.command(Command::RunForward), order.is_command(0x0031)), (Some((0x0031, 2)), true));
+    assert_eq!((order.command(Command::RunForward), order.is_command(0x0031)), (Some((0x0031.into(), 2)), true));
     assert_eq!((order.state_word().unwrap().register.as_str(), order.is_command(0x0008)), ("status", false));
 }
 
@@ -180,7 +180,7 @@ fn what_is_dropped_takes_only_its_own_way_with_it() {
     let no_state = Folder::new("no-state", TOML, ROWS).under("drop = [\"status\"]", "");
     assert_eq!(names_at(&no_state, 0x0008), ("order", "order"));
     assert!(no_state.state_word().is_none());
-    assert_eq!((no_state.command(Command::RunForward), no_state.is_command(0x0008)), (Some((0x0008, 2)), true));
+    assert_eq!((no_state.command(Command::RunForward), no_state.is_command(0x0008)), (Some((0x0008.into(), 2)), true));
     let no_order = Folder::new("no-order", TOML, ROWS).under("drop = [\"order\"]", "");
     assert_eq!(names_at(&no_order, 0x0008), ("status", "status"));
     assert_eq!((no_order.command(Command::RunForward), no_order.is_command(0x0008)), (None, false));

@@ -38,9 +38,9 @@ fn it_is_written_by_the_rule_of_its_family() {
         (profile.write_address(&entry, Store::Ram).ok(), profile.write_address(&entry, Store::Eeprom).ok())
     };
     // Opposite rules: bit 15 means RAM only here, and EEPROM there.
-    assert_eq!(places("gd350", "P05.01"), (Some(0x8501), Some(0x0501)));
-    assert_eq!(places("vfd500", "P05.01"), (Some(0x0501), Some(0x8501)));
-    assert_eq!(places("gd3000", "P05.01"), (None, Some(0x0501)));
+    assert_eq!(places("gd350", "P05.01"), (Some(0x8501.into()), Some(0x0501.into())));
+    assert_eq!(places("vfd500", "P05.01"), (Some(0x0501.into()), Some(0x8501.into())));
+    assert_eq!(places("gd3000", "P05.01"), (None, Some(0x0501.into())));
     // Nobody knows where this family takes its commands: P16.00 might be a start.
     assert_eq!(places("chv100", "P16.00"), (None, None));
     assert_eq!(Profile::builtin("chv100").unwrap().resolve("P16.00").unwrap().address(), Some(0x1000));

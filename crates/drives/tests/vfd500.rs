@@ -165,7 +165,10 @@ fn rules_are_those_of_the_manual() {
     // No fault of another family is lent.
     assert_eq!(profile.fault(39).label, "Unknown fault 39");
     let signature = profile.signature().unwrap();
-    assert_eq!((&*signature.answers, &*signature.refuses), ([0x1900, 0x1E0E].as_slice(), [0x2103].as_slice()));
+    assert_eq!(
+        (&*signature.answers, &*signature.refuses),
+        ([0x1900.into(), 0x1E0E.into()].as_slice(), [0x2103.into()].as_slice())
+    );
     // A read must not run from one group into the next: r25.00 and r27.00 are two reads, P30.01 to P30.05 are one.
     let plan = |names: &[&str]| {
         let entries: Vec<_> = names.iter().map(|name| profile.find(name).unwrap()).collect();

@@ -5,7 +5,7 @@ pub(crate) mod kind;
 use std::fmt;
 use std::time::Duration;
 
-use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request};
+use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request, Table};
 
 use crate::error::kind::ErrorKind;
 use crate::line::PortError;
@@ -65,8 +65,14 @@ struct Asked<'a>(Request<'a>);
 impl fmt::Display for Asked<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Request::ReadHolding { address, count: 1, .. } => write!(f, "read {address:04X}H"),
-            Request::ReadHolding { address, count, .. } => write!(f, "read {count} words from {address:04X}H"),
+            Request::Read { table: Table::Holding, address, count: 1, .. } => write!(f, "read {address:04X}H"),
+            Request::Read { table, address, count: 1, .. } => write!(f, "read {} {address:04X}H", table.one()),
+            Request::Read { table, address, count, .. } => {
+                write!(f, "read {count} {} from {address:04X}H", table.many())
+            }
+            Request::WriteCoil { address, on, .. } => {
+                write!(f, "write {} to coil {address:04X}H", if on { "on" } else { "off" })
+            }
             Request::WriteSingle { address, value, .. } => write!(f, "write {value} ({value:04X}H) to {address:04X}H"),
             Request::WriteMultiple { address, words, .. } => {
                 write!(f, "write {} words from {address:04X}H", words.len())

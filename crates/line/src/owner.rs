@@ -323,7 +323,7 @@ impl Owner {
             None => Err(ask.failed(Failure::Closed, None, None, &[])),
         };
         let delay = result.as_ref().ok().map(|done| self.delay(ask, done));
-        if let (Some(unit), Some(delay), Request::ReadHolding { .. }) = (unit, delay, ask.request) {
+        if let (Some(unit), Some(delay), Request::Read { .. }) = (unit, delay, ask.request) {
             self.delays.answered(unit, delay);
         } else if let (Some(unit), true, Err(error)) = (unit, ask.learns, &result)
             && matches!(error.failure, Failure::NoAnswer { .. })
@@ -382,7 +382,7 @@ impl Owner {
     /// The time-out that the unit's answers have taught, if that is to hold for `ask` and is shorter than its own.
     fn patience(&self, ask: &Ask<'_>) -> Duration {
         match (ask.destination, ask.request) {
-            (Destination::Unit(unit), Request::ReadHolding { .. }) if ask.learns => {
+            (Destination::Unit(unit), Request::Read { .. }) if ask.learns => {
                 let learned = self.delays.patience(unit).map(|patience| patience + self.answer_time(ask));
                 learned.map_or(ask.timeout, |learned| learned.min(ask.timeout))
             }

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use drivebus_line::{AdapterEcho, BusOptions, CallOptions, Failure, Opener, PortKey, Share};
-use drivebus_rtu::Request;
+use drivebus_rtu::{Request, Table};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::convert::one_word;
+use crate::convert::{one_word, table_of};
 use crate::errors::{not_allowed, port_error, refuse};
 use crate::format::SerialFormat;
 use crate::open;
@@ -45,15 +45,25 @@ pub(crate) fn open_failed(failure: Failure) -> PyErr {
     }
 }
 
-pub(crate) fn read_request(address: &Bound<'_, PyAny>, count: &Bound<'_, PyAny>) -> PyResult<Request<'static>> {
-    Request::read(one_word("address", address)?, one_word("count", count)?).map_err(refuse)
+pub(crate) fn read_request(
+    table: &str,
+    address: &Bound<'_, PyAny>,
+    count: &Bound<'_, PyAny>,
+) -> PyResult<Request<'static>> {
+    let (address, count) = (one_word("address", address)?, one_word("count", count)?);
+    Request::read_of(table_of(table)?, address, count).map_err(refuse)
 }
 
-/// `words`: a sequence of them, or else one.
-pub(crate) fn write_request(address: u16, words: &Result<Vec<u16>, u16>) -> PyResult<Request<'_>> {
-    match words {
-        Err(word) => Ok(Request::write(address, *word)),
-        Ok(words) => Request::write_many(address, words).map_err(refuse),
+/// `words`: a sequence of them, or else one; of a coil 0 or 1.
+pub(crate) fn write_request<'a>(table: &str, address: u16, words: &'a Result<Vec<u16>, u16>) -> PyResult<Request<'a>> {
+    match (table_of(table)?, words) {
+        (Table::Holding, Err(word)) => Ok(Request::write(address, *word)),
+        (Table::Holding, Ok(words)) => Request::write_many(address, words).map_err(refuse),
+        (Table::Coil, Err(word @ (0 | 1))) => Ok(Request::write_coil(address, *word == 1)),
+        (Table::Coil, _) => Err(not_allowed("a coil is written as 0 or 1, one at a time".to_owned())),
+        (Table::Input | Table::Discrete, _) => {
+            Err(not_allowed(format!("table {table:?} can only be read; holding and coil can be written")))
+        }
     }
 }
 

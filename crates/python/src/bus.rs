@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use drivebus_line::{
     Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind, UnitOptions,
 };
-use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ, Request};
+use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ_BITS, Request, Table};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -18,6 +18,9 @@ use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
 use crate::{overhear, trace};
+
+/// The table that is meant where nothing is said.
+pub(crate) const HOLDING: &str = Table::Holding.name();
 
 /// One line and its owner.
 #[pyclass(frozen, weakref, module = "drivebus._native")]
@@ -121,7 +124,8 @@ impl Bus {
         overhear::overhear(py, &self.core, function.as_unbound())
     }
 
-    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
+    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false,
+        table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn read<'py>(
         &self,
@@ -132,12 +136,13 @@ impl Bus {
         retries: Option<u32>,
         urgent: bool,
         verify: bool,
+        table: &str,
     ) -> PyResult<Bound<'py, PyList>> {
         let options = read_options(timeout, retries, verify)?;
-        Ok(self.read_words(unit, address, count, options, urgent)?.0)
+        Ok(self.read_words(unit, table, address, count, options, urgent)?.0)
     }
 
-    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
+    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false, table = "holding"))]
     fn read_stamped<'py>(
         &self,
         unit: &Bound<'py, PyAny>,
@@ -145,14 +150,17 @@ impl Bus {
         count: &Bound<'_, PyAny>,
         urgent: bool,
         verify: bool,
+        table: &str,
     ) -> PyResult<(Bound<'py, PyList>, f64, f64)> {
         let options = read_options(None, None, verify)?;
-        let (words, done) = self.read_words(unit, address, count, options, urgent)?;
+        let (words, done) = self.read_words(unit, table, address, count, options, urgent)?;
         let clock = self.unix_clock(unit.py());
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None))]
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None,
+        table = "holding"))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -161,14 +169,15 @@ impl Bus {
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
+        table: &str,
     ) -> PyResult<()> {
         let options = write_options(read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), address, value, options, urgent)
+        self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        self.write_to(Destination::Broadcast, address, value, CallOptions::default(), false)
+        self.write_to(Destination::Broadcast, HOLDING, address, value, CallOptions::default(), false)
     }
 
     #[pyo3(signature = (unit, word = None, /, *, timeout = None))]
@@ -264,16 +273,17 @@ impl Bus {
     fn read_words<'py>(
         &self,
         unit: &Bound<'py, PyAny>,
+        table: &str,
         address: &Bound<'_, PyAny>,
         count: &Bound<'_, PyAny>,
         options: CallOptions,
         urgent: bool,
     ) -> PyResult<(Bound<'py, PyList>, Done)> {
         let py = unit.py();
-        let request = read_request(address, count)?;
+        let request = read_request(table, address, count)?;
         let options = options_for(&request, options, urgent);
         // Kept here while the interpreter is let go of, so that only the list is made.
-        let (mut read, mut count) = ([0; MAX_READ as usize], 0);
+        let (mut read, mut count) = ([0; MAX_READ_BITS as usize], 0);
         let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
             if let Answer::Read { words, .. } = answer {
                 count = words.len();
@@ -286,6 +296,7 @@ impl Bus {
     fn write_to(
         &self,
         to: Destination,
+        table: &str,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
         options: CallOptions,
@@ -294,7 +305,7 @@ impl Bus {
         let py = address.py();
         let address = one_word("address", address)?;
         let words = words_of(value)?;
-        let request = write_request(address, &words)?;
+        let request = write_request(table, address, &words)?;
         self.call(py, to, &request, options_for(&request, options, urgent), &mut |_| ())?;
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Python's numbers and bytes as the core's, or `NotAllowed` that names what was given and what is allowed.
 
-use drivebus_rtu::{Destination, UnitAddress};
+use drivebus_drives::Place;
+use drivebus_rtu::{Destination, Table, UnitAddress};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyMemoryView, PyString};
 
@@ -10,6 +11,21 @@ use crate::errors::not_allowed;
 pub(crate) fn one_word(what: &str, given: &Bound<'_, PyAny>) -> PyResult<u16> {
     let word = if given.is_instance_of::<PyBool>() { None } else { given.extract().ok() };
     word.ok_or_else(|| not_allowed(format!("{what} {} is not a number from 0 to 65535", shown(given))))
+}
+
+/// A place: an address, and above it what tells another table than that of the holding registers.
+pub(crate) fn place_of(given: &Bound<'_, PyAny>) -> PyResult<Place> {
+    let number = if given.is_instance_of::<PyBool>() { None } else { given.extract().ok() };
+    let place = number.and_then(Place::of_number);
+    place.ok_or_else(|| not_allowed(format!("address {} is not a number from 0 to 65535", shown(given))))
+}
+
+/// A table by its name.
+pub(crate) fn table_of(given: &str) -> PyResult<Table> {
+    Table::named(given).ok_or_else(|| {
+        let names = Table::ALL.map(Table::name).join(", ");
+        not_allowed(format!("table {given:?} is unknown; allowed is {names}"))
+    })
 }
 
 /// A unit that can answer.

@@ -1,6 +1,6 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
-use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, UnitAddress, crc16 as crc, function};
+use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, Table, UnitAddress, crc16 as crc, function};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -101,10 +101,17 @@ pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResul
     fields.set_item("unit", frame.address())?;
     fields.set_item("crc", crc(&bytes[..bytes.len() - 2]))?;
     let kind = match (Request::parse(frame.pdu()), Answer::parse(frame.pdu())) {
-        (Ok(Request::ReadHolding { address, count, .. }), _) => {
+        (Ok(Request::Read { table, address, count, .. }), _) => {
+            set_table(&fields, table)?;
             fields.set_item("address", address)?;
             fields.set_item("count", count)?;
             "read"
+        }
+        (Ok(Request::WriteCoil { address, on, .. }), _) => {
+            set_table(&fields, Table::Coil)?;
+            fields.set_item("address", address)?;
+            fields.set_item("value", u16::from(on))?;
+            "write"
         }
         (Ok(Request::WriteSingle { address, value, .. }), _) => {
             fields.set_item("address", address)?;
@@ -121,7 +128,8 @@ pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResul
             fields.set_item("words", PyList::new(py, words.iter())?)?;
             "write_many"
         }
-        (_, Ok(Answer::Read { words, .. })) => {
+        (_, Ok(Answer::Read { table, words, .. })) => {
+            set_table(&fields, table)?;
             fields.set_item("count", words.len())?;
             fields.set_item("words", PyList::new(py, words.iter())?)?;
             "read_answer"
@@ -143,4 +151,9 @@ pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResul
     fields.set_item("kind", kind)?;
     fields.set_item("function", frame.pdu().first().map(|code| code & !function::EXCEPTION_BIT))?;
     Ok(fields)
+}
+
+/// Names the table, where it is not that of the holding registers.
+fn set_table(fields: &Bound<'_, PyDict>, table: Table) -> PyResult<()> {
+    if table == Table::Holding { Ok(()) } else { fields.set_item("table", table.name()) }
 }

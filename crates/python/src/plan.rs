@@ -26,8 +26,8 @@ impl Plan {
     }
 
     #[getter]
-    fn reads(&self) -> Vec<(u16, u16)> {
-        self.core.reads().iter().map(|read| (read.address, read.count)).collect()
+    fn reads(&self) -> Vec<(u32, u16)> {
+        self.core.reads().iter().map(|read| (read.place().number(), read.count)).collect()
     }
 
     #[pyo3(signature = (answers, /))]

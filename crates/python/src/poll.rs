@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use drivebus_drives::{ReadPlan, Value};
+use drivebus_drives::{ReadPlan, Table, Value};
 use drivebus_line::{Failure, Poll, PollBatch, PollError, PollSample, PollTarget};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyInt, PyList, PyTuple};
@@ -47,8 +47,8 @@ impl Poller {
             let unit = unit_address(&unit)?;
             if let Ok(plan) = what.cast::<Plan>() {
                 let plan = plan.get().core();
-                let reads = plan.reads().iter().map(|read| (read.address, read.count)).collect();
-                asked.push(PollTarget::new(unit, reads));
+                let reads = plan.reads().iter().map(|read| (table(read.table), read.address, read.count)).collect();
+                asked.push(PollTarget::of_tables(unit, reads));
                 meanings.push(Meaning::Values(plan));
             } else {
                 let reads = what.try_iter()?.map(|read| one_read(&read?)).collect::<PyResult<Vec<_>>>()?;
@@ -209,6 +209,11 @@ impl Batch {
             None => Ok(PyList::empty(py)),
         }
     }
+}
+
+/// A profile's table as the line has it.
+fn table(table: Table) -> drivebus_rtu::Table {
+    drivebus_rtu::Table::of_function(table.function()).unwrap_or_default()
 }
 
 /// Address and number of words.

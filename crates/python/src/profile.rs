@@ -4,11 +4,11 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Input, ProfileError, Setpoint, Store};
+use drivebus_drives::{self as drives, Command, Entry, Input, Place, ProfileError, Setpoint, Store};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
-use crate::convert::{one_word, shown};
+use crate::convert::{one_word, place_of, shown};
 use crate::errors::{not_allowed, refuse};
 use crate::plan::Plan;
 use crate::tables::{self, known_as, number};
@@ -130,8 +130,9 @@ impl Profile {
     }
 
     /// The addresses that a unit of this family answers, and those that it refuses.
-    fn signature(&self) -> Option<(Vec<u16>, Vec<u16>)> {
-        self.0.signature().map(|signature| (signature.answers.clone(), signature.refuses.clone()))
+    fn signature(&self) -> Option<(Vec<u32>, Vec<u32>)> {
+        let numbers = |places: &[Place]| places.iter().map(|place| place.number()).collect();
+        self.0.signature().map(|signature| (numbers(&signature.answers), numbers(&signature.refuses)))
     }
 
     #[pyo3(signature = (code, /))]
@@ -187,18 +188,19 @@ impl Profile {
     }
 
     #[pyo3(signature = (name, /, *, store = None))]
-    fn address(&self, name: &Bound<'_, PyAny>, store: Option<bool>) -> PyResult<u16> {
+    fn address(&self, name: &Bound<'_, PyAny>, store: Option<bool>) -> PyResult<u32> {
         let entry = self.find(name)?;
-        match store {
+        let place = match store {
             None => self.0.read_address(&entry).map_err(refuse),
             Some(false) => self.0.write_address(&entry, Store::Ram).map_err(refuse),
             Some(true) => self.0.write_address(&entry, Store::Eeprom).map_err(refuse),
-        }
+        };
+        place.map(Place::number)
     }
 
     #[pyo3(signature = (name, /))]
-    fn read_back(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<u16>> {
-        Ok(self.0.read_back(&*self.find(name)?))
+    fn read_back(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
+        Ok(self.0.read_back(&*self.find(name)?).map(Place::number))
     }
 
     #[pyo3(signature = (name, raw, /))]
@@ -252,10 +254,10 @@ impl Profile {
     }
 
     #[pyo3(signature = (names, /))]
-    fn plan(&self, names: &Bound<'_, PyAny>) -> PyResult<Vec<(u16, u16)>> {
+    fn plan(&self, names: &Bound<'_, PyAny>) -> PyResult<Vec<(u32, u16)>> {
         let entries = names.try_iter()?.map(|name| self.find(&name?)).collect::<PyResult<Vec<_>>>()?;
         let spans = self.0.plan(entries.iter().map(AsRef::as_ref)).map_err(refuse)?;
-        Ok(spans.into_iter().map(|span| (span.address, span.count)).collect())
+        Ok(spans.into_iter().map(|span| (span.place().number(), span.count)).collect())
     }
 
     #[pyo3(signature = (names, /))]
@@ -267,10 +269,17 @@ impl Profile {
     }
 
     #[pyo3(signature = (name, /))]
-    fn command(&self, name: &Bound<'_, PyAny>) -> PyResult<(u16, u16)> {
+    fn command(&self, name: &Bound<'_, PyAny>) -> PyResult<(u32, u16)> {
         let command: Command = text("command", name)?.parse().map_err(refuse)?;
         let missing = || not_allowed(format!("{} has no command {}", self.0.name(), command.name()));
-        self.0.command(command).ok_or_else(missing)
+        self.0.command(command).map(|(place, code)| (place.number(), code)).ok_or_else(missing)
+    }
+
+    /// What is written before a command, if anything.
+    #[pyo3(signature = (name, /))]
+    fn command_first(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<(u32, u16)>> {
+        let command: Command = text("command", name)?.parse().map_err(refuse)?;
+        Ok(self.0.command_first(command).map(|(place, code)| (place.number(), code)))
     }
 
     /// Why a command is not verified; `None` where it is.
@@ -288,8 +297,8 @@ impl Profile {
         self.0.command_codes()
     }
 
-    fn command_registers(&self) -> std::collections::BTreeMap<u16, std::collections::BTreeMap<u16, &str>> {
-        self.0.command_registers()
+    fn command_registers(&self) -> std::collections::BTreeMap<u32, std::collections::BTreeMap<u16, &str>> {
+        self.0.command_registers().into_iter().map(|(place, codes)| (place.number(), codes)).collect()
     }
 
     fn start_sequence<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -297,14 +306,14 @@ impl Profile {
     }
 
     #[getter]
-    fn command_address(&self) -> Option<u16> {
-        self.0.command_address()
+    fn command_address(&self) -> Option<u32> {
+        self.0.command_address().map(Place::number)
     }
 
     /// Whether `address` is a parameter's with the bit that says where it is kept: then the plain one.
     #[pyo3(signature = (address, /))]
     fn stored_address(&self, address: &Bound<'_, PyAny>) -> PyResult<Option<u16>> {
-        Ok(self.0.stored_address(one_word("address", address)?))
+        Ok(self.0.stored_address(place_of(address)?))
     }
 
     fn memory<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
@@ -313,7 +322,7 @@ impl Profile {
 
     #[pyo3(signature = (address, /))]
     fn is_command(&self, address: &Bound<'_, PyAny>) -> PyResult<bool> {
-        Ok(self.0.is_command(one_word("address", address)?))
+        Ok(self.0.is_command(place_of(address)?))
     }
 
     #[pyo3(signature = (raw, /))]

@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use drivebus_line::{Bus as CoreBus, CallOptions, Errand, Reply, Running};
-use drivebus_rtu::{Answer, Destination, Request};
+use drivebus_rtu::{Answer, Destination, Expected, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::arguments::{
     duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
 };
-use crate::bus::{Bus, Heard, UnixClock};
+use crate::bus::{Bus, HOLDING, Heard, UnixClock};
 use crate::convert::{one_word, unit_address, words_of};
 use crate::errors::{call_error, refuse};
 use crate::format::SerialFormat;
@@ -113,7 +113,8 @@ impl Requests {
         Self { core: Arc::clone(&bus.core), virtual_ahead: bus.virtual_ahead, inbox: Arc::clone(&mailbox.inbox) }
     }
 
-    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false))]
+    #[pyo3(signature = (unit, address, count, /, *, timeout = None, retries = None, urgent = false, verify = false,
+        table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn read(
         &self,
@@ -124,13 +125,17 @@ impl Requests {
         retries: Option<u32>,
         urgent: bool,
         verify: bool,
+        table: &str,
     ) -> PyResult<Asked> {
-        let request = read_request(address, count)?;
+        let request = read_request(table, address, count)?;
         let options = options_for(&request, read_options(timeout, retries, verify)?, urgent);
-        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| words(&reply).into_pyobject(py)))
+        let expected = request.expected();
+        Ok(self.ask(unit_address(unit)?.into(), &request, options, move |py, reply, _| {
+            words(expected, &reply).into_pyobject(py)
+        }))
     }
 
-    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false))]
+    #[pyo3(signature = (unit, address, count, /, *, urgent = false, verify = false, table = "holding"))]
     fn read_stamped(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -138,16 +143,20 @@ impl Requests {
         count: &Bound<'_, PyAny>,
         urgent: bool,
         verify: bool,
+        table: &str,
     ) -> PyResult<Asked> {
-        let request = read_request(address, count)?;
+        let request = read_request(table, address, count)?;
+        let expected = request.expected();
         let options = options_for(&request, read_options(None, None, verify)?, urgent);
-        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, clock| {
-            let stamped = (words(&reply), clock.at(reply.done.sent), clock.at(reply.done.ended));
+        Ok(self.ask(unit_address(unit)?.into(), &request, options, move |py, reply, clock| {
+            let stamped = (words(expected, &reply), clock.at(reply.done.sent), clock.at(reply.done.ended));
             Ok(stamped.into_pyobject(py)?.into_any())
         }))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None))]
+    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None,
+        table = "holding"))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -156,14 +165,15 @@ impl Requests {
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
+        table: &str,
     ) -> PyResult<Asked> {
         let options = write_options(read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), address, value, options, urgent)
+        self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
     fn broadcast(&self, address: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        self.write_to(Destination::Broadcast, address, value, CallOptions::default(), false)
+        self.write_to(Destination::Broadcast, HOLDING, address, value, CallOptions::default(), false)
     }
 
     #[pyo3(signature = (unit, word = None, /))]
@@ -222,6 +232,7 @@ impl Requests {
     fn write_to(
         &self,
         to: Destination,
+        table: &str,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
         options: CallOptions,
@@ -229,7 +240,7 @@ impl Requests {
     ) -> PyResult<Asked> {
         let address = one_word("address", address)?;
         let words = words_of(value)?;
-        let request = write_request(address, &words)?;
+        let request = write_request(table, address, &words)?;
         Ok(self.ask(to, &request, options_for(&request, options, urgent), confirmed))
     }
 
@@ -264,8 +275,9 @@ where
     Ok(Asked::apart(number, wanted))
 }
 
-fn words(reply: &Reply) -> Vec<u16> {
-    match Answer::parse(&reply.pdu) {
+/// The words of the reply to a read, as many as were asked for.
+fn words(asked: Expected, reply: &Reply) -> Vec<u16> {
+    match asked.judge(&reply.pdu) {
         Ok(Answer::Read { words, .. }) => words.iter().collect(),
         _ => Vec::new(),
     }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use drivebus_drives::{Place, Table};
 use drivebus_line::{Line, PortError, PortErrorKind};
-use drivebus_sim::{self as sim, Model, Options, SimError};
+use drivebus_sim::{self as sim, Model, Options, SimError, WriteRecord};
 use pyo3::prelude::*;
 
 use crate::convert::{one_word, shown, unit_address};
@@ -287,12 +288,12 @@ impl SimulatedDrive {
         Ok(self.0.eeprom_writes_of(one_word("address", address)?))
     }
 
-    fn writes(&self) -> Vec<(f64, u16, u16)> {
-        self.0.writes().iter().map(|write| (seconds(write.at), write.address, write.value)).collect()
+    fn writes(&self) -> Vec<(f64, u32, u16)> {
+        self.0.writes().iter().map(|write| (seconds(write.at), number(write), write.value)).collect()
     }
 
-    fn take_writes(&self) -> Vec<(f64, u16, u16)> {
-        self.0.take_writes().iter().map(|write| (seconds(write.at), write.address, write.value)).collect()
+    fn take_writes(&self) -> Vec<(f64, u32, u16)> {
+        self.0.take_writes().iter().map(|write| (seconds(write.at), number(write), write.value)).collect()
     }
 
     #[getter]
@@ -354,4 +355,10 @@ pub(crate) fn seconds(moment: drivebus_rtu::Instant) -> f64 {
 
 pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is not a time to wait")))
+}
+
+/// The place of a write, as profiles number it.
+fn number(write: &WriteRecord) -> u32 {
+    let table = Table::ALL.into_iter().find(|table| table.function() == write.table.function());
+    Place::new(table.unwrap_or_default(), write.address).number()
 }

@@ -40,6 +40,7 @@ pub(crate) fn description<'py>(py: Python<'py>, entry: &Entry) -> Table<'py> {
         },
     )?;
     dict.set_item("address", entry.address())?;
+    dict.set_item("table", entry.table().name())?;
     dict.set_item("unit", quantity.unit())?;
     // Where the scale is not known the unit is "raw", and there is one count to it.
     match quantity.ratio().unwrap_or((1, 1)) {

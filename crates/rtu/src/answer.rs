@@ -3,10 +3,12 @@
 mod error;
 mod head;
 
-use crate::Words;
-use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
-use crate::pdu::{ExceptionCode, MAX_PDU, MAX_READ, put_words};
+use crate::pdu::function::{
+    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+};
+use crate::pdu::{ExceptionCode, MAX_PDU, MAX_READ, MAX_READ_BITS, coil_of, coil_word, put_words};
 use crate::request::{Request, RequestError};
+use crate::{Table, Words};
 
 pub use error::AnswerError;
 pub use head::Head;
@@ -15,11 +17,22 @@ pub(crate) use head::MOST;
 /// An answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer<'a> {
-    /// The words read.
+    /// The words read, or the bits, each a word of 0 or 1.
     #[non_exhaustive]
     Read {
-        /// 1..=125 words.
+        /// What was read.
+        table: Table,
+        /// 1..=125 words, 1..=2000 bits. By itself an answer of bits tells only how many bytes they fill: those that were
+        /// asked for are the first.
         words: Words<'a>,
+    },
+    /// One coil was written.
+    #[non_exhaustive]
+    WriteCoil {
+        /// Coil.
+        address: u16,
+        /// What it was given.
+        on: bool,
     },
     /// One word was written.
     #[non_exhaustive]
@@ -60,16 +73,26 @@ pub enum Answer<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// The answer to a read.
+    /// The answer to a read of holding registers.
     ///
     /// # Errors
     ///
     /// [`RequestError::Count`]: `words` are none or more than 125.
     pub const fn read(words: &'a [u16]) -> Result<Self, RequestError> {
-        if words.is_empty() || words.len() > MAX_READ as usize {
-            return Err(RequestError::Count { count: words.len(), max: MAX_READ });
+        Self::read_of(Table::Holding, words)
+    }
+
+    /// The answer to a read of `table`: words, or bits of which 0 is off and anything else on.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError::Count`]: `words` are none, or more than one answer can carry.
+    pub const fn read_of(table: Table, words: &'a [u16]) -> Result<Self, RequestError> {
+        let max = table.max_read();
+        if words.is_empty() || words.len() > max as usize {
+            return Err(RequestError::Count { count: words.len(), max });
         }
-        Ok(Self::Read { words: Words::new(words) })
+        Ok(Self::Read { table, words: Words::new(words) })
     }
 
     /// The refusal of `function` (its low seven bits).
@@ -93,7 +116,7 @@ impl<'a> Answer<'a> {
     #[must_use]
     pub fn shortened(self, count: u16) -> Self {
         match self {
-            Self::Read { words } => Self::Read { words: words.first(count.into()) },
+            Self::Read { table, words } => Self::Read { table, words: words.first(count.into()) },
             other => other,
         }
     }
@@ -101,13 +124,14 @@ impl<'a> Answer<'a> {
     /// The answer that confirms `request`; `None` for a read and a custom request, whose answers carry data.
     pub fn confirming(request: &Request<'_>) -> Option<Self> {
         match *request {
+            Request::WriteCoil { address, on } => Some(Self::WriteCoil { address, on }),
             Request::WriteSingle { address, value } => Some(Self::WriteSingle { address, value }),
             Request::Echo { data } => Some(Self::Echo { data }),
             Request::WriteMultiple { address, words } => {
                 let count = u16::try_from(words.len()).ok()?;
                 Some(Self::WriteMultiple { address, count })
             }
-            Request::ReadHolding { .. } | Request::Custom { .. } => None,
+            Request::Read { .. } | Request::Custom { .. } => None,
         }
     }
 
@@ -116,17 +140,28 @@ impl<'a> Answer<'a> {
     ///
     /// # Errors
     ///
-    /// [`AnswerError::Length`]: the length does not fit the function.
+    /// [`AnswerError::Length`]: the length does not fit the function. [`AnswerError::Coil`]: a coil is neither on nor off.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, AnswerError> {
         match *pdu {
             [function, code] if function & EXCEPTION_BIT != 0 => Ok(Self::exception(function, ExceptionCode(code))),
             [READ_HOLDING, bytes, ref data @ ..] => match Words::from_wire(data) {
                 // No frame is long enough for 126 words, but a byte count is.
                 Some(words) if usize::from(bytes) == data.len() && (1..=MAX_READ.into()).contains(&words.len()) => {
-                    Ok(Self::Read { words })
+                    Ok(Self::Read { table: Table::Holding, words })
                 }
                 _ => Err(AnswerError::Length { len: pdu.len() }),
             },
+            [function @ READ_COILS..=READ_INPUT, bytes, ref data @ ..] => {
+                let words = words_of(function, data).filter(|_| usize::from(bytes) == data.len());
+                words.ok_or(AnswerError::Length { len: pdu.len() })
+            }
+            [WRITE_COIL, a1, a0, v1, v0] => {
+                let value = u16::from_be_bytes([v1, v0]);
+                match coil_of(value) {
+                    Some(on) => Ok(Self::WriteCoil { address: u16::from_be_bytes([a1, a0]), on }),
+                    None => Err(AnswerError::Coil { value }),
+                }
+            }
             [WRITE_SINGLE, a1, a0, v1, v0] => {
                 Ok(Self::WriteSingle { address: u16::from_be_bytes([a1, a0]), value: u16::from_be_bytes([v1, v0]) })
             }
@@ -134,9 +169,9 @@ impl<'a> Answer<'a> {
             [WRITE_MULTIPLE, a1, a0, c1, c0] => {
                 Ok(Self::WriteMultiple { address: u16::from_be_bytes([a1, a0]), count: u16::from_be_bytes([c1, c0]) })
             }
-            [] | [READ_HOLDING | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
-                Err(AnswerError::Length { len: pdu.len() })
-            }
+            []
+            | [READ_COILS..=READ_INPUT | WRITE_COIL | WRITE_SINGLE | WRITE_MULTIPLE, ..]
+            | [DIAGNOSTICS, 0, 0, ..] => Err(AnswerError::Length { len: pdu.len() }),
             [function, ..] if function & EXCEPTION_BIT != 0 => Err(AnswerError::Length { len: pdu.len() }),
             _ if pdu.len() > MAX_PDU => Err(AnswerError::Length { len: pdu.len() }),
             _ => Ok(Self::Custom { pdu }),
@@ -146,17 +181,23 @@ impl<'a> Answer<'a> {
     /// Writes the PDU into `target` and returns its length.
     pub(crate) fn put(&self, target: &mut [u8; MAX_PDU]) -> usize {
         match *self {
-            Self::Read { words } => {
-                // At most 125 words, checked by the constructors: the byte count fits.
-                let bytes = 2 * words.len();
-                target[0] = READ_HOLDING;
+            Self::Read { table, words } => {
+                // At most 125 words or 2000 bits, checked by the constructors: the byte count fits.
+                let bytes = table.bytes(words.len());
+                target[0] = table.function();
                 #[expect(clippy::cast_possible_truncation, reason = "at most 250")]
                 {
                     target[1] = bytes as u8;
                 }
-                words.put(&mut target[2..2 + bytes]);
+                let data = &mut target[2..2 + bytes];
+                if table.is_bits() {
+                    words.put_bits(data);
+                } else {
+                    words.put(data);
+                }
                 2 + bytes
             }
+            Self::WriteCoil { address, on } => put_words(target, WRITE_COIL, [address, coil_word(on)]),
             Self::WriteSingle { address, value } => put_words(target, WRITE_SINGLE, [address, value]),
             Self::Echo { data } => put_words(target, DIAGNOSTICS, [0, data]),
             Self::WriteMultiple { address, count } => put_words(target, WRITE_MULTIPLE, [address, count]),
@@ -170,4 +211,13 @@ impl<'a> Answer<'a> {
             }
         }
     }
+}
+
+/// What the answer to 01H, 02H or 04H carries, if it can: whole words, or all bits of its bytes.
+#[cold]
+fn words_of(function: u8, data: &[u8]) -> Option<Answer<'_>> {
+    let table = Table::of_function(function)?;
+    let words = if table.is_bits() { Words::from_bits(data, MAX_READ_BITS) } else { Words::from_wire(data)? };
+    let carried = data.len() <= table.bytes(table.max_read().into());
+    Some(Answer::Read { table, words }).filter(|_| carried && !words.is_empty())
 }

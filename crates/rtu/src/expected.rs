@@ -2,12 +2,12 @@
 
 mod shape;
 
-use crate::UnitAddress;
 use crate::answer::{Answer, AnswerError};
 use crate::frame::Frame;
-use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
-use crate::pdu::{AROUND_PDU, AnswerLength};
+use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::{AROUND_PDU, AnswerLength, coil_word};
 use crate::request::Request;
+use crate::{Table, UnitAddress};
 use shape::Shape;
 
 /// What a right answer must look like: all of a request that its answer has to repeat.
@@ -16,7 +16,8 @@ pub struct Expected(Kind);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    Read { count: u16 },
+    Read { table: Table, count: u16 },
+    WriteCoil { address: u16, on: bool },
     WriteSingle { address: u16, value: u16 },
     Echo { data: u16 },
     WriteMultiple { address: u16, count: u16 },
@@ -29,7 +30,8 @@ impl Expected {
 
     pub(crate) fn of(request: &Request<'_>) -> Self {
         Self(match *request {
-            Request::ReadHolding { count, .. } => Kind::Read { count },
+            Request::Read { table, count, .. } => Kind::Read { table, count },
+            Request::WriteCoil { address, on } => Kind::WriteCoil { address, on },
             Request::WriteSingle { address, value } => Kind::WriteSingle { address, value },
             Request::Echo { data } => Kind::Echo { data },
             #[expect(clippy::cast_possible_truncation, reason = "at most 123 words")]
@@ -41,7 +43,8 @@ impl Expected {
     /// The function code of the answer, unless the unit refuses.
     pub const fn function(&self) -> u8 {
         match self.0 {
-            Kind::Read { .. } => READ_HOLDING,
+            Kind::Read { table, .. } => table.function(),
+            Kind::WriteCoil { .. } => WRITE_COIL,
             Kind::WriteSingle { .. } => WRITE_SINGLE,
             Kind::Echo { .. } => DIAGNOSTICS,
             Kind::WriteMultiple { .. } => WRITE_MULTIPLE,
@@ -68,8 +71,10 @@ impl Expected {
 
     const fn pdu_len(self) -> Option<usize> {
         match self.0 {
-            Kind::Read { count } => Some(2 + 2 * count as usize),
-            Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => Some(5),
+            Kind::Read { table, count } => Some(2 + table.bytes(count as usize)),
+            Kind::WriteCoil { .. } | Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => {
+                Some(5)
+            }
             Kind::Custom { answer: AnswerLength::Bytes(pdu), .. } => Some(pdu as usize),
             Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
         }
@@ -78,9 +83,11 @@ impl Expected {
     /// What stands behind the function code in the answer, where that is known.
     pub(crate) const fn third(self) -> Option<u8> {
         match self.0 {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 125 words")]
-            Kind::Read { count } => Some(2 * count as u8),
-            Kind::WriteSingle { address, .. } | Kind::WriteMultiple { address, .. } => Some(address.to_be_bytes()[0]),
+            #[expect(clippy::cast_possible_truncation, reason = "at most 250 bytes")]
+            Kind::Read { table, count } => Some(table.bytes(count as usize) as u8),
+            Kind::WriteCoil { address, .. }
+            | Kind::WriteSingle { address, .. }
+            | Kind::WriteMultiple { address, .. } => Some(address.to_be_bytes()[0]),
             Kind::Echo { .. } => Some(0),
             Kind::Custom { .. } => None,
         }
@@ -109,7 +116,7 @@ impl Expected {
         !self.is_read() && !self.is_echo()
     }
 
-    /// Whether words are read.
+    /// Whether words or bits are read.
     pub(crate) const fn is_read(self) -> bool {
         matches!(self.0, Kind::Read { .. })
     }
@@ -124,6 +131,10 @@ impl Expected {
                     || matches!(theirs, AnswerLength::BySilence);
                 self.function() == other.function() && fits
             }
+            // Bits are told apart only by how many bytes they fill.
+            (Kind::Read { table: ours, .. }, Kind::Read { table: theirs, .. }) => {
+                ours == theirs && self.pdu_len() == other.pdu_len()
+            }
             _ => self == other,
         }
     }
@@ -132,16 +143,18 @@ impl Expected {
     /// some units give.
     pub(crate) fn could_pass_for_cut(self, other: Self) -> bool {
         match (self.0, other.0) {
-            (Kind::Read { count: ours }, Kind::Read { count: theirs }) => ours >= theirs,
+            (Kind::Read { table: ours, .. }, Kind::Read { table: theirs, .. }) => {
+                ours == theirs && self.pdu_len() >= other.pdu_len()
+            }
             _ => self.could_pass_for(other),
         }
     }
 
     /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.
     ///
-    /// Always so for 06H and 08H; of a custom function nobody knows.
+    /// Always so for 05H, 06H and 08H; of a custom function nobody knows.
     pub const fn may_repeat_request(&self) -> bool {
-        matches!(self.0, Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::Custom { .. })
+        matches!(self.0, Kind::WriteCoil { .. } | Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::Custom { .. })
     }
 
     /// `frame` as the answer of `unit` that was expected, or as the refusal of it.
@@ -164,6 +177,7 @@ impl Expected {
     pub(crate) fn parse(self, pdu: &[u8]) -> Result<Answer<'_>, AnswerError> {
         match (self.0, pdu) {
             (Kind::Custom { .. }, [function, ..]) if function & EXCEPTION_BIT == 0 => Ok(Answer::Custom { pdu }),
+            (Kind::Read { count, table }, _) if table.is_bits() => Ok(Answer::parse(pdu)?.shortened(count)),
             _ => Answer::parse(pdu),
         }
     }
@@ -191,10 +205,21 @@ impl Expected {
         }
         let answer = Answer::parse(pdu)?;
         match (self.0, answer) {
-            (Kind::Read { count }, Answer::Read { words }) if words.len() != usize::from(count) => {
+            (Kind::Read { table, count }, Answer::Read { words, .. }) if table.is_bits() => {
+                let (asked, came) = (table.bytes(count.into()), table.bytes(words.len()));
+                if asked == came {
+                    return Ok(answer.shortened(count));
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "at most 250 bytes")]
+                Err(AnswerError::Bytes { asked: asked as u8, came: came as u8 })
+            }
+            (Kind::Read { count, .. }, Answer::Read { words, .. }) if words.len() != usize::from(count) => {
                 Err(AnswerError::Count { asked: count, came: words.len() })
             }
             (_, Answer::Exception { .. }) | (Kind::Read { .. }, Answer::Read { .. }) => Ok(answer),
+            (Kind::WriteCoil { address, on }, Answer::WriteCoil { address: at, on: took }) => {
+                repeats([address, coil_word(on)], [at, coil_word(took)], answer)
+            }
             (Kind::WriteSingle { address, value }, Answer::WriteSingle { address: at, value: took }) => {
                 repeats([address, value], [at, took], answer)
             }

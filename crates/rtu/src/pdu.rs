@@ -4,8 +4,10 @@
 
 /// Most bytes of a PDU: 256 of the ADU less address and CRC.
 pub const MAX_PDU: usize = 253;
-/// Most words of one 03H read.
+/// Most words of one 03H or 04H read.
 pub const MAX_READ: u16 = 125;
+/// Most bits of one 01H or 02H read.
+pub const MAX_READ_BITS: u16 = 2_000;
 /// Most words of one 10H write.
 pub const MAX_WRITE: u16 = 123;
 /// Address and CRC.
@@ -15,8 +17,16 @@ pub(crate) const CRC_LEN: usize = 2;
 
 /// Function codes this crate knows by name.
 pub mod function {
+    /// Read coils.
+    pub const READ_COILS: u8 = 0x01;
+    /// Read discrete inputs.
+    pub const READ_DISCRETE: u8 = 0x02;
     /// Read holding registers.
     pub const READ_HOLDING: u8 = 0x03;
+    /// Read input registers.
+    pub const READ_INPUT: u8 = 0x04;
+    /// Write one coil.
+    pub const WRITE_COIL: u8 = 0x05;
     /// Write one register.
     pub const WRITE_SINGLE: u8 = 0x06;
     /// Diagnostics; sub-function 0000 is the echo.
@@ -69,6 +79,23 @@ impl ExceptionCode {
             _ => "not_in_the_specification",
         }
     }
+}
+
+/// How 05H says that a coil is to be on; off is 0.
+const ON: u16 = 0xFF00;
+
+/// What 05H says of a coil; `None` where it says neither.
+pub(crate) const fn coil_of(word: u16) -> Option<bool> {
+    match word {
+        ON => Some(true),
+        0 => Some(false),
+        _ => None,
+    }
+}
+
+/// How 05H says that a coil is `on`.
+pub(crate) const fn coil_word(on: bool) -> u16 {
+    if on { ON } else { 0 }
 }
 
 /// A function code and two words: the shape of most PDUs.

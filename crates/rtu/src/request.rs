@@ -1,23 +1,35 @@
 //! What a master asks: the PDUs of requests, built and parsed.
 //!
-//! Source: *Modbus Application Protocol* V1.1b3, §6.3, §6.6, §6.8, §6.12.
+//! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.8, §6.12.
 
 use core::fmt;
 
-use crate::Words;
-use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
-use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, put_words};
+use crate::pdu::function::{
+    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+};
+use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, coil_of, coil_word, put_words};
+use crate::{Table, Words};
 
 /// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request<'a> {
-    /// 03H: read `count` words from `address`.
+    /// 01H, 02H, 03H or 04H: read `count` words, or bits, of `table` from `address`.
     #[non_exhaustive]
-    ReadHolding {
-        /// First register.
+    Read {
+        /// Where.
+        table: Table,
+        /// The first.
         address: u16,
-        /// 1..=125.
+        /// 1..=125 words, 1..=2000 bits.
         count: u16,
+    },
+    /// 05H: write one coil.
+    #[non_exhaustive]
+    WriteCoil {
+        /// Coil.
+        address: u16,
+        /// What to write.
+        on: bool,
     },
     /// 06H: write one word.
     #[non_exhaustive]
@@ -57,11 +69,30 @@ impl<'a> Request<'a> {
     /// # Errors
     ///
     /// [`RequestError`]: the count is out of range, or the last register would lie beyond 0xFFFF.
+    #[inline]
     pub const fn read(address: u16, count: u16) -> Result<Self, RequestError> {
         match check_range(address, count as usize, MAX_READ) {
-            Ok(_) => Ok(Self::ReadHolding { address, count }),
+            Ok(_) => Ok(Self::Read { table: Table::Holding, address, count }),
             Err(error) => Err(error),
         }
+    }
+
+    /// 01H, 02H, 03H or 04H: `count` words (1..=125) or bits (1..=2000) of `table` from `address`.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: the count is out of range, or the last one would lie beyond 0xFFFF.
+    #[inline]
+    pub const fn read_of(table: Table, address: u16, count: u16) -> Result<Self, RequestError> {
+        match check_range(address, count as usize, table.max_read()) {
+            Ok(_) => Ok(Self::Read { table, address, count }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// 05H: the coil at `address` is to be `on`.
+    pub const fn write_coil(address: u16, on: bool) -> Self {
+        Self::WriteCoil { address, on }
     }
 
     /// 06H: `value` to `address`.
@@ -116,7 +147,17 @@ impl<'a> Request<'a> {
     /// 03H to it.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, RequestError> {
         match *pdu {
-            [READ_HOLDING, a1, a0, c1, c0] => Self::read(u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0])),
+            [function @ READ_COILS..=READ_INPUT, a1, a0, c1, c0] => {
+                let table = Table::of_function(function).unwrap_or_default();
+                Self::read_of(table, u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]))
+            }
+            [WRITE_COIL, a1, a0, v1, v0] => {
+                let value = u16::from_be_bytes([v1, v0]);
+                match coil_of(value) {
+                    Some(on) => Ok(Self::write_coil(u16::from_be_bytes([a1, a0]), on)),
+                    None => Err(RequestError::Coil { value }),
+                }
+            }
             [WRITE_SINGLE, a1, a0, v1, v0] => {
                 Ok(Self::write(u16::from_be_bytes([a1, a0]), u16::from_be_bytes([v1, v0])))
             }
@@ -131,7 +172,7 @@ impl<'a> Request<'a> {
                     _ => Err(RequestError::ByteCount { count, bytes, came: data.len() }),
                 }
             }
-            [READ_HOLDING | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
+            [READ_COILS..=READ_INPUT | WRITE_COIL | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
                 Err(RequestError::PduLength { len: pdu.len() })
             }
             _ => Self::custom(pdu, AnswerLength::BySilence),
@@ -141,7 +182,8 @@ impl<'a> Request<'a> {
     /// The function code.
     pub const fn function(&self) -> u8 {
         match self {
-            Self::ReadHolding { .. } => READ_HOLDING,
+            Self::Read { table, .. } => table.function(),
+            Self::WriteCoil { .. } => WRITE_COIL,
             Self::WriteSingle { .. } => WRITE_SINGLE,
             Self::Echo { .. } => DIAGNOSTICS,
             Self::WriteMultiple { .. } => WRITE_MULTIPLE,
@@ -155,11 +197,11 @@ impl<'a> Request<'a> {
     /// 18H, or 08H with a sub-function that returns a counter.
     pub const fn is_write(&self) -> bool {
         match self {
-            Self::ReadHolding { .. } | Self::Echo { .. } => false,
-            Self::WriteSingle { .. } | Self::WriteMultiple { .. } => true,
+            Self::Read { .. } | Self::Echo { .. } => false,
+            Self::WriteCoil { .. } | Self::WriteSingle { .. } | Self::WriteMultiple { .. } => true,
             Self::Custom { pdu, .. } => !matches!(
                 pdu,
-                [READ_HOLDING | 0x01 | 0x02 | 0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..]
+                [READ_COILS..=READ_INPUT | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..]
                     | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
             ),
         }
@@ -168,7 +210,7 @@ impl<'a> Request<'a> {
     /// How many bytes the request has on the wire, with address and CRC.
     pub const fn adu_len(&self) -> usize {
         let pdu = match self {
-            Self::ReadHolding { .. } | Self::WriteSingle { .. } | Self::Echo { .. } => 5,
+            Self::Read { .. } | Self::WriteCoil { .. } | Self::WriteSingle { .. } | Self::Echo { .. } => 5,
             Self::WriteMultiple { words, .. } => 6 + 2 * words.len(),
             Self::Custom { pdu, .. } => pdu.len(),
         };
@@ -178,7 +220,8 @@ impl<'a> Request<'a> {
     /// Writes the PDU into `target` and returns its length.
     pub(crate) fn put(&self, target: &mut [u8; MAX_PDU]) -> usize {
         match *self {
-            Self::ReadHolding { address, count } => put_words(target, READ_HOLDING, [address, count]),
+            Self::Read { table, address, count } => put_words(target, table.function(), [address, count]),
+            Self::WriteCoil { address, on } => put_words(target, WRITE_COIL, [address, coil_word(on)]),
             Self::WriteSingle { address, value } => put_words(target, WRITE_SINGLE, [address, value]),
             Self::Echo { data } => put_words(target, DIAGNOSTICS, [0, data]),
             Self::WriteMultiple { address, words } => {
@@ -213,18 +256,18 @@ const fn check_range(address: u16, count: usize, max: u16) -> Result<usize, Requ
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// Too many words, or none.
+    /// Too many words or bits, or none.
     Count {
         /// What was asked.
         count: usize,
-        /// Most words the function can carry.
+        /// Most that the function can carry.
         max: u16,
     },
     /// The last register lies beyond 0xFFFF.
     Range {
         /// First register.
         address: u16,
-        /// Number of words.
+        /// How many.
         count: usize,
     },
     /// Byte count, word count and data of a 10H request do not agree.
@@ -235,6 +278,11 @@ pub enum RequestError {
         bytes: u8,
         /// Bytes that stand there.
         came: usize,
+    },
+    /// A coil is neither to be on nor off.
+    Coil {
+        /// What 05H carries: FF00H and 0000H mean something.
+        value: u16,
     },
     /// The length does not fit the function.
     PduLength {
@@ -263,6 +311,7 @@ impl fmt::Display for RequestError {
             Self::ByteCount { count, bytes, came } => {
                 write!(f, "{count} words and {bytes} bytes announced, {came} bytes of data")
             }
+            Self::Coil { value } => write!(f, "a coil is written with FF00H or 0000H, not {value:04X}H"),
             Self::PduLength { len } => write!(f, "a PDU of {len} bytes does not fit its function (1 to {MAX_PDU})"),
             Self::Function { function } => write!(f, "function {function:02X}H cannot be asked for (01H..=7FH)"),
             Self::AnswerLength { len } => write!(f, "an answer's PDU of {len} bytes cannot be (1 to {MAX_PDU})"),

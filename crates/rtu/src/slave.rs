@@ -21,7 +21,7 @@ use crate::{Destination, FrameError, Instant, SerialFormat, UnitAddress};
 /// let mut slave = Slave::new(unit, &SerialFormat::DEFAULT);
 /// let now = Instant::from_nanos(0);
 /// slave.receive(now, &[0x01, 0x03, 0x21, 0x00, 0x00, 0x01, 0x8E, 0x36]);
-/// let Some(SlaveEvent::Request { request: Request::ReadHolding { address, count, .. }, broadcast: false }) = slave.poll(now)
+/// let Some(SlaveEvent::Request { request: Request::Read { address, count, .. }, broadcast: false }) = slave.poll(now)
 /// else {
 ///     panic!("a read")
 /// };

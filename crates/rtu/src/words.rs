@@ -1,8 +1,8 @@
-//! Registers inside a PDU: 16-bit words, high byte first, borrowed from wherever they are.
+//! What a PDU carries: 16-bit words, high byte first, or bits, lowest first; borrowed from wherever they are.
 
 use core::fmt;
 
-/// Words of a request or an answer, borrowed: from the caller as `u16`, or from a frame as bytes.
+/// Words of a request or an answer, borrowed: from the caller as `u16`, or from a frame as bytes. A bit is a word of 0 or 1.
 ///
 /// ```
 /// use drivebus_rtu::Words;
@@ -18,6 +18,7 @@ pub struct Words<'a>(Source<'a>);
 enum Source<'a> {
     Host(&'a [u16]),
     Wire(&'a [[u8; 2]]),
+    Bits { bytes: &'a [u8], count: u16 },
 }
 
 impl<'a> Words<'a> {
@@ -34,11 +35,20 @@ impl<'a> Words<'a> {
         }
     }
 
+    /// The first `count` bits of `bytes`, the lowest of the first byte first; as many as are there.
+    pub(crate) const fn from_bits(bytes: &'a [u8], count: u16) -> Self {
+        let there = 8 * bytes.len();
+        #[expect(clippy::cast_possible_truncation, reason = "less than `count`, which fits")]
+        let count = if there < count as usize { there as u16 } else { count };
+        Self(Source::Bits { bytes, count })
+    }
+
     /// How many words.
     pub const fn len(&self) -> usize {
         match self.0 {
             Source::Host(words) => words.len(),
             Source::Wire(pairs) => pairs.len(),
+            Source::Bits { count, .. } => count as usize,
         }
     }
 
@@ -52,6 +62,9 @@ impl<'a> Words<'a> {
         Self(match self.0 {
             Source::Host(words) => Source::Host(words.get(..count).unwrap_or(words)),
             Source::Wire(pairs) => Source::Wire(pairs.get(..count).unwrap_or(pairs)),
+            Source::Bits { bytes, count: there } => {
+                Source::Bits { bytes, count: u16::try_from(count).map_or(there, |count| count.min(there)) }
+            }
         })
     }
 
@@ -60,6 +73,7 @@ impl<'a> Words<'a> {
         match self.0 {
             Source::Host(words) => words.get(index).copied(),
             Source::Wire(pairs) => pairs.get(index).map(|&pair| u16::from_be_bytes(pair)),
+            Source::Bits { bytes, count } => bit(bytes, count, index),
         }
     }
 
@@ -75,8 +89,29 @@ impl<'a> Words<'a> {
         match self.0 {
             Source::Host(words) => pairs.iter_mut().zip(words).for_each(|(pair, word)| *pair = word.to_be_bytes()),
             Source::Wire(wire) => pairs.iter_mut().zip(wire).for_each(|(pair, word)| *pair = *word),
+            Source::Bits { .. } => {
+                pairs.iter_mut().zip(self.iter()).for_each(|(pair, word)| *pair = word.to_be_bytes());
+            }
         }
     }
+
+    /// Writes the words into `target` as bits, the lowest of the first byte first, as many as fit: any word but 0 is 1.
+    #[cold]
+    pub(crate) fn put_bits(&self, target: &mut [u8]) {
+        target.fill(0);
+        for (index, word) in self.iter().enumerate() {
+            if let Some(byte) = target.get_mut(index / 8) {
+                *byte |= u8::from(word != 0) << (index % 8);
+            }
+        }
+    }
+}
+
+/// The bit at `index` of the first `count`. Apart, because nearly all that is read are words.
+#[cold]
+fn bit(bytes: &[u8], count: u16, index: usize) -> Option<u16> {
+    let byte = bytes.get(index / 8).filter(|_| index < usize::from(count))?;
+    Some(u16::from(byte >> (index % 8) & 1))
 }
 
 impl PartialEq for Words<'_> {

@@ -88,10 +88,12 @@ impl Unit {
         let address = UnitAddress::new(unit).unwrap();
         let refused = Answer::exception(request.function(), ExceptionCode::ILLEGAL_ADDRESS);
         Some(match (*request, self.echo) {
-            (Request::ReadHolding { address: first, count, .. }, _) => match self.words(unit, first, count) {
-                Outcome::Words(words) => Adu::answer(address, &Answer::read(&words).unwrap()),
-                _ => Adu::answer(address, &refused),
-            },
+            (Request::Read { table: Table::Holding, address: first, count, .. }, _) => {
+                match self.words(unit, first, count) {
+                    Outcome::Words(words) => Adu::answer(address, &Answer::read(&words).unwrap()),
+                    _ => Adu::answer(address, &refused),
+                }
+            }
             (Request::WriteSingle { address: to, value, .. }, _) => {
                 if to >= REGISTERS {
                     return Some(Adu::answer(address, &refused));

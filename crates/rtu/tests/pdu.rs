@@ -59,7 +59,10 @@ proptest! {
         let adu = Adu::answer(UnitAddress::MIN, &stranger);
         let pdu = Frame::parse(adu.as_bytes()).unwrap().pdu();
         let fits = match (answer, stranger) {
-            (Answer::Read { words: a, .. }, Answer::Read { words: b, .. }) => a.len() == b.len(),
+            // Words are told apart by how many they are, bits by how many bytes they fill, and all by their function.
+            (Answer::Read { table: ours, words: a, .. }, Answer::Read { table: theirs, words: b, .. }) => {
+                ours == theirs && if ours.is_bits() { a.len().div_ceil(8) == b.len().div_ceil(8) } else { a.len() == b.len() }
+            }
             (a, b) => a == b,
         };
         prop_assert_eq!(request.judge(pdu).is_ok(), fits);
@@ -77,6 +80,77 @@ fn requests_out_of_range_cannot_be_made() {
     assert_eq!(Request::custom(&[], AnswerLength::BySilence), Err(RequestError::PduLength { len: 0 }));
     assert_eq!(Request::custom(&[0x83], AnswerLength::BySilence), Err(RequestError::Function { function: 0x83 }));
     assert_eq!(Request::custom(&[7], AnswerLength::Bytes(0)), Err(RequestError::AnswerLength { len: 0 }));
+}
+
+#[test]
+fn each_table_has_its_function_and_its_limit() {
+    for (table, function, most) in [
+        (Table::Coil, 0x01, 2000),
+        (Table::Discrete, 0x02, 2000),
+        (Table::Holding, 0x03, 125),
+        (Table::Input, 0x04, 125),
+    ] {
+        let longest = Request::read_of(table, 0, most).unwrap();
+        assert_eq!(longest.function(), function);
+        assert!(!longest.is_write());
+        let [c1, c0] = (most + 1).to_be_bytes();
+        let count = usize::from(most) + 1;
+        assert_eq!(Request::parse(&[function, 0, 0, c1, c0]), Err(RequestError::Count { count, max: most }));
+        assert_eq!(Request::read_of(table, 0, 0), Err(RequestError::Count { count: 0, max: most }));
+        assert_eq!(Request::read_of(table, 0xFFFF, 2), Err(RequestError::Range { address: 0xFFFF, count: 2 }));
+        assert_eq!(longest.expected().adu_len(), Some(255), "250 bytes of data, and five around them");
+        assert_eq!(Request::parse(&[function, 0, 0, 0]), Err(RequestError::PduLength { len: 4 }));
+        assert_eq!(Table::named(table.name()), Some(table));
+    }
+}
+
+/// §6.5: FF00H is on, 0000H is off, and nothing else is either.
+#[test]
+fn a_coil_is_on_or_off() {
+    assert_eq!(Request::parse(&[0x05, 0x00, 0xAC, 0xFF, 0x00]), Ok(Request::write_coil(172, true)));
+    assert_eq!(Request::parse(&[0x05, 0x00, 0xAC, 0x00, 0x00]), Ok(Request::write_coil(172, false)));
+    for value in [1, 0xFF, 0xFF01, 0x0100] {
+        let [v1, v0] = u16::to_be_bytes(value);
+        assert_eq!(Request::parse(&[0x05, 0, 0xAC, v1, v0]), Err(RequestError::Coil { value }));
+        assert_eq!(Answer::parse(&[0x05, 0, 0xAC, v1, v0]), Err(AnswerError::Coil { value }));
+    }
+    assert!(Request::write_coil(172, false).is_write());
+    let on = Request::write_coil(172, true);
+    let other = Err(AnswerError::Echo { asked: [172, 0xFF00], came: [172, 0] });
+    assert_eq!(on.judge(&[0x05, 0x00, 0xAC, 0x00, 0x00]), other, "it confirms the opposite");
+}
+
+#[test]
+fn an_answer_belongs_to_one_table_only() {
+    let read = |table| Request::read_of(table, 0, 8).unwrap();
+    for asked in Table::ALL {
+        for came in Table::ALL {
+            let adu = Adu::answer(UnitAddress::MIN, &Answer::read_of(came, &[1; 8]).unwrap());
+            let verdict = read(asked).judge(Frame::parse(adu.as_bytes()).unwrap().pdu()).map(|_| ());
+            let wrong = AnswerError::Function { asked: asked.function(), came: came.function() };
+            assert_eq!(verdict, if asked == came { Ok(()) } else { Err(wrong) });
+        }
+    }
+}
+
+/// §6.1: the rest of the last byte is filled with zeros. Who fills it otherwise is understood.
+#[test]
+fn bits_that_nobody_asked_for_are_not_there() {
+    let asked = Request::read_of(Table::Coil, 0, 3).unwrap();
+    for byte in [0b0000_0101, 0b1010_0101] {
+        let pdu = [0x01, 1, byte];
+        let Ok(Answer::Read { words, .. }) = asked.judge(&pdu) else { unreachable!("{byte:08b}") };
+        assert_eq!(words, Words::new(&[1, 0, 1]));
+    }
+}
+
+#[test]
+fn what_is_carried_as_it_is_stays_so() {
+    // The Huanyang HY writes a parameter by 02H: as a read of discrete inputs it would be asked twice.
+    for pdu in [[0x01, 0, 19, 0, 19], [0x02, 3, 5, 0, 100], [0x04, 0, 8, 0, 1], [0x05, 0, 0xAC, 0xFF, 0]] {
+        assert_eq!(Request::raw(&pdu, None), Request::custom(&pdu, AnswerLength::BySilence));
+        assert!(!matches!(Request::parse(&pdu), Ok(Request::Custom { .. })), "{pdu:02X?}");
+    }
 }
 
 #[test]

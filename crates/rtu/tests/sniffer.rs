@@ -548,9 +548,9 @@ proptest! {
     fn what_a_master_sends_is_heard(request in requests(), unit in 1..=247_u8) {
         let unit = UnitAddress::new(unit).unwrap();
         let request = request.borrow();
-        let words = [7; 125];
+        let words = [7; 2000];
         let answer = match request {
-            Request::ReadHolding { count, .. } => Answer::read(&words[..usize::from(count)]).unwrap(),
+            Request::Read { table, count, .. } => Answer::read_of(table, &words[..usize::from(count)]).unwrap(),
             Request::Custom { pdu, .. } => Answer::custom(pdu).unwrap(),
             _ => Answer::confirming(&request).unwrap(),
         };

@@ -23,7 +23,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_rtu::{ExceptionCode, Instant, UnitAddress};
+use drivebus_rtu::{ExceptionCode, Instant, Table, UnitAddress};
 
 pub(crate) use all::Drives;
 pub(crate) use family::{Family, own, unlisted};
@@ -45,6 +45,8 @@ const USUAL_LOAD: f64 = 0.3;
 pub struct WriteRecord {
     /// When.
     pub at: Instant,
+    /// Where.
+    pub table: Table,
     /// The address as it was written to, with the RAM bit if it was set.
     pub address: u16,
     /// The word.
@@ -235,7 +237,7 @@ impl Drive {
     }
 
     pub(crate) fn eeprom_writes_of(&self, address: u16) -> u64 {
-        self.store.eeprom_writes_of(self.plain(address))
+        self.store.eeprom_writes_of(places::table_of(self.plain(address.into())).1)
     }
 
     pub(crate) fn writes(&self) -> Vec<WriteRecord> {
@@ -279,7 +281,7 @@ impl Drive {
         address.map_or(0, |address| self.parameter(address))
     }
 
-    fn control_word(&self, address: u16) -> u16 {
+    fn control_word(&self, address: u32) -> u16 {
         self.map.control(address).and_then(|place| self.control.get(place)).copied().unwrap_or(0)
     }
 

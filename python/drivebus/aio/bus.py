@@ -120,17 +120,31 @@ class Bus(BusFace):
 
     @documented_by(Requests.read)
     async def read(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> list[int]:
         """See `Requests.read`."""
-        return await self._asked().read(unit, address, count, urgent=urgent, verify=verify)
+        return await self._asked().read(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     @documented_by(Requests.read_stamped)
     async def read_stamped(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `Requests.read_stamped`."""
-        return await self._asked().read_stamped(unit, address, count, urgent=urgent, verify=verify)
+        return await self._asked().read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     @documented_by(Requests.write)
     async def write(
@@ -143,10 +157,18 @@ class Bus(BusFace):
         read_back: int | None = None,
         connection: int | None = None,
         force: bool = False,
+        table: str = "holding",
     ) -> None:
         """See `Requests.write`."""
         await self._asked().write(
-            unit, address, value, urgent=urgent, read_back=read_back, connection=connection, force=force
+            unit,
+            address,
+            value,
+            urgent=urgent,
+            read_back=read_back,
+            connection=connection,
+            force=force,
+            table=table,
         )
 
     @documented_by(Requests.broadcast)

@@ -59,9 +59,9 @@ class AwaitedRequests:
         """The same line for who has no event loop: it blocks."""
         return BlockingBus(Requests(self._line.native, self._known))
 
-    async def look(self, unit: int, address: int, timeout: float) -> list[int]:
+    async def look(self, unit: int, address: int, timeout: float, table: str = "holding") -> list[int]:
         """Reads one word, within *timeout* seconds, and not again."""
-        return await self._line.read(unit, address, 1, timeout=timeout, retries=0)
+        return await self._line.read(unit, address, 1, timeout=timeout, retries=0, table=table)
 
     async def sleep(self, seconds: float, /) -> None:
         """See `Requests`."""
@@ -72,18 +72,32 @@ class AwaitedRequests:
         return await self._line.listen(seconds_of(seconds))
 
     async def read(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> list[int]:
         """See `Requests`."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify)
-        return await self._line.read(unit, address, count, urgent=urgent, verify=verify)
+        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return await self._line.read(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     async def read_stamped(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `Requests`."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify)
-        return await self._line.read_stamped(unit, address, count, urgent=urgent, verify=verify)
+        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return await self._line.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     async def write(
         self,
@@ -95,10 +109,11 @@ class AwaitedRequests:
         read_back: int | None = None,
         connection: int | None = None,
         force: bool = False,
+        table: str = "holding",
     ) -> None:
         """See `Requests`."""
-        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force)
-        await self._line.write(*checked, urgent=urgent, read_back=read_back, connection=connection)
+        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
+        await self._line.write(*checked, urgent=urgent, read_back=read_back, connection=connection, table=table)
 
     async def link(self, unit: int) -> Link:
         """See `Requests`."""

@@ -49,7 +49,7 @@ def place(unit: Unit, code: str, *, store: bool) -> int:
     profile = unit.profile
     memory = profile.memory()
     address = profile.address(code, store=store)
-    plain = store and address == profile.describe(code).address
+    plain = store and address == profile.describe(code).place
     if memory is None or unit.evidence.allows(memory["reason"]) or plain:
         return address
     raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")

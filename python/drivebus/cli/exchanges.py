@@ -8,6 +8,7 @@ from datetime import datetime, timezone
 from typing import Any
 
 import drivebus
+from drivebus import places
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import exit_code
 from drivebus.line.trace import meaning
@@ -123,6 +124,6 @@ def taken_back(families: Families) -> Iterator[str]:
     """What is to be said of guesses that did not hold."""
     for unit, name, address in families.withdrawn():
         yield (
-            f"unit {unit} was taken for {name} by what it was asked. It was asked for {address:04X}H now, which does "
-            f"not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
+            f"unit {unit} was taken for {name} by what it was asked. It was asked for {places.shown(address)} now, "
+            f"which does not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
         )

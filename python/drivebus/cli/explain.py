@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 import drivebus
+from drivebus import places
 from drivebus.cli import names
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import counted
@@ -45,7 +46,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
         _show_matches(session, profile, wanted, found)
         return
     values = dict(vars(known))
-    values["address"] = None if known.address is None else f"{known.address:04X}H"
+    values["address"] = None if known.place is None else places.shown(known.place)
     if not session.out.as_json:
         values["choices"] = ", ".join(f"{number} = {label}" for number, label in known.choices.items())
         values["bits"] = ", ".join(known.bits or {})
@@ -152,7 +153,7 @@ def _groups(rows: list[drivebus.Description]) -> list[str]:
 
 
 def _address(row: drivebus.Description) -> str | None:
-    return None if row.address is None else f"{row.address:04X}H"
+    return None if row.place is None else places.shown(row.place)
 
 
 def _range(row: drivebus.Description) -> str:

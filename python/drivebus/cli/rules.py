@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import drivebus
+from drivebus import places
 from drivebus.line.write_guard import code_text
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
@@ -109,7 +110,7 @@ def _identification(profile: drivebus.Profile) -> list[str]:
     signature = profile.signature()
     if signature is not None:
         told = [
-            f"{what} {', '.join(f'{address:04X}H' for address in signature[key])}"
+            f"{what} {', '.join(places.shown(place) for place in signature[key])}"
             for key, what in (("answers", "answers"), ("refuses", "refuses"))
             if signature[key]
         ]
@@ -125,16 +126,24 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     lines = []
     registers = profile.command_registers()
     for address in sorted(registers, key=lambda address: address != profile.command_address):
-        lines.append(f"written to {address:04X}H")
+        lines.append(f"written to {places.shown(address)}")
         for code, label in sorted(registers[address].items()):
-            doubt = " [unverified]" if label in reasons else ""
-            lines.append(f"{_code(code, label)}{doubt}")
+            either = label.split(" or ")
+            for command in either if {*either} <= {*profile.commands()} else [label]:
+                doubt = " [unverified]" if command in reasons else ""
+                lines.append(f"{_code(code, command)}{_after(profile, command)}{doubt}")
     for number, step in enumerate(profile.start_sequence()):
         until = ", ".join(f"{field} = {value}" for field, value in step["until"].items())
         when = "before a run or jog from rest:" if number == 0 else "then"
         lines.append(f"{when} {_code(step['word'], step['label']).lstrip()}, until {until}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
+
+
+def _after(profile: drivebus.Profile, command: str) -> str:
+    """What goes out before *command*, if anything does."""
+    first = profile.command_first(command) if command in profile.commands() else None
+    return "" if first is None else f", after {first[1]} at {places.shown(first[0])}"
 
 
 def _code(code: int, label: str) -> str:
@@ -230,7 +239,7 @@ def _left_alone(profile: drivebus.Profile) -> list[str]:
 
 def _place(profile: drivebus.Profile, name: str) -> str:
     row = profile.describe(name)
-    return f"{name}, whose address is not known" if row.address is None else f"{name} ({row.address:04X}H)"
+    return f"{name}, whose address is not known" if row.address is None else f"{name} ({places.shown(row.place or 0)})"
 
 
 def _doubt(verified: bool, note: str) -> str:

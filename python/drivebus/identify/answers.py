@@ -6,10 +6,13 @@ from typing import NamedTuple
 
 from drivebus.profile import Profile
 
-__all__ = ["LOCKED", "UNREACHED", "Answer", "no_such_address", "passes", "tells_nothing"]
+__all__ = ["LOCKED", "NO_FUNCTION", "UNREACHED", "Answer", "no_such_address", "passes", "tells_nothing"]
 
 _ILLEGAL_ADDRESS = 0x02
 """In the Modbus specification, and under this name in the profiles that list their exceptions."""
+
+NO_FUNCTION = 0x01
+"""In the Modbus specification: the unit does not know the function, and so has no such table."""
 
 LOCKED = 0x09
 """The exception of an INVT drive that refuses all but the password. Whose unit this is, nobody knows yet."""
@@ -26,7 +29,7 @@ _DAMAGED = "frame_error"
 
 
 class Answer(NamedTuple):
-    """How a unit answered the question for the word at *address*: with a *word*, or with an *exception*."""
+    """How a unit answered the question for the word at *address*, its place: with a *word*, or with an *exception*."""
 
     address: int
     word: int | None

@@ -21,7 +21,7 @@ Row = dict[str, Any]
 def address_of(profile: Profile) -> int | None:
     """The address where units of *profile* keep their code; None if they have none."""
     register = profile.role("identification")
-    return None if register is None else profile.describe(register).address
+    return None if register is None else profile.describe(register).place
 
 
 @functools.cache

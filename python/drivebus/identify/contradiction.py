@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from drivebus import places
 from drivebus.identify import codes
-from drivebus.identify.answers import Answer, no_such_address
+from drivebus.identify.answers import NO_FUNCTION, Answer, no_such_address
 from drivebus.identify.families import one_of, shipped
 from drivebus.identify.signatures import signature_of
 from drivebus.profile import Profile, profiles
@@ -108,11 +109,14 @@ def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
     """What speaks against *profile* if the unit says that it lacks an address which each unit of it has."""
     if answer.exception is None or answer.address not in _must_have(profile):
         return None
-    if not no_such_address(profile, answer.exception):
+    table, _ = places.split(answer.address)
+    no_function = table != "holding" and answer.exception == NO_FUNCTION
+    if not no_function and not no_such_address(profile, answer.exception):
         return None
+    what = "function" if no_function else "address"
     return (
-        f"it refuses {answer.address:04X}H (exception {answer.exception:02X}H: there is no such address), which each "
-        f"of those answers: see what it is (bus.identify({unit}), `drivebus info`) and name that"
+        f"it refuses {places.shown(answer.address)} (exception {answer.exception:02X}H: there is no such {what}), "
+        f"which each of those answers: see what it is (bus.identify({unit}), `drivebus info`) and name that"
     )
 
 

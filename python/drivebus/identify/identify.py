@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivebus import places
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.identify import codes, signatures
 from drivebus.identify.answers import LOCKED, UNREACHED, no_such_address
@@ -49,8 +50,10 @@ async def identify(read: Read, unit: int) -> Identification:
         reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
     told_by = [signatures.listed()[name] for name in candidates]
-    telling = {address for signature in told_by for address in (*signature["answers"], *signature["refuses"])}
-    seen = ", ".join(f"{address:04X}H {'answered' if answered[address] else 'refused'}" for address in sorted(telling))
+    telling = {place for signature in told_by for place in (*signature["answers"], *signature["refuses"])}
+    seen = ", ".join(
+        f"{places.shown(place)} {'answered' if answered[place] else 'refused'}" for place in sorted(telling)
+    )
     return Identification(
         unit,
         candidates,
@@ -85,10 +88,11 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
     known = next(map(Profile.builtin, shipped(found.candidates)), None)
     register = None if known is None else known.role("state")
     about = None if known is None or register is None else known.describe(register)
-    if known is None or about is None or about.address is None or about.evidence == "assumed":
+    if known is None or about is None or about.place is None or about.evidence == "assumed":
         return found
     try:
-        [word] = await read(found.unit, about.address)
+        address, table = places.at(about.place)
+        [word] = await read(found.unit, address, **table)
     except Refused as error:
         if not no_such_address(known, error.code):
             return found
@@ -100,7 +104,7 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
             return found
         against = f"says {word} at"
     reason = (
-        f"{found.reason}; but it {against} {about.address:04X}H, where such a drive has its state: "
+        f"{found.reason}; but it {against} {places.shown(about.place)}, where such a drive has its state: "
         f"{place:04X}H may have another meaning"
     )
     return replace(found, certainty="unverified", reason=reason)

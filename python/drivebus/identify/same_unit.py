@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivebus import places
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer, passes, tells_nothing
@@ -142,7 +143,8 @@ class SameUnit:
 
     async def _answer(self, bus: AwaitableBus, address: int) -> Answer:
         try:
-            [word] = await bus.read(self._unit, address)
+            first, table = places.at(address)
+            [word] = await bus.read(self._unit, first, **table)
         except Refused as error:
             return Answer(address, None, error.code)
         return Answer(address, word, None)
@@ -156,7 +158,7 @@ class SameUnit:
         told = {answer.address: self._shown(answer) for answer in answers}
         if len(told) == 1:
             return next(iter(told.values()))
-        return ", ".join(f"{_hex(address)} {said}" for address, said in told.items())
+        return ", ".join(f"{places.shown(address)} {said}" for address, said in told.items())
 
     def _shown(self, answer: Answer) -> str:
         if answer.word is None:
@@ -176,7 +178,7 @@ def _questions(profile: Profile) -> tuple[Sequence[int], Sequence[int]]:
         return (), (*signature["answers"], *signature["refuses"])
     # Whether it has the words that are always asked of its family is better than nothing.
     known = [profile.describe(name) for role in ("state", "fault") if (name := profile.role(role))]
-    asked = [each.address for each in known if each.address is not None and each.evidence != "assumed"]
+    asked = [each.place for each in known if each.place is not None and each.evidence != "assumed"]
     # What the profile has there itself is no code.
     others = [address for address in codes.registers() if profile.name_at(address) is None]
     return (), (*others, *asked)

@@ -37,9 +37,9 @@ async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | N
     started = now()
     took: list[float] = []
 
-    async def timed(unit: int, address: int) -> list[int]:
+    async def timed(unit: int, address: int, **table: str) -> list[int]:
         try:
-            return await read(unit, address)
+            return await read(unit, address, **table)
         finally:
             took.append(now() - started)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Awaitable, Callable
 
+from drivebus import places
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.profile import Profile, profiles
 
 __all__ = ["Read", "Signature", "listed", "shown_by", "signature_of"]
 
-Read = Callable[[int, int], Awaitable[list[int]]]
-"""Asks a unit for the word at an address."""
+Read = Callable[..., Awaitable[list[int]]]
+"""Asks a unit for the word at an address; with the keyword `table`, of another one than the holding registers."""
 
 Signature = dict[str, list[int]]
 """The addresses that a unit `answers`, and those that it `refuses`: see `Profile.signature`."""
@@ -36,19 +37,20 @@ async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[st
     """
     shown = []
     for name, signature in listed().items():
-        wanted = [(address, True) for address in signature["answers"]]
-        wanted += [(address, False) for address in signature["refuses"]]
-        for address, yes in wanted:
-            if address not in answered:
+        wanted = [(place, True) for place in signature["answers"]]
+        wanted += [(place, False) for place in signature["refuses"]]
+        for place, yes in wanted:
+            if place not in answered:
+                address, table = places.at(place)
                 try:
-                    await read(unit, address)
-                    answered[address] = True
+                    await read(unit, address, **table)
+                    answered[place] = True
                 except Refused:
-                    answered[address] = False
+                    answered[place] = False
                 except (NoAnswer, BadAnswer):
                     # Neither, then: no signature has it.
                     break
-            if answered[address] is not yes:
+            if answered[place] is not yes:
                 break
         else:
             shown.append(name)

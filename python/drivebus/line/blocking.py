@@ -43,16 +43,32 @@ class BlockingBus:
         self._bus.sleep(seconds)
 
     async def read(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> list[int]:
         """See `BusProtocol`."""
-        return self._bus.read(unit, address, count, urgent=urgent, verify=verify)
+        return self._bus.read(unit, address, count, urgent=urgent, verify=verify, **_of(table))
 
     async def read_stamped(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `BusProtocol`."""
-        return self._bus.read_stamped(unit, address, count, urgent=urgent, verify=verify)
+        return self._bus.read_stamped(unit, address, count, urgent=urgent, verify=verify, **_of(table))
 
     async def write(
         self,
@@ -65,10 +81,12 @@ class BlockingBus:
         read_back: int | None = None,
         connection: int | None = None,
         force: bool = False,
+        table: str = "holding",
     ) -> None:
         """See `BusProtocol`."""
-        forced = {"force": True} if force else {}
-        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **forced)
+        rest: dict[str, Any] = {"force": True} if force else {}
+        rest |= _of(table)
+        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **rest)
 
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""
@@ -86,6 +104,11 @@ class BlockingBus:
     def blocking(self) -> BlockingBus:
         """Itself."""
         return self
+
+
+def _of(table: str) -> dict[str, Any]:
+    """What a bus is told of *table*: nothing of holding registers, so that a bus which knows no other will do."""
+    return {} if table == "holding" else {"table": table}
 
 
 def at_once(work: Coroutine[Any, Any, _R]) -> _R:

@@ -24,12 +24,26 @@ class BusProtocol(Protocol):
         """Waits on the line's clock."""
 
     def read(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
     ) -> list[int]:
         """Reads words; repeated by the bus's own policy. *urgent* before all who wait; *verify* asks twice."""
 
     def read_stamped(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
     ) -> tuple[list[int], float, float]:
         """Reads words, with the Unix times of request and answer."""
 
@@ -65,7 +79,7 @@ class BusProtocol(Protocol):
 
 
 class AwaitableBus(Protocol):
-    """A bus as the operations know it: the same calls, to be awaited.
+    """A bus as the operations know it: the same calls, to be awaited, and the tables beside the holding registers.
 
     Whatever else an operation awaits is made of them, so that over a bus that blocks nothing is left to wait for.
     """
@@ -77,12 +91,28 @@ class AwaitableBus(Protocol):
         """See `BusProtocol`."""
 
     async def read(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> list[int]:
         """See `BusProtocol`."""
 
     async def read_stamped(
-        self, unit: int, address: int, count: int = 1, /, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        /,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `BusProtocol`."""
 
@@ -97,6 +127,7 @@ class AwaitableBus(Protocol):
         read_back: int | None = None,
         connection: int | None = None,
         force: bool = False,
+        table: str = "holding",
     ) -> None:
         """See `BusProtocol`."""
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus import _native, checks
+from drivebus import _native, checks, places
 from drivebus.errors import NotAllowed
 from drivebus.line.stats import Link
 from drivebus.line.write_guard import KnownUnits
@@ -58,8 +58,20 @@ class Requests:
         """
         return self._native.listen(seconds_of(seconds))
 
-    def read(self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> list[int]:
+    def read(
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
+    ) -> list[int]:
         """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.
+
+        With *table*, `"input"` registers (04H), or bits, 1..2000 of them and each 0 or 1: `"coil"` (01H), `"discrete"`
+        (02H).
 
         Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
 
@@ -75,15 +87,22 @@ class Requests:
             PortError: The port is lost, or the bus closed.
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify)
-        return self._native.read(unit, address, count, urgent=urgent, verify=verify)
+        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return self._native.read(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     def read_stamped(
-        self, unit: int, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+        self,
+        unit: int,
+        address: int,
+        count: int = 1,
+        *,
+        urgent: bool = False,
+        verify: bool = False,
+        table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and at which the answer was complete."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify)
-        return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify)
+        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     def write(
         self,
@@ -95,8 +114,11 @@ class Requests:
         read_back: int | None = None,
         connection: int | None = None,
         force: bool = False,
+        table: str = "holding",
     ) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
+
+        With *table* `"coil"` one coil, to 0 or 1 (05H).
 
         A word in a command register moves the motor. Of units for which `drive` was asked, the family is known: a word
         that would be a command which that family does not define, or the command register of another one, is refused
@@ -122,8 +144,8 @@ class Requests:
             Refused: The unit did not take it.
             Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
         """
-        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force)
-        self._native.write(*checked, urgent=urgent, read_back=read_back, connection=connection)
+        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
+        self._native.write(*checked, urgent=urgent, read_back=read_back, connection=connection, table=table)
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
@@ -157,9 +179,12 @@ class Requests:
         return self._native.transact(*transact_of(self._known, unit, pdu, reply_length, force))
 
 
-def read_of(unit: int, address: int, count: int, *, urgent: object, verify: object) -> tuple[int, int, int]:
+def read_of(
+    unit: int, address: int, count: int, *, urgent: object, verify: object, table: object = "holding"
+) -> tuple[int, int, int]:
     """What a read is of. Raises `NotAllowed` where something is out of range."""
-    unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, 125)
+    most = 125 if table == "holding" or checks.one_of("table", table, places.TABLES) not in places.BITS else 2000
+    unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, most)
     # Without a call for each of them where both are right.
     if type(urgent) is not bool or type(verify) is not bool:
         checks.flag("urgent", urgent)
@@ -176,15 +201,16 @@ def write_of(
     read_back: int | None,
     connection: int | None,
     force: bool,
+    table: object = "holding",
 ) -> tuple[int, int, int | list[int]]:
     """What a write is of. Raises `NotAllowed` where something is out of range, or would be an unknown command."""
     if read_back is not None:
         checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
     if connection is not None:
         checks.whole("connection", connection, 0, 2**63)
-    unit, address, words = checks.unit(unit), checks.address(address), checks.payload(value)
+    unit, address, words = checks.unit(unit), checks.address(address), checks.of_table(table, value)
     checks.flag("urgent", urgent)
-    known.check(unit, address, words, checks.flag("force", force))
+    known.check(unit, places.place(str(table), address), words, checks.flag("force", force))
     return unit, address, words
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Protocol
 
-from drivebus import rtu
+from drivebus import places, rtu
 from drivebus.errors import DrivebusError
 from drivebus.line.write_guard import KnownUnits, code_text
 from drivebus.profile import Profile
@@ -119,7 +119,7 @@ def meaning(frame: bytes, sent: bool, asked: bytes | None = None, profile: Profi
 
 
 def _request(fields: rtu.Frame, profile: Profile | None) -> str:
-    first = fields.address or 0
+    first = _place(fields)
     match fields.kind:
         case "read":
             return f"read {_names(first, fields.count or 0, profile)}"
@@ -139,11 +139,11 @@ def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> 
             first = _read_from(asked, fields)
             if first is None:
                 return f"answers {' '.join(f'{word:04X}H' for word in words)}"
-            return f"answers {_values(first, words, profile)}"
+            return f"answers {_values(first, words[: _asked_for(asked)], profile)}"
         case "write":
-            return f"took {_values(fields.address or 0, [fields.value or 0], profile, written=True)}"
+            return f"took {_values(_place(fields), [fields.value or 0], profile, written=True)}"
         case "write_many_answer":
-            return f"took {_names(fields.address or 0, fields.count or 0, profile, written=True)}"
+            return f"took {_names(_place(fields), fields.count or 0, profile, written=True)}"
         case "echo":
             return f"returns {fields.data:04X}H"
         case "exception":
@@ -151,7 +151,7 @@ def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> 
             known = "" if profile is None else f" {', '.join(profile.exception(code))}"
             return f"refuses function {fields.function:02X}H: exception {code:02X}H{known}"
         case "read":
-            return f"is asked by another master: read {_names(fields.address or 0, fields.count or 0, profile)}"
+            return f"is asked by another master: read {_names(_place(fields), fields.count or 0, profile)}"
     return f"answers function {fields.function:02X}H"
 
 
@@ -160,13 +160,25 @@ def _read_from(asked: bytes | None, answer: rtu.Frame) -> int | None:
     if asked is None:
         return None
     request = rtu.decode(asked)
-    fits = request.kind == "read" and request.unit == answer.unit and request.count == answer.count
-    return request.address if fits else None
+    if request.kind != "read" or (request.unit, request.table) != (answer.unit, answer.table):
+        return None
+    return _place(request) if request.count == _count(request, answer) else None
+
+
+def _count(request: rtu.Frame, answer: rtu.Frame) -> int | None:
+    """How many *answer* brings of what was asked: an answer of bits fills its last byte."""
+    asked, came = request.count or 0, answer.count or 0
+    fills = request.table in places.BITS and asked <= came < asked + 8
+    return asked if fills else answer.count
+
+
+def _place(fields: rtu.Frame) -> int:
+    return places.place(fields.table, fields.address or 0)
 
 
 def _names(first: int, count: int, profile: Profile | None, *, written: bool = False) -> str:
     """What stands at *count* addresses from *first* on."""
-    where = f"{first:04X}H" if count == 1 else f"{count} words at {first:04X}H"
+    where = places.shown(first) if count == 1 else f"{count} {_many(first)} at {places.split(first)[1]:04X}H"
     rows = (_row(address, profile, written) for address in range(first, first + count))
     named = [_called(row) for row in rows if row is not None]
     if not named:
@@ -188,7 +200,7 @@ def _each(first: int, words: list[int], profile: Profile | None, written: bool) 
         row = _row(address, profile, written)
         count = 1 if row is None else min(row.words, len(words) - at)
         if profile is None or row is None:
-            yield f"{address:04X}H = {word}"
+            yield f"{places.shown(address)} = {word}"
         else:
             yield f"{_called(row)} = {_value(row, words[at : at + count], profile)}"
         at += count
@@ -196,7 +208,7 @@ def _each(first: int, words: list[int], profile: Profile | None, written: bool) 
 
 def _value(row: Description, words: list[int], profile: Profile) -> str:
     is_state = row.access == "ro"
-    codes = None if row.address is None or is_state else profile.command_registers().get(row.address)
+    codes = None if row.place is None or is_state else profile.command_registers().get(row.place)
     if codes is not None:
         meant = codes.get(words[0])
         return code_text(words[0]) if meant is None else f"{code_text(words[0])} ({meant.replace('_', ' ')})"
@@ -213,6 +225,15 @@ def _value(row: Description, words: list[int], profile: Profile) -> str:
 
 def _called(row: Description) -> str:
     return row.name if row.code is None or row.code == row.name else f"{row.code} {row.name}"
+
+
+def _asked_for(asked: bytes | None) -> int | None:
+    return None if asked is None else rtu.decode(asked).count
+
+
+def _many(place: int) -> str:
+    table, _ = places.split(place)
+    return {"coil": "coils", "discrete": "discrete inputs", "input": "input registers"}.get(table, "words")
 
 
 def _row(address: int, profile: Profile | None, written: bool) -> Description | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Mapping, Sequence
 
+from drivebus import places
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.rtu import written
@@ -77,8 +78,8 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
     codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return NotAllowed(
-        f"{code_text(word)} at {address:04X}H is not a command of unit {unit}, which is known as {family.title}: its "
-        f"codes are {codes or 'not known'}; {_HINT}",
+        f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
+        f"{family.title}: its codes are {codes or 'not known'}; {_HINT}",
         unit=unit,
     )
 
@@ -91,10 +92,10 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
     if others is None or any(family.name_at(place) is not None for family in families for place in plain):
         return
     own = families[0].command_address
-    where = "is not known" if own is None else f"is {own:04X}H"
+    where = "is not known" if own is None else f"is {places.shown(own)}"
     raise NotAllowed(
-        f"{address:04X}H is the command register of {others}; unit {unit} is known as {families[0].title}, whose "
-        f"command register {where}; {_HINT}",
+        f"{places.shown(address)} is the command register of {others}; unit {unit} is known as {families[0].title}, "
+        f"whose command register {where}; {_HINT}",
         unit=unit,
     )
 
@@ -107,6 +108,8 @@ def _codes_at(family: Profile, address: int) -> Mapping[int, str] | None:
 
 def _plain(family: Profile, address: int) -> int:
     """*address* without what tells RAM from EEPROM."""
+    if places.split(address)[0] != "holding":
+        return address
     memory = family.memory()
     return address & ~(1 << (15 if memory is None else memory["bit"]))
 

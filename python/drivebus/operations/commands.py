@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
+from drivebus import places
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.operations import halts, setpoints, state, words
 from drivebus.operations.state import Seen
@@ -15,7 +16,18 @@ from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
-__all__ = ["A_WORD", "HALTS", "POLL_INTERVAL", "Proof", "confirm", "explained", "give", "prepared", "send_once"]
+__all__ = [
+    "A_WORD",
+    "HALTS",
+    "POLL_INTERVAL",
+    "Proof",
+    "confirm",
+    "explained",
+    "give",
+    "prepared",
+    "send_once",
+    "send_whole",
+]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
@@ -47,8 +59,8 @@ HALTS = ("stop", "coast", "jog_stop")
 
 
 async def give(unit: Unit, name: str) -> None:
-    """Sends the command word once."""
-    await send_once(unit, name, *unit.profile.command(name))
+    """Sends the command word once, after what comes before it."""
+    await send_whole(unit, name, *unit.profile.command(name))
 
 
 async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, int | list[int]]:
@@ -63,6 +75,21 @@ async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, in
             return address, [code, setpoint]
         await setpoints.write_word(unit, setpoint)
     return address, code
+
+
+async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
+    """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too."""
+    first = unit.profile.command_first(name)
+    if first is not None:
+        before = halts.begun(unit)
+        await send_once(unit, name, *first)
+        if name not in HALTS and halts.begun(unit) != before:
+            raise Unconfirmed(
+                f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
+                f"which comes before {name}; the rest of {name} was not sent",
+                unit=unit.address,
+            )
+    await send_once(unit, name, address, payload)
 
 
 async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:

@@ -196,7 +196,7 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     address, payload = await commands.prepared(unit, command, setpoint)
     if not before.state.running:
         await start_sequence.lead_up(unit, command, confirm)
-    await commands.send_once(unit, command, address, payload)
+    await commands.send_whole(unit, command, address, payload)
 
     async def shows(seen: Seen) -> bool:
         if "state" in seen.missing:

@@ -174,7 +174,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
     known = unit.profile.describe(name)
     if not known.writable:
         raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=unit.address)
-    if known.address is not None and unit.profile.is_command(known.address):
+    if known.place is not None and unit.profile.is_command(known.place):
         raise NotAllowed(
             f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
             "or reset_fault(), or for terminals and the special control word their own methods",
@@ -190,7 +190,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
     raw = unit.profile.encode(name, value)
     unit.evidence.writes_word(name, raw)
     address = unit.profile.address(name, store=store)
-    if known.kind == "parameter" and (address != known.address or not store):
+    if known.kind == "parameter" and (address != known.place or not store):
         memory = unit.profile.memory()
         kept = "EEPROM" if store else "RAM"
         reason = None if memory is None else memory["reason"]

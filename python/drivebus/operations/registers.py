@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
+from drivebus import places
 from drivebus.errors import NotAllowed
 from drivebus.operations import variants, words
 from drivebus.operations.unit import Unit
@@ -55,9 +56,10 @@ async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bo
     plan = unit.profile.compile(names)
     answers: list[list[int]] = []
     started = ended = 0.0
-    for address, count in plan.reads:
+    for place, count in plan.reads:
+        address, table = places.at(place)
         with words.explained(unit):
-            came, sent, ended = await unit.bus.read_stamped(unit.address, address, count, verify=verify)
+            came, sent, ended = await unit.bus.read_stamped(unit.address, address, count, verify=verify, **table)
         started = started if answers else sent
         answers.append(came)
     values = dict(zip(plan.names, plan.values(answers), strict=True))

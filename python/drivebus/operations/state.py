@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from drivebus import places
 from drivebus.errors import NotAllowed
 from drivebus.operations import registers, words
 from drivebus.operations.unit import Unit
@@ -101,9 +102,10 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
         return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
     answers: list[list[int]] = []
     first = 0.0
-    for address, count in plan.plan.reads:
+    for place, count in plan.plan.reads:
+        address, table = places.at(place)
         with words.explained(unit):
-            came, time, _ = await unit.bus.read_stamped(unit.address, address, count, urgent=urgent)
+            came, time, _ = await unit.bus.read_stamped(unit.address, address, count, urgent=urgent, **table)
         first = first if answers else time
         answers.append(came)
     values = dict(zip(plan.plan.names, map(int, plan.plan.values(answers)), strict=True))

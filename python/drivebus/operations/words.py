@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
-from drivebus import checks
+from drivebus import checks, places
 from drivebus.errors import PortError, Refused
 from drivebus.line.write_guard import check_words
 from drivebus.operations.unit import Unit
@@ -18,6 +19,9 @@ _WRITE_ONE, _WRITE_MANY = 0x06, 0x10
 _LOCKED = ("password_error", "password_protected")
 """What INVT's families call the exceptions that have to do with the user password."""
 
+_TABLES = {0x01: "coil", 0x02: "discrete", 0x04: "input", 0x05: "coil"}
+"""The functions that are not for holding registers, and whose table they are for."""
+
 _UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
 """What an exception is called that no profile names, and one that the specification does not name either."""
 
@@ -25,9 +29,10 @@ _UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
 async def read_words(
     unit: Unit, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
 ) -> list[int]:
-    """Reads words by address, as they are. As `Bus.read`, but a refusal says what this family means by it."""
+    """Reads words by address or place, as they are. As `Bus.read`, but a refusal says what this family means by it."""
+    first, table = places.at(address)
     with explained(unit):
-        return await unit.bus.read(unit.address, address, count, urgent=urgent, verify=verify)
+        return await unit.bus.read(unit.address, first, count, urgent=urgent, verify=verify, **table)
 
 
 async def write_words(unit: Unit, address: int, value: int | Sequence[int], force: bool = False) -> None:
@@ -94,10 +99,13 @@ async def send(
     if isinstance(value, int) and _WRITE_ONE not in functions and _WRITE_MANY in functions:
         value = [value]
     # What a bus of somebody's own must know is the rest: only a raw write is ever forced.
-    forced = {"force": True} if force else {}
+    forced: dict[str, Any] = {"force": True} if force else {}
+    first, table = places.at(address)
+    if read_back is not None:
+        read_back, _ = places.at(read_back)
     with explained(unit):
         await unit.bus.write(
-            unit.address, address, value, urgent=urgent, read_back=read_back, connection=connection, **forced
+            unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **forced, **table
         )
 
 
@@ -142,8 +150,12 @@ def _asked(request: bytes) -> str:
     """What a request frame asked for, for people."""
     if len(request) < 6:
         return "the request"
-    address = f"{int.from_bytes(request[2:4], 'big'):04X}H"
-    number = int.from_bytes(request[4:6], "big")
+    at = places.place(_TABLES.get(request[1]), int.from_bytes(request[2:4], "big"))
+    address, number = places.shown(at), int.from_bytes(request[4:6], "big")
+    if request[1] == 0x05:
+        return f"to switch {address} {'on' if number else 'off'}"
+    if request[1] in _TABLES:
+        return f"to read {address}" if number == 1 else f"to read {number} from {address} on"
     if request[1] == 0x03:
         return f"to read {number} word{'s' if number != 1 else ''} at {address}"
     return f"to write {number} at {address}" if request[1] == 0x06 else f"to write {number} words at {address}"

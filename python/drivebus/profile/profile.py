@@ -184,7 +184,7 @@ class Profile:
         return self._native.monitor_names()
 
     def name_at(self, address: int, /, *, written: bool = False) -> str | None:
-        """The register or parameter at *address* (0..0xFFFF), or None.
+        """The register or parameter at *address* (0..0xFFFF, or the `place` of another table), or None.
 
         Where a state is read and a command is written, that is the state; with *written*, the command.
         """
@@ -192,8 +192,8 @@ class Profile:
             # The first of two names for one place is the one that is meant.
             rows = [self.describe(name) for name in self._names]
             named = list(zip(rows, self._names, strict=True))[::-1]
-            self._orders = {row.address: name for row, name in named if row.access == "wo"}
-            self._places = self._orders | {row.address: name for row, name in named if row.access != "wo"}
+            self._orders = {row.place: name for row, name in named if row.access == "wo"}
+            self._places = self._orders | {row.place: name for row, name in named if row.access != "wo"}
         return (written and self._orders.get(address)) or self._places.get(address)
 
     def describe(self, name: str, /) -> Description:
@@ -209,7 +209,10 @@ class Profile:
         return address if stored is None else stored
 
     def address(self, name: str, /, *, store: bool | None = None) -> int:
-        """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True)."""
+        """Where *name* is read; with *store* given, where it is written for RAM (False) or EEPROM (True).
+
+        Beside the holding registers that is its `Description.place`.
+        """
         return self._native.address(name, store=store)
 
     def read_back(self, name: str, /) -> int | None:
@@ -254,6 +257,10 @@ class Profile:
         """Address and code of a command such as `"run_forward"` or `"coast"`."""
         return self._native.command(name)
 
+    def command_first(self, name: str, /) -> tuple[int, int] | None:
+        """Place and word of what is written before the command, which says which way the motor turns; None for most."""
+        return self._native.command_first(name)
+
     def command_reason(self, name: str, /) -> str | None:
         """Why a command is not verified; None where it is, or where the family has no such command."""
         return self._native.command_reason(name)
@@ -283,7 +290,7 @@ class Profile:
 
     @property
     def command_address(self) -> int | None:
-        """Where commands are written, 0..0xFFFF; None where the family has none."""
+        """Where commands are written, as `address` tells places; None where the family has none."""
         return self._native.command_address
 
     def memory(self) -> dict[str, Any] | None:

@@ -72,7 +72,7 @@ class Families:
         if place is None or unit == 0 or not self.is_guess(unit):
             return
         first, count = place
-        for address, word in enumerate(carried(answer) or [] if answer is not None else [], first):
+        for address, word in enumerate(carried(answer, request) or [] if answer is not None else [], first):
             names = shipped(dict.fromkeys(row["family"] for row in listed_at(address, word) if row["verified"]))
             if len(names) == 1:
                 self._told[unit] = Profile.builtin(names[0])
@@ -98,7 +98,7 @@ class Families:
         place, words = place_of(request), written_by(request)
         written = words is not None
         if words is None and answer is not None and answer[1] == request[1]:
-            words = carried(answer)
+            words = carried(answer, request)
         if place is None or not words:
             return {}
         profile, first, found = self.of(request[0], request), place[0], dict[str | int, Value]()

@@ -63,6 +63,6 @@ def _told(exchanges: Sequence[Exchange], writes: bool) -> list[tuple[int, int, i
             continue
         words = written_by(request) if writes else None
         if words is None:
-            words = carried(answer) if request[1] == _READ == answer[1] else None
+            words = carried(answer, request) if request[1] == _READ == answer[1] else None
         told += [(at, request[0], address, word) for address, word in enumerate(words or (), place[0])]
     return told

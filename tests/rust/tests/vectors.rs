@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use drivebus_rtu::{
     Adu, Answer, AnswerError, Destination, ExceptionCode, Frame, FrameError, Framer, Instant, Request, SerialFormat,
-    Slave, SlaveEvent, UnitAddress, crc16,
+    Slave, SlaveEvent, Table, UnitAddress, crc16,
 };
 use serde::Deserialize;
 
@@ -144,25 +144,31 @@ impl Fields {
     fn of_request(frame: &Frame<'_>) -> Self {
         let unit = frame.address();
         match Request::parse(frame.pdu()).unwrap() {
-            Request::ReadHolding { address, count, .. } => Self::Read { unit, address, count },
+            Request::Read { table: Table::Holding, address, count, .. } => Self::Read { unit, address, count },
             Request::WriteSingle { address, value, .. } => Self::Write { unit, address, value },
             Request::WriteMultiple { address, words, .. } => {
                 Self::WriteMany { unit, address, words: words.iter().collect() }
             }
             Request::Echo { data, .. } => Self::Echo { unit, data },
-            other @ Request::Custom { .. } => panic!("no vector is like {other:?}"),
+            other @ (Request::Read { .. } | Request::WriteCoil { .. } | Request::Custom { .. }) => {
+                panic!("no vector is like {other:?}")
+            }
         }
     }
 
     fn of_answer(frame: &Frame<'_>) -> Self {
         let unit = frame.address();
         match Answer::parse(frame.pdu()).unwrap() {
-            Answer::Read { words, .. } => Self::ReadAnswer { unit, words: words.iter().collect() },
+            Answer::Read { table: Table::Holding, words, .. } => {
+                Self::ReadAnswer { unit, words: words.iter().collect() }
+            }
             Answer::WriteSingle { address, value, .. } => Self::Write { unit, address, value },
             Answer::WriteMultiple { address, count, .. } => Self::WriteManyAnswer { unit, address, count },
             Answer::Echo { data, .. } => Self::Echo { unit, data },
             Answer::Exception { function, code, .. } => Self::Exception { unit, function, code: code.0 },
-            other @ Answer::Custom { .. } => panic!("no vector is like {other:?}"),
+            other @ (Answer::Read { .. } | Answer::WriteCoil { .. } | Answer::Custom { .. }) => {
+                panic!("no vector is like {other:?}")
+            }
         }
     }
 }

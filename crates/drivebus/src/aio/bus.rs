@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use drivebus_drives::Place;
 use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
 use drivebus_rtu::{Destination, Request};
 
@@ -47,21 +48,22 @@ impl Bus {
     }
 
     /// Reads `count` words: as [`Bus::read`](crate::Bus::read).
-    pub fn read(&self, unit: u8, address: u16, count: u16) -> Asked<Vec<u16>> {
+    pub fn read(&self, unit: u8, address: impl Into<Place>, count: u16) -> Asked<Vec<u16>> {
         self.read_with(unit, address, count, CallOptions::new())
     }
 
     /// As [`Bus::read_with`](crate::Bus::read_with).
-    pub fn read_with(&self, unit: u8, address: u16, count: u16, options: CallOptions) -> Asked<Vec<u16>> {
+    pub fn read_with(&self, unit: u8, address: impl Into<Place>, count: u16, options: CallOptions) -> Asked<Vec<u16>> {
+        let place = address.into();
         let checked = || {
-            let (unit, request) = (checks::unit(unit)?, checks::read(address, count)?);
+            let (unit, request) = (checks::unit(unit)?, checks::read(place, count)?);
             Ok((unit.into(), request, options.of(&request)?))
         };
-        self.ask(checked(), |reply| replies::words_of(&reply))
+        self.ask(checked(), move |reply| replies::words_of(&reply, count))
     }
 
     /// Writes a word or a sequence of words: as [`Bus::write`](crate::Bus::write).
-    pub fn write<'a>(&self, unit: u8, address: u16, value: impl Into<Payload<'a>>) -> Asked<()> {
+    pub fn write<'a>(&self, unit: u8, address: impl Into<Place>, value: impl Into<Payload<'a>>) -> Asked<()> {
         self.write_with(unit, address, value, CallOptions::new())
     }
 
@@ -69,13 +71,13 @@ impl Bus {
     pub fn write_with<'a>(
         &self,
         unit: u8,
-        address: u16,
+        address: impl Into<Place>,
         value: impl Into<Payload<'a>>,
         options: CallOptions,
     ) -> Asked<()> {
-        let payload = value.into();
+        let (place, payload) = (address.into(), value.into());
         let checked = || {
-            let (unit, request) = (checks::unit(unit)?, checks::write(address, &payload)?);
+            let (unit, request) = (checks::unit(unit)?, checks::write(place, &payload)?);
             Ok((unit.into(), request, options.of(&request)?))
         };
         self.ask(checked(), drop)
@@ -84,7 +86,7 @@ impl Bus {
     /// Writes to every unit at once: as [`Bus::broadcast`](crate::Bus::broadcast).
     pub fn broadcast<'a>(&self, address: u16, value: impl Into<Payload<'a>>) -> Asked<()> {
         let payload = value.into();
-        let checked = || Ok((Destination::Broadcast, checks::write(address, &payload)?, LineOptions::default()));
+        let checked = || Ok((Destination::Broadcast, checks::write(address.into(), &payload)?, LineOptions::default()));
         self.ask(checked(), drop)
     }
 
@@ -108,8 +110,10 @@ impl Bus {
     /// Those of [`Bus::values`](crate::Bus::values).
     pub async fn values(&self, unit: u8, reading: &Reading) -> Result<Values, Error> {
         let mut words = Vec::with_capacity(reading.words());
-        for (address, count) in reading.reads() {
-            words.extend(self.read(unit, address, count).await?);
+        for (place, count) in reading.spans() {
+            let checked = || Ok((checks::unit(unit)?.into(), checks::read(place, count)?, LineOptions::default()));
+            let came = self.ask(checked(), move |reply| replies::words_of(&reply, count)).await?;
+            words.extend(came);
         }
         Ok(reading.values(&words))
     }

@@ -9,14 +9,15 @@ use super::problems::Problems;
 use super::rows::Located;
 use crate::entry::{Access, Entry, Kind, names};
 use crate::parts::memory::Memory;
+use crate::place::{Place, Table};
 use crate::text::{closest, group, parse_code};
 
 /// The registers and parameters, and where each address is.
 #[derive(Debug, Default)]
 pub(super) struct Entries {
     pub(super) list: Vec<Entry>,
-    /// Of two at one address the one that is read.
-    pub(super) by_address: BTreeMap<u16, usize>,
+    /// Of two at one place the one that is read.
+    pub(super) by_address: BTreeMap<Place, usize>,
     /// Some rows were broken, so that a name that is missing may be theirs.
     pub(super) incomplete: bool,
 }
@@ -34,8 +35,8 @@ impl Entries {
         for (file, Located { line, item }) in rows {
             if let Some(twice) = names(&item).find(|&name| own.iter().any(|other| is_called(other, name))) {
                 problems.add(file, line, format!("{twice} is there twice"));
-            } else if let Some((other, address)) = own.iter().find_map(|other| Some((other, clash(other, &item)?))) {
-                let reason = format!("{} is at {address:04X}H, where {} is already", item.name, other.name);
+            } else if let Some((other, place)) = own.iter().find_map(|other| Some((other, clash(other, &item)?))) {
+                let reason = format!("{} is at {place}, where {} is already", item.name, other.name);
                 problems.add(file, line, reason);
             } else if let Some(reason) = out_of_place(&item, closed_groups, memory) {
                 problems.add(file, line, reason);
@@ -49,10 +50,10 @@ impl Entries {
         let mut list: Vec<Entry> = inherited.into_iter().filter(|old| !replaced(old)).collect();
         list.append(&mut own);
         list.sort_by(|one, other| {
-            let place = |entry: &Entry| (entry.kind, entry.address.is_none(), entry.address);
+            let place = |entry: &Entry| (entry.kind, entry.place.is_none(), entry.place);
             place(one).cmp(&place(other)).then_with(|| one.name.cmp(&other.name))
         });
-        let placed = |index: usize| Some((list.get(index)?.address?, index));
+        let placed = |index: usize| Some((list.get(index)?.place?, index));
         let (written, read): (Vec<_>, Vec<_>) =
             (0..list.len()).filter_map(placed).partition(|&(_, index)| list[index].access == Access::Wo);
         let by_address = written.into_iter().chain(read).collect();
@@ -139,28 +140,30 @@ fn is_called(entry: &Entry, name: &str) -> bool {
     names(entry).any(|own| own.eq_ignore_ascii_case(name))
 }
 
-/// An address that both have, and only one can.
-pub(super) fn clash(one: &Entry, other: &Entry) -> Option<u16> {
+/// A place that both have, and only one can.
+pub(super) fn clash(one: &Entry, other: &Entry) -> Option<Place> {
     overlap(one, other).filter(|_| !is_other_way(one, other))
 }
 
-/// Whether one is what is read and the other what is written at the same address.
+/// Whether one is what is read and the other what is written at the same place.
 pub(super) fn is_other_way(one: &Entry, other: &Entry) -> bool {
     let ways = (one.access, other.access);
-    let same_word = one.address.is_some() && one.address == other.address && one.words() == other.words();
+    let same_word = one.place.is_some() && one.place == other.place && one.words() == other.words();
     same_word && matches!(ways, (Access::Ro, Access::Wo) | (Access::Wo, Access::Ro))
 }
 
-/// An address that both have.
-fn overlap(one: &Entry, other: &Entry) -> Option<u16> {
+/// A place that both have.
+fn overlap(one: &Entry, other: &Entry) -> Option<Place> {
     let last = |first: u16, entry: &Entry| first.saturating_add(entry.words() - 1);
-    let (first, second) = (one.address?, other.address?);
-    (first.max(second) <= last(first, one).min(last(second, other))).then_some(first.max(second))
+    let (Place { table, address: first }, second) = (one.place?, other.place?);
+    let meet = first.max(second.address);
+    let both = table == second.table && meet <= last(first, one).min(last(second.address, other));
+    both.then_some(Place::new(table, meet))
 }
 
 /// Why `entry` cannot stand at its address.
 fn out_of_place(entry: &Entry, closed_groups: &[u8], memory: Option<&Memory>) -> Option<String> {
-    let address = entry.address?;
+    let Place { table: Table::Holding, address } = entry.place? else { return None };
     let [group, _] = address.to_be_bytes();
     if entry.kind == Kind::Parameter && closed_groups.contains(&group) {
         return Some(format!("{} is in the group {group}, which is one of \"closed_groups\"", entry.name));

@@ -17,6 +17,7 @@ use crate::parts::memory::Memory;
 use crate::parts::serial::SerialDefaults;
 use crate::parts::variant::{Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
+use crate::place::Place;
 use crate::quantity::{Quantity, limits};
 use crate::scale::Scale;
 use crate::text::parse_address;
@@ -103,14 +104,14 @@ pub(super) fn signature(
     row: &manifest::Signature,
     problems: &mut Problems,
 ) -> Option<Signature> {
-    let mut addresses = |names: &[Placed<String>]| -> Vec<u16> {
-        let address = |name: &Placed<String>| match parse_address(name.get_ref()) {
-            Some(address) => Some(address),
-            None => entries.get(file, name, problems)?.address,
+    let mut places = |names: &[Placed<String>]| -> Vec<Place> {
+        let place = |name: &Placed<String>| match parse_address(name.get_ref()) {
+            Some(address) => Some(address.into()),
+            None => entries.get(file, name, problems)?.place,
         };
-        names.iter().filter_map(address).collect()
+        names.iter().filter_map(place).collect()
     };
-    let (answers, refuses) = (addresses(&row.answers), addresses(&row.refuses));
+    let (answers, refuses) = (places(&row.answers), places(&row.refuses));
     (!answers.is_empty()).then_some(Signature { answers, refuses })
 }
 

@@ -10,6 +10,7 @@ use crate::bits::BitField;
 use crate::entry::{Access, Entry};
 use crate::parts::memory::Memory;
 use crate::parts::setpoint::Setpoint;
+use crate::place::{Place, Table};
 use crate::profile::Profile;
 
 /// Checks the whole `profile`, which is put together.
@@ -17,6 +18,7 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
     memory(file, manifest, profile, problems);
     words(file, profile, problems);
     setpoints(file, profile, problems);
+    functions(file, manifest, profile, problems);
     sequence(file, profile, problems);
 }
 
@@ -24,11 +26,12 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
 fn memory(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
     let mask = profile.memory.as_ref().map_or(0, Memory::mask);
     let own = manifest.parameters.as_ref().and_then(|parameters| parameters.memory.as_ref());
-    let hit = profile.entries.iter().find_map(|entry| Some((entry, entry.address.filter(|at| at & mask != 0)?)));
-    if let Some((entry, address)) = hit {
+    let is_hit = |place: &Place| place.table == Table::Holding && place.address & mask != 0;
+    let hit = profile.entries.iter().find_map(|entry| Some((entry, entry.place.filter(is_hit)?)));
+    if let Some((entry, at)) = hit {
         let place = own.map_or(1, |rule| line(file, rule));
         let reason = format!(
-            "{} is at {address:04X}H, and bit {} of an address is to say where a write is kept",
+            "{} is at {at}, and bit {} of an address is to say where a write is kept",
             entry.name,
             mask.trailing_zeros()
         );
@@ -46,8 +49,8 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
             problems.add(file, 1, reason);
         }
     };
-    for &address in profile.command_registers().keys() {
-        one_word("the command register", profile.written_entry_at(address), Access::Ro);
+    for &place in profile.command_registers().keys() {
+        one_word("the command register", profile.written_entry_at(place), Access::Ro);
     }
     for setpoint in profile.setpoints.values() {
         one_word("a setpoint", profile.entry(&setpoint.register), Access::Ro);
@@ -61,8 +64,8 @@ fn words(file: &File, profile: &Profile, problems: &mut Problems) {
         one_word("a status word", Some(word), Access::Wo);
     }
     let registers = profile.command_registers();
-    for address in registers.into_keys().filter(|&address| profile.entry_at(address).is_none()) {
-        problems.add(file, 1, format!("another row lies over the command register, {address:04X}H"));
+    for place in registers.into_keys().filter(|&place| profile.entry_at(place).is_none()) {
+        problems.add(file, 1, format!("another row lies over the command register, {place}"));
     }
 }
 
@@ -85,12 +88,28 @@ fn sequence(file: &File, profile: &Profile, problems: &mut Problems) {
 fn setpoints(file: &File, profile: &Profile, problems: &mut Problems) {
     for (setpoint, role) in &profile.setpoints {
         let moves = matches!(setpoint, Setpoint::VirtualInputs | Setpoint::VirtualOutputs | Setpoint::SpecialControl);
-        let address = profile.entry(&role.register).and_then(|entry| entry.address);
+        let place = profile.entry(&role.register).and_then(|entry| entry.place);
         let commands = profile.command_registers();
-        let taken = |address: u16| commands.contains_key(&address) || (!moves && profile.is_command(address));
-        if let Some(address) = address.filter(|&address| taken(address)) {
-            let reason = format!("{} is at {address:04X}H, where a word can start a motor", role.register);
+        let taken = |place: Place| commands.contains_key(&place) || (!moves && profile.is_command(place));
+        if let Some(place) = place.filter(|&place| taken(place)) {
+            let reason = format!("{} is at {place}, where a word can start a motor", role.register);
             problems.add(file, 1, format!("{reason}: no setpoint can be there"));
+        }
+    }
+}
+
+/// What stands beside the holding registers is read and written by functions that the drive has to know.
+fn functions(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    let place = manifest.requests.as_ref().map_or(1, |requests| line(file, &requests.max_words));
+    for entry in profile.entries.iter().filter(|entry| entry.table() != Table::Holding) {
+        let (table, known) = (entry.table(), profile.functions());
+        let reads = entry.access != Access::Wo && !known.contains(&table.function());
+        let writes = entry.access != Access::Ro && !table.written_by().iter().any(|function| known.contains(function));
+        let lacks = if reads { Some(table.function()) } else { table.written_by().first().copied().filter(|_| writes) };
+        if let Some(function) = lacks {
+            let does = if reads { "read" } else { "written" };
+            let reason = format!("\"functions\" has no 0x{function:02X}, by which {} is {does}", entry.name);
+            problems.add(file, place, reason);
         }
     }
 }

@@ -43,7 +43,7 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         let gone = base.entries.remove(index);
         // Where the same address is written as something else, the commands stay.
         let place = gone
-            .address
+            .place
             .filter(|_| gone.access != Access::Ro || !base.entries.iter().any(|other| is_other_way(&gone, other)));
         let stays = |name: &String| *name != gone.name;
         base.lists_mut().into_iter().for_each(|list| list.retain(stays));
@@ -57,14 +57,17 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.watchdog.take_if(|watchdog| {
             !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
         });
-        base.moving.retain(|&address| Some(address) != place);
-        if base.command_address.is_some_and(|address| Some(address) == place) {
+        base.moving.retain(|&at| Some(at) != place);
+        if base.command_address.is_some_and(|at| Some(at) == place) {
             base.command_address = None;
             base.commands.clear();
             base.other_commands.clear();
             base.start_sequence.clear();
         }
-        base.commands.retain(|_, known| known.elsewhere.is_none_or(|address| Some(address) != place));
+        base.commands.retain(|_, known| {
+            let places = known.elsewhere.into_iter().chain(known.first.map(|(at, _)| at));
+            places.into_iter().all(|at| Some(at) != place)
+        });
         for entry in &mut base.entries {
             entry.quantity.variant.take_if(|variant| !base.variants.contains_key(variant));
             for bound in [&mut entry.quantity.low_from, &mut entry.quantity.high_from] {

@@ -1,5 +1,7 @@
 //! What `profile.toml` says of commands and states: the words that move a motor, and those that tell what it does.
 
+use std::collections::BTreeMap;
+
 use super::File;
 use super::entries::Entries;
 use super::facts::check;
@@ -7,9 +9,11 @@ use super::manifest::{Elsewhere, Manifest, States, Word, line};
 use super::placed::Placed;
 use super::problems::Problems;
 use super::words;
+use crate::entry::Access;
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
 use crate::parts::state::{StateRule, StateWord};
+use crate::place::Place;
 use crate::profile::Profile;
 
 /// The command register, its codes, and what else moves a motor.
@@ -33,12 +37,14 @@ pub(super) fn commands(
             problems.add(file, line(file, &assumed.reason), "\"reason\" is empty; say why these codes are assumed");
         }
     }
+    let before = |(&command, row)| (command, first(file, manifest, command, row, entries, problems));
+    let before: Before = table.first.iter().map(before).collect();
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
-    profile.command_address = register.address;
+    profile.command_address = register.place;
     register.quantity.choices.clear();
     let base = table.base.as_ref();
     let base = base.map_or(0, |base| words::word(file, base, 0, register, manifest, problems));
-    let mut choices = std::collections::BTreeMap::new();
+    let mut choices: BTreeMap<u16, String> = BTreeMap::new();
     for (command, spanned, verified) in all {
         let code = words::word(file, spanned, base, register, manifest, problems);
         if profile.kind == UnitKind::Rectifier && !for_rectifiers(command) {
@@ -49,10 +55,17 @@ pub(super) fn commands(
         if problems.keep(word).is_none() {
             continue;
         }
-        if let Some(other) = choices.insert(code, command.name().to_owned()) {
-            problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
-        }
-        if profile.commands.insert(command, CommandCode { code, verified, elsewhere: None }).is_some() {
+        let label = match choices.get(&code) {
+            Some(other) if told_apart(&before, command, other) => format!("{other} or {}", command.name()),
+            other => {
+                if let Some(other) = other {
+                    problems.add(file, line(file, spanned), format!("{} has the code of {other}", command.name()));
+                }
+                command.name().to_owned()
+            }
+        };
+        choices.insert(code, label);
+        if profile.commands.insert(command, CommandCode { code, verified, elsewhere: None, first: None }).is_some() {
             problems.add(file, line(file, spanned), format!("{} is there twice", command.name()));
         }
     }
@@ -71,8 +84,16 @@ pub(super) fn commands(
     for (&command, other) in &table.elsewhere {
         elsewhere(file, manifest, command, other, profile, entries, problems);
     }
+    for (command, row) in &table.first {
+        if let Some(known) = profile.commands.get_mut(command) {
+            known.first = before.get(command).copied().flatten();
+        } else {
+            let reason = format!("there is no {} that this could come before", command.name());
+            problems.add(file, line(file, &row.register), reason);
+        }
+    }
     let moves = entries.names(file, &table.moves, problems);
-    profile.moving = moves.iter().filter_map(|name| entries.find(name)?.address).collect();
+    profile.moving = moves.iter().filter_map(|name| entries.find(name)?.place).collect();
 }
 
 /// A command in a register of its own.
@@ -92,7 +113,7 @@ fn elsewhere(
         problems.add(file, place, format!("a rectifier feeds no motor: it has no {}", command.name()));
     }
     // Without an address of its own it would go to the command register, where the word means something else.
-    let Some(address) = register.address else {
+    let Some(address) = register.place else {
         problems.add(file, place, format!("{} takes {}, so it needs an address", register.name, command.name()));
         return;
     };
@@ -112,10 +133,49 @@ fn elsewhere(
         problems.add(file, line(file, &table.code), reason);
     }
     register.quantity.choices.insert(code, command.name().to_owned());
-    let known = CommandCode { code, verified: true, elsewhere: Some(address) };
+    let known = CommandCode { code, verified: true, elsewhere: Some(address), first: None };
     if profile.commands.insert(command, known).is_some() {
         problems.add(file, place, format!("{} is there twice", command.name()));
     }
+}
+
+/// What is written before commands: where, and the word. `None` is what cannot be read, which has a problem of its own.
+type Before = BTreeMap<Command, Option<(Place, u16)>>;
+
+/// Whether what is written `before` them tells `one` and the command called `other` apart, which have the same word.
+fn told_apart(before: &Before, one: Command, other: &str) -> bool {
+    let other = other.parse().ok().and_then(|other: Command| before.get(&other));
+    match (before.get(&one), other) {
+        (Some(Some((here, code))), Some(Some((there, word)))) => here == there && code != word,
+        (one, other) => one.is_some() && other.is_some(),
+    }
+}
+
+/// What is written before the word of a command: where, and the word.
+fn first(
+    file: &File,
+    manifest: &Manifest,
+    command: Command,
+    table: &Elsewhere,
+    entries: &Entries,
+    problems: &mut Problems,
+) -> Option<(Place, u16)> {
+    let place = line(file, &table.register);
+    let register = entries.get(file, &table.register, problems)?;
+    let code = words::word(file, &table.code, 0, register, manifest, problems);
+    let word = check(file, line(file, &table.code), &register.quantity, &register.name, code.into());
+    problems.keep(word)?;
+    let mut needs = |what: &str| {
+        let reason = format!("{} is written before {}, so it {what}", register.name, command.name());
+        problems.add(file, place, reason);
+    };
+    if register.access == Access::Ro || register.words() != 1 {
+        needs("must have one word that can be written");
+    }
+    if register.place.is_none() {
+        needs("needs an address");
+    }
+    Some((register.place?, code))
 }
 
 /// A word as a key of TOML has it, which is a text: `9`, or `0x0476`.

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use super::problems::Problems;
 use super::table::{self, Columns, Row};
+use super::table_cell;
 use super::{File, Files, ProfileError};
 use crate::decimal::{Counts, Decimal};
 use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
 use crate::parts::fault::Fault;
+use crate::place::Place;
 use crate::quantity::{Quantity, limits, to_word};
 use crate::scale::Scale;
 use crate::text::{parameter_address, parse_address, parse_code};
@@ -50,7 +52,7 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
             "note",
             "source",
         ],
-        optional: &["words", "order", "variant"],
+        optional: &["table", "words", "order", "variant"],
     };
     table::read(file, &COLUMNS, problems, |row| {
         let name = row.required("name")?;
@@ -60,8 +62,10 @@ pub(super) fn registers(file: &File, problems: &mut Problems) -> Vec<Located<Ent
                 row.broken(format!("address \"{text}\" must be hex such as 0x3004, or empty if nobody knows it"))
             })?),
         };
-        let quantity = quantity(row, None, BTreeMap::new())?;
-        entry(row, Kind::Register, checked_name(row, name)?, None, address, quantity, None)
+        let table = table_cell::table(row)?;
+        let quantity = table_cell::quantity(row, table, quantity(row, None, BTreeMap::new())?)?;
+        let place = address.map(|address| Place::new(table, address));
+        entry(row, Kind::Register, checked_name(row, name)?, None, place, quantity, None)
     })
 }
 
@@ -104,7 +108,7 @@ pub(super) fn parameters(file: &File, listed: bool, problems: &mut Problems) -> 
             "" => None,
             name => Some(checked_name(row, name)?),
         };
-        entry(row, Kind::Parameter, code, alias, Some(address), quantity, default)
+        entry(row, Kind::Parameter, code, alias, Some(address.into()), quantity, default)
     })
 }
 
@@ -214,7 +218,7 @@ fn entry(
     kind: Kind,
     name: String,
     alias: Option<String>,
-    address: Option<u16>,
+    place: Option<Place>,
     quantity: Quantity,
     default: Option<u16>,
 ) -> Result<Located<Entry>, ProfileError> {
@@ -225,7 +229,7 @@ fn entry(
     if quantity.wide && access != Access::Ro {
         return Err(row.broken("a value of two words can only be read: its \"access\" must be ro"));
     }
-    if quantity.wide && address == Some(u16::MAX) {
+    if quantity.wide && place.is_some_and(|place| place.address == u16::MAX) {
         return Err(row.broken("a value of two words does not fit at the last address"));
     }
     let (evidence, note, source) = evidence(row)?;
@@ -233,7 +237,7 @@ fn entry(
         name,
         alias,
         kind,
-        address,
+        place,
         label: row.required("label")?.to_owned(),
         quantity,
         bits: Vec::new(),

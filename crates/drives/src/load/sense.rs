@@ -98,7 +98,7 @@ fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
 /// What moves a motor, and what tells whether it moves.
 fn motion(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
     if let Some(commands) = &manifest.commands {
-        let others = commands.elsewhere.values().map(|other| &other.register);
+        let others = commands.elsewhere.values().chain(commands.first.values()).map(|other| &other.register);
         for named in std::iter::once(&commands.register).chain(others) {
             let register = entries.find(named.get_ref());
             let is_it = |name: &Placed<String>| entries.find(name.get_ref()) == register;

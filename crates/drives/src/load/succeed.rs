@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use crate::entry::{Access, Entry, Kind, names};
 use crate::evidence::Evidence;
+use crate::place::Place;
 use crate::profile::Profile;
 
 /// Lets `rows` succeed those of `base` that have one of their names, or else one of their addresses. Rows of `base` in
@@ -40,17 +41,22 @@ pub(super) fn succeed<'a>(base: &mut Profile, rows: impl Iterator<Item = &'a mut
         }
         called.insert(old.name.clone(), new.name.clone());
         // What is written there stays, wherever what is read there goes.
-        places.extend(old.address.filter(|_| !only_read(old)).map(|place| (place, new.address)));
+        places.extend(old.place.filter(|_| !only_read(old)).map(|place| (place, new.place)));
     }
     rename(base, &called);
-    let follow = |address: u16| places.get(&address).copied().unwrap_or(Some(address));
-    base.moving = base.moving.iter().filter_map(|&address| follow(address)).collect();
+    let follow = |place: Place| places.get(&place).copied().unwrap_or(Some(place));
+    base.moving = base.moving.iter().filter_map(|&place| follow(place)).collect();
     base.command_address = base.command_address.and_then(follow);
     base.commands.retain(|_, known| {
-        known.elsewhere.is_none_or(|address| {
-            known.elsewhere = follow(address);
+        let is_there = known.elsewhere.is_none_or(|place| {
+            known.elsewhere = follow(place);
             known.elsewhere.is_some()
-        })
+        });
+        is_there
+            && known.first.is_none_or(|(place, code)| {
+                known.first = follow(place).map(|place| (place, code));
+                known.first.is_some()
+            })
     });
 }
 
@@ -60,7 +66,7 @@ fn pairs(inherited: &[Entry], rows: &[&mut Entry]) -> BTreeMap<usize, usize> {
     let same_place = |old: &Entry, new: &Entry| {
         let unnamed = new.kind == Kind::Parameter && new.alias.is_none();
         let known = old.evidence != Evidence::Assumed || unnamed;
-        let same = old.address.is_some() && old.address == new.address && !super::entries::is_other_way(old, new);
+        let same = old.place.is_some() && old.place == new.place && !super::entries::is_other_way(old, new);
         known && (share_a_name(old, new) || same)
     };
     let mut pairs = BTreeMap::new();

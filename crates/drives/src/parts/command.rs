@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::place::Place;
+
 /// What a motor can be told. The codes differ from family to family; the profile owns them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -63,7 +65,9 @@ pub struct CommandCode {
     /// Whether a document of the family prints it.
     pub verified: bool,
     /// The register that takes it, where that is not the command register.
-    pub elsewhere: Option<u16>,
+    pub elsewhere: Option<Place>,
+    /// What is written before it: where, and the word. It says which way the motor turns, where the word itself does not.
+    pub first: Option<(Place, u16)>,
 }
 
 /// A word that comes, with others in their order, before one that runs or jogs a motor at rest.

@@ -1,5 +1,7 @@
 //! Identification: by what a unit says it is, or by what it answers and refuses.
 
+use crate::place::Place;
+
 /// What an identification code says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -24,8 +26,8 @@ pub struct Identification {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Signature {
-    /// Addresses that it answers.
-    pub answers: Vec<u16>,
-    /// Addresses that it refuses.
-    pub refuses: Vec<u16>,
+    /// Places that it answers.
+    pub answers: Vec<Place>,
+    /// Places that it refuses.
+    pub refuses: Vec<Place>,
 }

@@ -1,6 +1,7 @@
 //! Names: what a register or a parameter may be called, and what is said where nothing has a name.
 
 use crate::entry::{Access, Entry, names};
+use crate::place::Place;
 use crate::profile::Profile;
 use crate::text::{near, parameter_address, parse_address, parse_code, parse_loose_address, parse_loose_code};
 
@@ -49,10 +50,11 @@ fn hint(closest: &str) -> String {
 }
 
 impl Profile {
-    /// The entry that is written at `address`: where that is a command and a read tells a state, the command.
-    pub fn written_entry_at(&self, address: u16) -> Option<&Entry> {
-        let read = self.entry_at(address)?;
-        let is_written = |entry: &&Entry| entry.access == Access::Wo && entry.address == Some(address);
+    /// The entry that is written at `place`: where that is a command and a read tells a state, the command.
+    pub fn written_entry_at(&self, place: impl Into<Place>) -> Option<&Entry> {
+        let place = place.into();
+        let read = self.entry_at(place)?;
+        let is_written = |entry: &&Entry| entry.access == Access::Wo && entry.place == Some(place);
         // Nothing else stands beside what can be written as it is read.
         let other = (read.access == Access::Ro).then(|| self.entries.iter().find(is_written)).flatten();
         Some(other.unwrap_or(read))

@@ -3,6 +3,7 @@
 //! Made once and used for every answer: what is asked again and again is neither looked up nor planned again.
 
 use crate::entry::{AccessError, Entry};
+use crate::place::Place;
 use crate::plan::ReadSpan;
 use crate::profile::Profile;
 use crate::quantity::Quantity;
@@ -33,11 +34,12 @@ impl Profile {
     /// [`AccessError`]: one of them can only be written.
     pub fn compile(&self, entries: &[&Entry]) -> Result<ReadPlan, AccessError> {
         let reads = self.plan(entries.iter().copied())?;
-        let position = |address| {
+        let position = |place: Place| {
             let mut before = 0;
             for read in &reads {
-                if (read.address..=read.address + (read.count - 1)).contains(&address) {
-                    return before + usize::from(address - read.address);
+                let holds = (read.address..=read.address + (read.count - 1)).contains(&place.address);
+                if read.table == place.table && holds {
+                    return before + usize::from(place.address - read.address);
                 }
                 before += usize::from(read.count);
             }
@@ -55,7 +57,7 @@ impl Profile {
 }
 
 impl ReadPlan {
-    /// What to read, in address order.
+    /// What to read, one table after the other, each in address order.
     pub fn reads(&self) -> &[ReadSpan] {
         &self.reads
     }

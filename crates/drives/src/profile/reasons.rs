@@ -5,15 +5,17 @@ use crate::parts::command::Command;
 use crate::profile::Profile;
 
 impl Profile {
-    /// Why `command` is not verified: its code, or the register it is written to. `None` where both are, or where there is
-    /// no such command.
+    /// Why `command` is not verified: its code, the register it is written to, or what is written before it. `None` where
+    /// all are, or where there is no such command.
     pub fn command_reason(&self, command: Command) -> Option<&str> {
         let known = self.commands.get(&command)?;
         if !known.verified {
             return Some(&self.commands_note);
         }
         let register = self.written_entry_at(known.elsewhere.or(self.command_address)?)?;
-        (!register.verified()).then_some(&register.note)
+        let before = known.first.and_then(|(place, _)| self.written_entry_at(place));
+        let unproven = std::iter::once(register).chain(before).find(|entry| !entry.verified());
+        unproven.map(|entry| entry.note.as_str())
     }
 
     /// Why what the state word means is not verified, or where it is. `None` where both are known, or where no state word

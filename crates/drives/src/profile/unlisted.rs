@@ -54,7 +54,7 @@ fn raw_word(code: String, address: u16, is_no_command: bool) -> Entry {
         name: code,
         alias: None,
         kind: Kind::Parameter,
-        address: Some(address),
+        place: Some(address.into()),
         label: LABEL.to_owned(),
         quantity: Quantity {
             unit: String::new(),

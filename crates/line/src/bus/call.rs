@@ -15,7 +15,7 @@ mod course;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Request, Table, UnitAddress};
 
 use crate::ask::{Ask, Done};
 use crate::bus::call::course::{Course, is_unanswered};
@@ -125,7 +125,7 @@ impl<'b, 'r> Call<'b, 'r> {
         }
         let mut course = Course::new(self.ask.timeout, self.retries);
         let result = match (self.ask.request, self.read_back) {
-            (Request::ReadHolding { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
+            (Request::Read { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
             (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
             _ => self.once(&mut turn, &mut course, give_up, take),
         };
@@ -279,13 +279,14 @@ impl<'b, 'r> Call<'b, 'r> {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let written = match *self.ask.request {
-            Request::WriteSingle { value, .. } => vec![value],
-            Request::WriteMultiple { words, .. } => words.iter().collect(),
+        let (table, written) = match *self.ask.request {
+            Request::WriteSingle { value, .. } => (Table::Holding, vec![value]),
+            Request::WriteMultiple { words, .. } => (Table::Holding, words.iter().collect()),
+            Request::WriteCoil { on, .. } => (Table::Coil, vec![u16::from(on)]),
             _ => return self.once(turn, course, give_up, take),
         };
         let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
-        let Ok(read) = Request::read(address, count) else {
+        let Ok(read) = Request::read_of(table, address, count) else {
             return self.once(turn, course, give_up, take);
         };
         let mut writing = Call { ..*self };

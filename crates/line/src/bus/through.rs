@@ -63,7 +63,7 @@ impl Shared {
                 Err(Lost::Unsent) => sharing.lost(&guest),
                 Err(Lost::Unknown) => {
                     sharing.lost(&guest);
-                    if !matches!(ask.request, Request::ReadHolding { .. }) || retries == 0 {
+                    if !matches!(ask.request, Request::Read { .. }) || retries == 0 {
                         let why = format!("{}, through which the port was used, ended", guest.host());
                         return Err(self.lost_there(&ask, PortErrorKind::Lost, why, Some(began)));
                     }

@@ -3,7 +3,7 @@
 //! A write and an echo are confirmed by the very bytes of the request, so an adapter that echoes would confirm what no
 //! unit has heard.
 
-use drivebus_rtu::{Destination, Request, Tally};
+use drivebus_rtu::{Destination, Request, Table, Tally};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
@@ -28,7 +28,7 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
         let address = match *ask.request {
-            Request::ReadHolding { address, .. } => address,
+            Request::Read { table: Table::Holding, address, .. } => address,
             _ => 0,
         };
         let Ok(read) = Request::read(address, 1) else {

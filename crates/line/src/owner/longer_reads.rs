@@ -6,16 +6,19 @@
 
 use std::collections::BTreeMap;
 
-use drivebus_rtu::{Instant, Master, Request, UnitAddress};
+use drivebus_rtu::{Instant, Master, Request, Table, UnitAddress};
 
 use crate::owner::resync::MAX_WORDS;
 
 /// Places that are remembered. With more, all are forgotten and learned again.
 const REMEMBERED: usize = 1024;
 
-/// What is known of longer reads, by unit and first register.
+/// Where a read begins.
+type Place = (Table, u16);
+
+/// What is known of longer reads, by unit and place.
 #[derive(Debug, Default)]
-pub(crate) struct Longer(BTreeMap<(UnitAddress, u16), Limit>);
+pub(crate) struct Longer(BTreeMap<(UnitAddress, Place), Limit>);
 
 #[derive(Debug, Clone, Copy)]
 struct Limit {
@@ -29,11 +32,11 @@ impl Longer {
     /// How many words to ask for, as many as `request` does or more, so that the answer of `unit` can be no other's; `None`
     /// where nothing helps.
     pub(crate) fn form(&self, master: &Master, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
-        let Request::ReadHolding { address, count, .. } = *request else { return None };
-        let refused = self.0.get(&(unit, address)).map_or(u16::MAX, |limit| limit.refused);
+        let Request::Read { table, address, count, .. } = *request else { return None };
+        let refused = self.0.get(&(unit, (table, address))).map_or(u16::MAX, |limit| limit.refused);
         let find = |tells_apart: &dyn Fn(&Request<'_>) -> bool| {
             let mut given = (count..=count.max(MAX_WORDS)).take_while(|&words| words < refused);
-            given.find(|&words| Request::read(address, words).is_ok_and(|read| tells_apart(&read)))
+            given.find(|&words| Request::read_of(table, address, words).is_ok_and(|read| tells_apart(&read)))
         };
         // More words than anything open has, so that not even an answer that is cut short could pass; else another number.
         find(&|read| master.tells_apart(now, unit, read)).or_else(|| {
@@ -42,15 +45,15 @@ impl Longer {
         })
     }
 
-    /// `unit` refused to give `count` words from `address`.
-    pub(crate) fn refused(&mut self, unit: UnitAddress, address: u16, count: u16) {
-        let limit = self.limit(unit, address);
+    /// `unit` refused to give `count` words from `place`.
+    pub(crate) fn refused(&mut self, unit: UnitAddress, place: Place, count: u16) {
+        let limit = self.limit(unit, place);
         limit.refused = limit.refused.min(count);
     }
 
-    /// `unit` was silent on `count` words from `address`: the second time in a row it counts as a refusal.
-    pub(crate) fn silent(&mut self, unit: UnitAddress, address: u16, count: u16) {
-        let limit = self.limit(unit, address);
+    /// `unit` was silent on `count` words from `place`: the second time in a row it counts as a refusal.
+    pub(crate) fn silent(&mut self, unit: UnitAddress, place: Place, count: u16) {
+        let limit = self.limit(unit, place);
         if limit.silent <= count {
             limit.refused = limit.refused.min(count);
         }
@@ -58,17 +61,17 @@ impl Longer {
     }
 
     /// `unit` gave them.
-    pub(crate) fn given(&mut self, unit: UnitAddress, address: u16) {
-        if let Some(limit) = self.0.get_mut(&(unit, address)) {
+    pub(crate) fn given(&mut self, unit: UnitAddress, place: Place) {
+        if let Some(limit) = self.0.get_mut(&(unit, place)) {
             limit.silent = u16::MAX;
         }
     }
 
-    fn limit(&mut self, unit: UnitAddress, address: u16) -> &mut Limit {
-        if self.0.len() >= REMEMBERED && !self.0.contains_key(&(unit, address)) {
+    fn limit(&mut self, unit: UnitAddress, place: Place) -> &mut Limit {
+        if self.0.len() >= REMEMBERED && !self.0.contains_key(&(unit, place)) {
             self.0.clear();
         }
-        self.0.entry((unit, address)).or_insert(Limit { refused: u16::MAX, silent: u16::MAX })
+        self.0.entry((unit, place)).or_insert(Limit { refused: u16::MAX, silent: u16::MAX })
     }
 }
 
@@ -120,16 +123,16 @@ mod tests {
         assert!(matches!(master.poll(sent), Some(Event::Answer(_))), "the unit has caught up");
         let read = Request::read(100, 1).unwrap();
         assert_eq!(longer.form(&master, sent, UNIT, &read), Some(5));
-        longer.refused(UNIT, 100, 4);
+        longer.refused(UNIT, (Table::Holding, 100), 4);
         assert_eq!(longer.form(&master, sent, UNIT, &read), Some(2));
-        longer.refused(UNIT, 100, 2);
+        longer.refused(UNIT, (Table::Holding, 100), 2);
         assert_eq!(longer.form(&master, sent, UNIT, &read), None);
     }
 
     #[test]
     fn what_was_refused_is_not_asked_for_again() {
         let (mut longer, master, read) = (Longer::default(), owed(&[1]), Request::read(100, 1).unwrap());
-        longer.refused(UNIT, 100, 2);
+        longer.refused(UNIT, (Table::Holding, 100), 2);
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &read), None, "nor are more, from there");
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &Request::read(101, 1).unwrap()), Some(2));
     }
@@ -137,12 +140,12 @@ mod tests {
     #[test]
     fn silence_counts_when_it_comes_twice_in_a_row() {
         let (mut longer, master, read) = (Longer::default(), owed(&[1]), Request::read(100, 1).unwrap());
-        longer.silent(UNIT, 100, 2);
+        longer.silent(UNIT, (Table::Holding, 100), 2);
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &read), Some(2));
-        longer.given(UNIT, 100);
-        longer.silent(UNIT, 100, 2);
+        longer.given(UNIT, (Table::Holding, 100));
+        longer.silent(UNIT, (Table::Holding, 100), 2);
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &read), Some(2));
-        longer.silent(UNIT, 100, 2);
+        longer.silent(UNIT, (Table::Holding, 100), 2);
         assert_eq!(longer.form(&master, Instant::ZERO, UNIT, &read), None);
     }
 
@@ -153,11 +156,11 @@ mod tests {
             longer.form(&master, Instant::ZERO, UNIT, &Request::read(address, 1).unwrap()).is_none()
         };
         let places = u16::try_from(REMEMBERED).unwrap();
-        (0..places).for_each(|address| longer.refused(UNIT, address, 2));
+        (0..places).for_each(|address| longer.refused(UNIT, (Table::Holding, address), 2));
         assert!((0..places).all(|address| is_refused(&longer, address)));
-        longer.refused(UNIT, 0, 2);
+        longer.refused(UNIT, (Table::Holding, 0), 2);
         assert!((0..places).all(|address| is_refused(&longer, address)), "what is known already needs no new place");
-        longer.refused(UNIT, places, 2);
+        longer.refused(UNIT, (Table::Holding, places), 2);
         assert!(!(0..places).any(|address| is_refused(&longer, address)));
         assert!(is_refused(&longer, places));
     }

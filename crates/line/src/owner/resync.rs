@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::atomic::{AtomicU16, Ordering};
 
-use drivebus_rtu::{Instant, Master, Request, UnitAddress};
+use drivebus_rtu::{Instant, Master, Request, Table, UnitAddress};
 
 use crate::by_unit::ByUnit;
 use crate::error::CallError;
@@ -109,7 +109,7 @@ struct Known {
     echo: Option<Echo>,
     /// Echoes in a row that it was silent on.
     silent_echoes: u32,
-    /// A register that it answered a read of.
+    /// A holding register that it answered a read of.
     readable: Option<u16>,
     /// The latest probe was an echo.
     echo_was_last: bool,
@@ -136,7 +136,7 @@ impl Resync {
                 known.echo = Some(if refused { Echo::Refused } else { Echo::Returned });
                 known.silent_echoes = 0;
             }
-            Request::ReadHolding { address, .. } if !refused => known.readable = Some(*address),
+            Request::Read { table: Table::Holding, address, .. } if !refused => known.readable = Some(*address),
             _ => {}
         }
     }
@@ -161,7 +161,7 @@ impl Resync {
         };
         let echo = (tried.echoes == 0 || again).then_some(Probe::Echo);
         let address = match *request {
-            Request::ReadHolding { address, .. } => known.readable.or(Some(address)),
+            Request::Read { table: Table::Holding, address, .. } => known.readable.or(Some(address)),
             _ => known.readable,
         };
         let knows_no_echo = known.knows_no_echo();

@@ -46,7 +46,7 @@ impl Runner {
 
     /// The most words that one target brings.
     pub(crate) fn most_words(&self) -> usize {
-        let words = |target: &PollTarget| target.reads.iter().map(|&(_, count)| usize::from(count)).sum();
+        let words = |target: &PollTarget| target.reads.iter().map(|&(.., count)| usize::from(count)).sum();
         self.targets.iter().map(words).max().unwrap_or(0)
     }
 
@@ -105,8 +105,8 @@ impl Runner {
         let late = self.schedule.missed();
         let mut sample = PollSample { target, sent: Instant::ZERO, ended: Instant::ZERO, late, missing: None };
         let mut heard = true;
-        for (index, &(address, count)) in reads.iter().enumerate() {
-            let Ok(request) = Request::read(address, count) else {
+        for (index, &(table, address, count)) in reads.iter().enumerate() {
+            let Ok(request) = Request::read_of(table, address, count) else {
                 continue; // checked when the poll began
             };
             // What does not come is asked for in the next cycle; repeating it now would keep the others waiting.
@@ -226,7 +226,7 @@ mod tests {
         let options = BusOptions { timeout: Duration::from_secs(60), ..BusOptions::new(SerialFormat::DEFAULT) };
         let bus = Arc::new(Bus::open(Box::new(opener), options, &mut || false).unwrap());
         let unit = UnitAddress::new(1).unwrap();
-        let targets = vec![PollTarget { unit, reads: vec![(0x3000, 16), (0x3010, 7)] }];
+        let targets = vec![PollTarget::new(unit, vec![(0x3000, 16), (0x3010, 7)])];
         let poll = Poll::start(Arc::clone(&bus), targets, None, 9).unwrap();
         assert_eq!(requests.recv().unwrap()[..4], [1, 3, 0x30, 0]);
         thread::scope(|scope| {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{SerialFormat, UnitAddress};
+use drivebus_rtu::{Request, SerialFormat, Table, UnitAddress};
 
 use crate::error::Failure;
 
@@ -12,13 +12,18 @@ use crate::error::Failure;
 pub struct PollTarget {
     /// Who is asked.
     pub unit: UnitAddress,
-    /// Address and number of words (1..=125) of each read, in the order in which they are sent.
-    pub reads: Vec<(u16, u16)>,
+    /// Table, address and number of words (1..=125) or bits (1..=2000) of each read, in the order in which they are sent.
+    pub reads: Vec<(Table, u16, u16)>,
 }
 
 impl PollTarget {
-    /// `reads` of `unit`.
+    /// `reads` of holding registers of `unit`: address and number of words.
     pub fn new(unit: UnitAddress, reads: Vec<(u16, u16)>) -> Self {
+        Self::of_tables(unit, reads.into_iter().map(|(address, count)| (Table::Holding, address, count)).collect())
+    }
+
+    /// `reads` of `unit`.
+    pub fn of_tables(unit: UnitAddress, reads: Vec<(Table, u16, u16)>) -> Self {
         Self { unit, reads }
     }
 }
@@ -87,8 +92,8 @@ pub(super) fn check(targets: &[PollTarget]) -> Result<(), PollError> {
         if reads.is_empty() {
             return Err(PollError::Nothing { unit: Some(unit) });
         }
-        let wrong = reads.iter().find(|&&(address, count)| drivebus_rtu::Request::read(address, count).is_err());
-        if let Some(&(address, count)) = wrong {
+        let wrong = reads.iter().find(|&&(table, address, count)| Request::read_of(table, address, count).is_err());
+        if let Some(&(_, address, count)) = wrong {
             return Err(PollError::Read { unit, address, count });
         }
     }
@@ -102,10 +107,14 @@ pub(super) fn shortest_cycle(
     targets: &[PollTarget],
     silence: impl Fn(UnitAddress) -> Duration,
 ) -> Duration {
-    let words = |count: u16| 5 + 2 * u32::from(count);
-    let read = |count| format.chars(8) + format.t35() + format.chars(words(count));
-    let reads = targets.iter().flat_map(|target| target.reads.iter().map(|&(_, count)| (target.unit, count)));
-    reads.fold(Duration::ZERO, |cycle, (unit, count)| cycle.saturating_add(silence(unit)).saturating_add(read(count)))
+    let answer = |bytes: usize| 5 + u32::try_from(bytes).unwrap_or(u32::MAX);
+    let read = |bytes| format.chars(8) + format.t35() + format.chars(answer(bytes));
+    let of = |target: &PollTarget| {
+        let bytes = target.reads.iter().map(|&(table, _, count)| table.bytes(count.into()));
+        let silence = silence(target.unit);
+        bytes.fold(Duration::ZERO, |time, bytes| time.saturating_add(silence).saturating_add(read(bytes)))
+    };
+    targets.iter().map(of).fold(Duration::ZERO, Duration::saturating_add)
 }
 
 /// Seconds in whole microseconds, no fewer than `time` has.
@@ -119,7 +128,7 @@ mod tests {
     use super::*;
 
     fn target(unit: u8, reads: &[(u16, u16)]) -> PollTarget {
-        PollTarget { unit: UnitAddress::new(unit).unwrap(), reads: reads.to_vec() }
+        PollTarget::new(UnitAddress::new(unit).unwrap(), reads.to_vec())
     }
 
     #[test]

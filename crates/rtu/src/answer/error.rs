@@ -51,6 +51,11 @@ pub enum AnswerError {
         /// Bytes that it says it has.
         came: u8,
     },
+    /// It says of a coil neither that it is on nor that it is off.
+    Coil {
+        /// What it says: FF00H and 0000H mean something.
+        value: u16,
+    },
     /// Its length does not fit its function.
     Length {
         /// Bytes of the PDU.
@@ -76,6 +81,7 @@ impl fmt::Display for AnswerError {
             ),
             Self::Repeat { asked, came } => write!(f, "{asked} was sent, the answer repeats {came}"),
             Self::Bytes { asked, came } => write!(f, "{asked} bytes of data answer that, {came} came"),
+            Self::Coil { value } => write!(f, "a coil is FF00H or 0000H, {value:04X}H came"),
             Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
             Self::Refusal { code } => {
                 write!(f, "exception {:02X}H came, which may be meant for an earlier read", code.0)

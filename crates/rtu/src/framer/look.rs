@@ -5,7 +5,10 @@ use super::Framer;
 use crate::UnitAddress;
 use crate::crc::{crc16, update};
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
-use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, READ_HOLDING, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::function::{
+    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_DISCRETE, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE,
+    WRITE_SINGLE,
+};
 
 const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
 /// Address, function code, exception code or byte count, CRC.
@@ -39,7 +42,7 @@ impl Framer {
         }
         // Its own account of its length agrees with what was asked for: nothing shorter can be it. Said before anything is
         // weighed, for who hands bytes over one by one.
-        if let [_, READ_HOLDING, bytes, ..] = *here
+        if let [_, READ_COILS..=READ_INPUT, bytes, ..] = *here
             && here.len() < EXCEPTION_ADU + usize::from(bytes)
             && expected
             && !is_over
@@ -115,9 +118,9 @@ impl Framer {
     /// Length that the answer looked for has by its own account.
     fn answer_lengths(here: &[u8]) -> [Option<usize>; 2] {
         let len = match *here {
-            [_, READ_HOLDING, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
-            [_] | [_, READ_HOLDING] => here.len() + 1,
-            [_, WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => SHORT_ADU,
+            [_, READ_COILS..=READ_INPUT, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
+            [_] | [_, READ_COILS..=READ_INPUT] => here.len() + 1,
+            [_, WRITE_COIL | WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => SHORT_ADU,
             [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
             _ => return [None, None],
         };
@@ -130,16 +133,19 @@ impl Framer {
         let lowest = u8::from(self.expect.is_some());
         match *here {
             [address, ..] if !(lowest..=HIGHEST_UNIT).contains(&address) => [None, None],
-            [_] | [_, READ_HOLDING] => [more, None],
+            [_] | [_, READ_COILS..=READ_INPUT] => [more, None],
             // A request has 8 bytes; an answer begins with its byte count.
-            [_, READ_HOLDING, bytes @ 2..=250, ..] if bytes % 2 == 0 => {
+            [_, READ_HOLDING | READ_INPUT, bytes @ 2..=250, ..] if bytes % 2 == 0 => {
+                [Some(SHORT_ADU), Some(EXCEPTION_ADU + usize::from(bytes))]
+            }
+            [_, READ_COILS | READ_DISCRETE, bytes @ 1..=250, ..] => {
                 [Some(SHORT_ADU), Some(EXCEPTION_ADU + usize::from(bytes))]
             }
             // An answer has 8 bytes; a request has its byte count after address and count.
             [_, WRITE_MULTIPLE, _, _, _, _, bytes @ 2..=246, ..] if bytes % 2 == 0 => {
                 [Some(SHORT_ADU), Some(SHORT_ADU + 1 + usize::from(bytes))]
             }
-            [_, READ_HOLDING | WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => [Some(SHORT_ADU), None],
+            [_, READ_COILS..=WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => [Some(SHORT_ADU), None],
             [_, function, ..] if function > EXCEPTION_BIT => [Some(EXCEPTION_ADU), None],
             _ => [None, None],
         }
@@ -155,7 +161,11 @@ impl Framer {
         match *here {
             [_, function, ..] if function & EXCEPTION_BIT != 0 => here.len() < EXCEPTION_ADU,
             // Another number of words than asked for: no use waiting for the rest of it.
-            [_, READ_HOLDING, bytes, ..] if self.answer_len() != Some(EXCEPTION_ADU + usize::from(bytes)) => false,
+            [_, READ_COILS..=READ_INPUT, bytes, ..]
+                if self.answer_len() != Some(EXCEPTION_ADU + usize::from(bytes)) =>
+            {
+                false
+            }
             _ => self.answer_len().is_some_and(|len| here.len() < len),
         }
     }
@@ -207,5 +217,5 @@ pub(crate) fn lost_its_head(bytes: &[u8], unit: UnitAddress, function: u8, len: 
     };
     (is_second && update(crc16(&known), body) == received)
         || matches!(*body, [second, ref rest @ ..]
-            if function == READ_HOLDING && [*head, second] == known && is_third(rest))
+            if matches!(function, READ_COILS..=READ_INPUT) && [*head, second] == known && is_third(rest))
 }

@@ -2,14 +2,10 @@
 
 use crate::Instant;
 use crate::frame::{Adu, Frame};
-use crate::pdu::MAX_READ;
 use crate::pdu::function::EXCEPTION_BIT;
 use crate::request::Request;
 
 use super::lengths::{self, Length};
-
-/// Most bits of one 01H or 02H read.
-const MAX_BITS: u16 = 2_000;
 
 /// What a unit has said to a request so far that was not its answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,7 +106,7 @@ pub(super) fn is_pair(request: &[u8], answer: &[u8]) -> bool {
 /// Whether a master may have sent `frame`.
 pub(super) fn can_ask(frame: &[u8]) -> bool {
     match lengths::of_request(frame) {
-        Length::Is(len) => len == frame.len() && keeps_limits(pdu(frame)),
+        Length::Is(len) => len == frame.len() && Request::parse(pdu(frame)).is_ok(),
         Length::Unknown => true,
         Length::Later | Length::Never => false,
     }
@@ -122,17 +118,6 @@ pub(super) fn may_be_answer(frame: &[u8]) -> bool {
         Length::Is(len) => len == frame.len(),
         Length::Unknown => true,
         Length::Later | Length::Never => false,
-    }
-}
-
-/// Whether the request `pdu` keeps to the limits of its function.
-fn keeps_limits(pdu: &[u8]) -> bool {
-    let count = |high, low| u16::from_be_bytes([high, low]);
-    match *pdu {
-        [0x01 | 0x02, _, _, high, low] => (1..=MAX_BITS).contains(&count(high, low)),
-        [0x04, _, _, high, low] => (1..=MAX_READ).contains(&count(high, low)),
-        [0x05, _, _, high, low] => matches!([high, low], [0x00 | 0xFF, 0x00]),
-        _ => Request::parse(pdu).is_ok(),
     }
 }
 

@@ -50,7 +50,7 @@ fn what_an_open_answer_could_pass_for_is_repeated_or_waits() {
                 Request::Echo { .. } => Attribution::Certain,
                 _ if open.function() != asked.function() => Attribution::Certain,
                 // Refusals of one function look alike; the words only if there are as many.
-                Request::ReadHolding { .. } => repeat(if alike { 2 } else { 1 }, 2),
+                Request::Read { table: Table::Holding, .. } => repeat(if alike { 2 } else { 1 }, 2),
                 _ if alike => Attribution::Wait(over),
                 _ => Attribution::Certain,
             };

@@ -3,11 +3,12 @@
 //! A request is judged as a whole before any of it is done.
 //! Assumption: the manual does not say what a drive does with a 10H request of which one word is refused.
 
-use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Words, function};
+use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Table, Words, function};
 
 use super::family::{Memory, Range};
-use super::machine::Command;
+use super::machine::{Command, Direction, RunState};
 use super::map::{Access, Word};
+use super::places::{spot, table_of};
 use super::refusal::Refusal;
 use super::{Drive, WRITES_KEPT, WriteRecord};
 
@@ -56,17 +57,17 @@ impl Drive {
 
     /// The word at `address` as the bus would read it at this moment, or the exception code.
     pub(crate) fn read(&self, address: u16) -> Result<u16, ExceptionCode> {
-        self.check_unlocked().and_then(|()| self.word(address)).map_err(|refusal| self.exception(refusal))
+        self.check_unlocked().and_then(|()| self.word(address.into())).map_err(|refusal| self.exception(refusal))
     }
 
     /// Sets a parameter at the keypad, for good: checked as on the bus, but no password is asked, and neither the
     /// record of writes nor the EEPROM counter moves.
     pub(crate) fn set_parameter(&mut self, address: u16, word: u16) -> Result<(), ExceptionCode> {
         let refused = |refusal| self.exception(refusal);
-        if !self.map.word(address).is_some_and(Word::is_parameter) {
+        if !self.map.word(address.into()).is_some_and(Word::is_parameter) {
             return Err(refused(Refusal::Address));
         }
-        self.check_word(address, word).map_err(refused)?;
+        self.check_word(address.into(), word).map_err(refused)?;
         self.store.keep(address, word);
         self.settings_may_have_changed();
         Ok(())
@@ -79,20 +80,23 @@ impl Drive {
         words: &'a mut [u16; MOST_WORDS],
     ) -> Result<Answer<'a>, Refusal> {
         match *request {
-            Request::ReadHolding { address, count, .. } => {
+            Request::Read { table, address, count, .. } => {
                 self.check_count(count)?;
                 self.check_unlocked()?;
                 self.check_groups(address, count)?;
                 let words = words.get_mut(..usize::from(count)).ok_or(Refusal::Structure)?;
                 for (word, offset) in words.iter_mut().zip(0..) {
-                    *word = self.word(address.wrapping_add(offset))?;
+                    *word = self.word(spot(table, address.wrapping_add(offset)))?;
                 }
-                return Answer::read(words).map_err(|_| Refusal::Structure);
+                return Answer::read_of(table, words).map_err(|_| Refusal::Structure);
             }
-            Request::WriteSingle { address, value, .. } => self.write(now, address, Words::new(&[value]))?,
+            Request::WriteSingle { address, value, .. } => self.write(now, address.into(), Words::new(&[value]))?,
+            Request::WriteCoil { address, on, .. } => {
+                self.write(now, spot(Table::Coil, address), Words::new(&[on.into()]))?;
+            }
             Request::WriteMultiple { address, words, .. } => {
                 self.check_count(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
-                self.write(now, address, words)?;
+                self.write(now, address.into(), words)?;
             }
             // Assumption: the echo works on a locked drive; it reads and writes nothing.
             Request::Echo { .. } => {}
@@ -112,7 +116,7 @@ impl Drive {
         if self.family().across_groups || group(address) == group(last) { Ok(()) } else { Err(Refusal::Address) }
     }
 
-    fn write(&mut self, now: Instant, address: u16, words: Words<'_>) -> Result<(), Refusal> {
+    fn write(&mut self, now: Instant, address: u32, words: Words<'_>) -> Result<(), Refusal> {
         match words.get(0) {
             Some(password) if words.len() == 1 && self.is_password(address) => self.check_password(password)?,
             _ => self.check_unlocked()?,
@@ -134,8 +138,8 @@ impl Drive {
         if self.is_locked() && password != self.password() { Err(Refusal::Password) } else { Ok(()) }
     }
 
-    fn is_password(&self, address: u16) -> bool {
-        self.family().roles.password == Some(self.plain(address))
+    pub(super) fn is_password(&self, address: u32) -> bool {
+        self.family().roles.password.map(u32::from) == Some(self.plain(address))
     }
 
     fn password(&self) -> u16 {
@@ -151,11 +155,14 @@ impl Drive {
     }
 
     /// The address without the bit for the other memory.
-    pub(super) fn plain(&self, address: u16) -> u16 {
-        address & !self.family().memory.mask()
+    pub(super) fn plain(&self, address: u32) -> u32 {
+        match table_of(address) {
+            (Table::Holding, _) => address & !u32::from(self.family().memory.mask()),
+            _ => address,
+        }
     }
 
-    fn target(&self, address: u16) -> Option<Target> {
+    fn target(&self, address: u32) -> Option<Target> {
         let plain = self.plain(address);
         match (self.map.word(plain)?, self.family().memory, address == plain) {
             (Word::Register(_), _, true) => Some(Target::Control),
@@ -167,7 +174,7 @@ impl Drive {
     }
 
     /// Whether `word` may be written to what stands at `address`, which is a plain one.
-    fn check_word(&self, address: u16, word: u16) -> Result<(), Refusal> {
+    fn check_word(&self, address: u32, word: u16) -> Result<(), Refusal> {
         let target = self.map.word(address).ok_or(Refusal::Address)?;
         match target.access() {
             Access::ReadOnly => return Err(Refusal::ReadOnly),
@@ -194,13 +201,34 @@ impl Drive {
         if fits { Ok(()) } else { Err(Refusal::Value) }
     }
 
+    /// What `word` at `address` tells the machine. A run turns the way that another word says, where a family has one, and
+    /// so does a motor that runs when that word changes.
+    fn command_at(&self, address: u32, before: u16, word: u16) -> Option<Command> {
+        let direction = self.family().roles.direction;
+        let turns =
+            direction.map(
+                |(place, reverse)| {
+                    if self.control_word(place) == reverse { Direction::Reverse } else { Direction::Forward }
+                },
+            );
+        let runs = || matches!(self.machine.state(), RunState::Forward | RunState::Reverse);
+        match (self.family().command_at(address, before, word), turns) {
+            (Some(Command::Run(_)), Some(turns)) => Some(Command::Run(turns)),
+            (None, Some(turns)) if direction.is_some_and(|(place, _)| place == address) && runs() => {
+                Some(Command::Run(turns))
+            }
+            (command, _) => command,
+        }
+    }
+
     /// Does what was found right.
-    fn take(&mut self, now: Instant, address: u16, word: u16) {
+    fn take(&mut self, now: Instant, address: u32, word: u16) {
         if self.writes.len() == WRITES_KEPT {
             self.writes.pop_front();
         }
         self.words_written += 1;
-        self.writes.push_back(WriteRecord { at: now, address, value: word });
+        let (table, plain) = (table_of(address).0, table_of(self.plain(address)).1);
+        self.writes.push_back(WriteRecord { at: now, table, address: table_of(address).1, value: word });
 
         if self.is_password(address) && self.is_locked() {
             self.unlocked = true;
@@ -213,8 +241,8 @@ impl Drive {
                     *control = word;
                 }
             }
-            Some(Target::Eeprom) => self.store.write_eeprom(self.plain(address), word),
-            Some(Target::Ram) => self.store.write_ram(self.plain(address), word),
+            Some(Target::Eeprom) => self.store.write_eeprom(plain, word),
+            Some(Target::Ram) => self.store.write_ram(plain, word),
             None => {}
         }
         if self.is_password(address) {
@@ -223,7 +251,7 @@ impl Drive {
         self.settings_may_have_changed();
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.obeys_bus()
-            && let Some(command) = self.family().command_at(address, before, word)
+            && let Some(command) = self.command_at(address, before, word)
         {
             self.obey(address, word, command);
         }
@@ -233,7 +261,7 @@ impl Drive {
     ///
     /// Assumption: while it runs, a word of those that means nothing else changes nothing, and a run that follows another is obeyed
     /// at once.
-    fn obey(&mut self, address: u16, word: u16, command: Command) {
+    fn obey(&mut self, address: u32, word: u16, command: Command) {
         let family = self.map.family();
         let handshake = family.roles.handshake.as_ref().filter(|_| family.command == Some(address));
         if let Some(handshake) = handshake {

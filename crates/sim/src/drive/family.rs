@@ -30,6 +30,7 @@ mod sunfar;
 mod unlisted;
 mod v20;
 mod vfd500;
+mod wj200;
 
 use std::borrow::Cow;
 
@@ -60,12 +61,12 @@ pub(crate) struct Family {
     /// What [`Shows::Identification`] shows.
     pub(crate) identification: u16,
     /// The register that takes commands, and what each code does; codes it does not know are out of range.
-    pub(crate) command: Option<u16>,
+    pub(crate) command: Option<u32>,
     pub(crate) commands: Vec<(u16, Command)>,
     /// Where a command is bits and no code: what the word at the register does, by the word before it and itself.
     pub(crate) control_word: Option<fn(u16, u16) -> Command>,
     /// Commands in registers of their own: address, code, and what it does.
-    pub(crate) elsewhere: Vec<(u16, u16, Command)>,
+    pub(crate) elsewhere: Vec<(u32, u16, Command)>,
     /// Its bus registers; a later one replaces an earlier one at the same address.
     pub(crate) registers: Vec<Register>,
     /// Its parameters, beside those of the profile, which they replace at the same address.
@@ -134,7 +135,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 24] = [
+const FAMILIES: [fn() -> Family; 25] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -159,6 +160,7 @@ const FAMILIES: [fn() -> Family; 24] = [
     v20::v20,
     acs355::acs355,
     fc51::fc51,
+    wj200::wj200,
 ];
 
 impl Family {
@@ -173,12 +175,12 @@ impl Family {
     }
 
     /// Whether `address` takes commands.
-    pub(crate) fn takes_commands(&self, address: u16) -> bool {
+    pub(crate) fn takes_commands(&self, address: u32) -> bool {
         self.command == Some(address) || self.elsewhere.iter().any(|&(place, ..)| place == address)
     }
 
     /// What `code` does at `address`, where `before` stood; `None` where it is out of range, or no command is taken there.
-    pub(crate) fn command_at(&self, address: u16, before: u16, code: u16) -> Option<Command> {
+    pub(crate) fn command_at(&self, address: u32, before: u16, code: u16) -> Option<Command> {
         if let Some(decode) = self.control_word.filter(|_| self.command == Some(address)) {
             return Some(decode(before, code));
         }

@@ -31,7 +31,7 @@ pub(crate) enum Word {
 pub(crate) struct Map {
     family: Family,
     /// By address.
-    words: Vec<(u16, Word)>,
+    words: Vec<(u32, Word)>,
     places: Places,
     /// Where the parameters stand among the parameters, by address.
     parameters: Arc<Places>,
@@ -49,15 +49,15 @@ impl Map {
             if entry.words() == 2 {
                 // A value of two words is only read, and its factory value fills no more than the low one.
                 let high = if low == address { address.wrapping_add(1) } else { address };
-                words.insert(high, Word::Parameter(Parameter::shown(high)));
+                words.insert(high.into(), Word::Parameter(Parameter::shown(high)));
             }
-            words.insert(low, Word::Parameter(parameter(&family, profile, entry, low)));
+            words.insert(u32::from(low), Word::Parameter(parameter(&family, profile, entry, low)));
         }
-        words.extend(family.parameters.iter().map(|&known| (known.address, Word::Parameter(known))));
+        words.extend(family.parameters.iter().map(|&known| (known.address.into(), Word::Parameter(known))));
         words.extend(family.registers.iter().map(|register| (register.address, Word::Register(register.clone()))));
 
         let places = Places::new(words.keys().copied());
-        let addresses = |wanted: fn(&Word) -> bool| -> Vec<u16> {
+        let addresses = |wanted: fn(&Word) -> bool| -> Vec<u32> {
             words.iter().filter(|(_, word)| wanted(word)).map(|(&address, _)| address).collect()
         };
         let parameters = Arc::new(Places::new(addresses(Word::is_parameter)));
@@ -76,11 +76,11 @@ impl Map {
     }
 
     /// Where `address` stands among them.
-    pub(crate) fn control(&self, address: u16) -> Option<usize> {
+    pub(crate) fn control(&self, address: u32) -> Option<usize> {
         self.controls.of(address)
     }
 
-    pub(crate) fn word(&self, address: u16) -> Option<&Word> {
+    pub(crate) fn word(&self, address: u32) -> Option<&Word> {
         self.places.of(address).and_then(|place| self.words.get(place)).map(|(_, word)| word)
     }
 
@@ -94,7 +94,7 @@ impl Map {
         let own = self.family.roles.unit_address;
         self.words.iter().filter_map(move |(address, word)| match word {
             Word::Register(_) => None,
-            Word::Parameter(_) if own == Some(*address) => Some(u16::from(unit.get())),
+            Word::Parameter(_) if own.map(u32::from) == Some(*address) => Some(u16::from(unit.get())),
             Word::Parameter(parameter) => Some(parameter.factory),
         })
     }

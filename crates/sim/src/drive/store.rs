@@ -28,12 +28,12 @@ impl Store {
 
     /// The value in force; `None` where there is no such parameter.
     pub(crate) fn get(&self, address: u16) -> Option<u16> {
-        self.places.of(address).and_then(|place| self.ram.get(place)).copied()
+        self.places.of(address.into()).and_then(|place| self.ram.get(place)).copied()
     }
 
     /// From the bus, for good: both memories.
     pub(crate) fn write_eeprom(&mut self, address: u16, word: u16) {
-        if self.places.of(address).is_some() {
+        if self.places.of(address.into()).is_some() {
             self.keep(address, word);
             *self.writes.entry(address).or_default() += 1;
         }
@@ -41,7 +41,7 @@ impl Store {
 
     /// To RAM only: lost with the power.
     pub(crate) fn write_ram(&mut self, address: u16, word: u16) {
-        if let Some(cell) = self.places.of(address).and_then(|place| self.ram.get_mut(place)) {
+        if let Some(cell) = self.places.of(address.into()).and_then(|place| self.ram.get_mut(place)) {
             *cell = word;
         }
     }
@@ -49,7 +49,7 @@ impl Store {
     /// The drive itself keeps `word` for good.
     pub(crate) fn keep(&mut self, address: u16, word: u16) {
         self.write_ram(address, word);
-        if let Some(cell) = self.places.of(address).and_then(|place| self.eeprom.get_mut(place)) {
+        if let Some(cell) = self.places.of(address.into()).and_then(|place| self.eeprom.get_mut(place)) {
             *cell = word;
         }
     }

@@ -12,20 +12,20 @@ const LOCAL_INPUTS: u16 = 0x3F;
 const RELAY_1: u16 = 1 << 2;
 
 impl Drive {
-    /// The word at `address`, as 03H would read it.
+    /// The word at `address`, as the function of its table would read it.
     ///
     /// Assumption: a password reads as 0.
-    pub(super) fn word(&self, address: u16) -> Result<u16, Refusal> {
+    pub(super) fn word(&self, address: u32) -> Result<u16, Refusal> {
         match self.map.word(address) {
             None => Err(Refusal::Address),
             Some(Word::Register(register)) if register.access == Access::WriteOnly => Err(Refusal::Unreadable),
             Some(Word::Register(register)) => Ok(self.shown(register.address, &register.shows)),
-            Some(Word::Parameter(_)) if self.family().roles.password == Some(address) => Ok(0),
-            Some(Word::Parameter(_)) => self.store.get(address).ok_or(Refusal::Address),
+            Some(Word::Parameter(_)) if self.is_password(address) => Ok(0),
+            Some(Word::Parameter(parameter)) => self.store.get(parameter.address).ok_or(Refusal::Address),
         }
     }
 
-    fn shown(&self, address: u16, shows: &Shows) -> u16 {
+    fn shown(&self, address: u32, shows: &Shows) -> u16 {
         match *shows {
             Shows::Written => self.control_word(address),
             Shows::WrittenTo(register) => self.control_word(register),

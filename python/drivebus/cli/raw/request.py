@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import click
 
 import drivebus
+from drivebus import places
 from drivebus.cli import names
 from drivebus.cli.frames import framed
 from drivebus.line.trace import meaning
@@ -91,7 +92,7 @@ def check_commands(request: Request) -> None:
         there = [family for family in families if address in family.command_registers()]
         if there and not any(word in family.command_registers()[address] for family in there):
             raise drivebus.NotAllowed(
-                f"{word} at {address:04X}H is not a command of any family that has its command register there "
+                f"{word} at {places.shown(address)} is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
                 "--profile the family is known; with --force it is sent all the same"
             )

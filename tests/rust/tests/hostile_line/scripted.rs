@@ -29,7 +29,7 @@ pub(crate) fn right(request: &[u8]) -> Vec<u8> {
     let request = Request::parse(frame.pdu()).unwrap();
     let words: Vec<u16>;
     let answer = match request {
-        Request::ReadHolding { address, count, .. } => {
+        Request::Read { address, count, .. } => {
             words = (address..address + count).collect();
             Answer::read(&words).unwrap()
         }

@@ -34,6 +34,11 @@ pub(in crate::load) struct Commands {
     #[serde(default)]
     #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Elsewhere>"))]
     pub(in crate::load) elsewhere: BTreeMap<Command, Elsewhere>,
+    /// What is written, once, before the word of a command: the direction, where one register says whether the motor runs
+    /// and another which way.
+    #[serde(default)]
+    #[cfg_attr(test, schemars(schema_with = "super::schema::table::<Command, Elsewhere>"))]
+    pub(in crate::load) first: BTreeMap<Command, Elsewhere>,
     /// Words that mean something else: `"9" = "immediate stop"`.
     #[serde(default)]
     pub(in crate::load) other: BTreeMap<Placed<String>, String>,
@@ -89,7 +94,7 @@ pub(in crate::load) struct SequenceWord {
     pub(in crate::load) until: BTreeMap<String, u16>,
 }
 
-/// A command in a register of its own.
+/// A command in a register of its own, or what comes before one.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

@@ -169,10 +169,10 @@ impl<'b> Call<'b, '_> {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let (&Request::ReadHolding { address, count: asked, .. }, Some(unit)) = (self.ask.request, self.unit) else {
+        let (&Request::Read { table, address, count: asked, .. }, Some(unit)) = (self.ask.request, self.unit) else {
             return put(course, owner, &self.ask, Form::Plain, give_up, take);
         };
-        let Ok(request) = Request::read(address, count) else {
+        let Ok(request) = Request::read_of(table, address, count) else {
             return put(course, owner, &self.ask, Form::Plain, give_up, take);
         };
         if !again && owner.master.in_quarantine(owner.now(), unit) {
@@ -182,9 +182,9 @@ impl<'b> Call<'b, '_> {
         let result = put(course, owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
         if count > asked {
             match &result {
-                Ok(_) => owner.longer.given(unit, address),
-                Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, address, count),
-                Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, address, count),
+                Ok(_) => owner.longer.given(unit, (table, address)),
+                Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, (table, address), count),
+                Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, (table, address), count),
                 Err(_) => {}
             }
         }
@@ -195,7 +195,7 @@ impl<'b> Call<'b, '_> {
     /// asked the unit in between: that may be open now.
     fn go_on_hearing(&self, course: &mut Course, owner: &Owner, attribution: Attribution) -> bool {
         // Whatever else is repeated would be done twice.
-        let twice = self.verify && matches!(self.ask.request, Request::ReadHolding { .. });
+        let twice = self.verify && matches!(self.ask.request, Request::Read { .. });
         if course.hearing.is_none() && attribution == Attribution::Certain && !twice {
             return false;
         }

@@ -134,7 +134,7 @@ impl Course {
         asked: impl FnOnce(UnitAddress) -> Asked,
     ) {
         self.left_open = match (result, ask.destination, ask.request) {
-            (Err(error), Destination::Unit(unit), Request::ReadHolding { .. }) if is_unanswered(&error.failure) => {
+            (Err(error), Destination::Unit(unit), Request::Read { .. }) if is_unanswered(&error.failure) => {
                 Some((asked(unit), form))
             }
             _ => None,

@@ -19,7 +19,7 @@ use super::{
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::Refusal;
 
-const COMMAND: u16 = 8501;
+const COMMAND: u32 = 8501;
 const MAX_FREQUENCY: u16 = 3103;
 const HIGH_SPEED: u16 = 3104;
 const SETPOINT_SOURCE: u16 = 8413;

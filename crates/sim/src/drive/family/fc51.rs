@@ -25,8 +25,8 @@ use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
 use crate::drive::refusal::Refusal;
 
-const CONTROL_WORD: u16 = 49_999;
-const REFERENCE: u16 = 50_009;
+const CONTROL_WORD: u32 = 49_999;
+const REFERENCE: u32 = 50_009;
 /// The low words of 3-03 and 3-42.
 const HIGHEST_REFERENCE: u16 = 3_030;
 const RAMP_DOWN: u16 = 3_420;

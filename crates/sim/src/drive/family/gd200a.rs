@@ -52,7 +52,7 @@ pub(crate) fn gd10() -> Family {
 }
 
 fn without(mut registers: Vec<Register>, gone: &[u16]) -> Vec<Register> {
-    registers.retain(|register| !gone.contains(&register.address));
+    registers.retain(|register| !gone.iter().any(|&address| register.address == u32::from(address)));
     registers
 }
 

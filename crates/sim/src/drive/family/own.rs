@@ -13,8 +13,8 @@
 use std::borrow::Cow;
 
 use drivebus_drives::{
-    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, MemoryBit, Profile,
-    Quantity, Setpoint, State, UnitKind, Value,
+    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, MemoryBit, Place, Profile,
+    Quantity, Setpoint, State, Table, UnitKind, Value,
 };
 
 use super::{
@@ -80,7 +80,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
             None => Memory::EepromOnly,
         },
         identification: own.identification(),
-        command: profile.command_address(),
+        command: profile.command_address().map(Place::number),
         commands,
         registers: own.registers(states),
         parameters: own.kept_registers().map(Parameter::shown).collect(),
@@ -96,7 +96,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
 }
 
 /// Assumption, beyond 01H to 03H.
-fn exception(refusal: Refusal) -> u8 {
+pub(super) fn exception(refusal: Refusal) -> u8 {
     match refusal {
         Refusal::Function => 0x01,
         Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
@@ -140,9 +140,14 @@ impl Own<'_> {
     }
 
     /// The commands that stand in registers of their own.
-    fn elsewhere(&self) -> Vec<(u16, u16, Command)> {
+    fn elsewhere(&self) -> Vec<(u32, u16, Command)> {
         let known = self.profile.commands().iter();
-        known.filter_map(|(&told, known)| Some((known.elsewhere?, known.code, done(told)))).collect()
+        known.filter_map(|(&told, known)| Some((known.elsewhere?.number(), known.code, done(told)))).collect()
+    }
+
+    /// The word that says which way a run turns, where two commands differ in nothing else.
+    fn direction(&self) -> Option<(u32, u16)> {
+        self.profile.command_first(Told::RunReverse).map(|(place, word)| (place.number(), word))
     }
 
     /// The words for forward, reverse, stopped and fault. One that nothing asks for is that of a stopped motor.
@@ -187,7 +192,7 @@ impl Own<'_> {
     fn speed(&mut self) -> Option<Speed> {
         const PLACE: &str = "profile.toml, [setpoints.frequency]";
         let entry = self.profile.role("setpoints.frequency");
-        let Some((entry, register)) = entry.and_then(|entry| Some((entry, entry.address()?))) else {
+        let Some((entry, register)) = entry.and_then(|entry| Some((entry, entry.place()?.number()))) else {
             self.miss(PLACE, "no register that sets the frequency, or registers.csv has no address for it");
             return None;
         };
@@ -245,6 +250,7 @@ impl Own<'_> {
             Some(Silence { parameter: self.address_of(watchdog.action.as_deref()?)?, words })
         });
         Roles {
+            direction: self.direction(),
             acceleration: parameter(Some(ACCELERATION), "s").or(deceleration),
             deceleration,
             fault_history: self.profile.fault_history().filter_map(Entry::address).collect(),
@@ -284,13 +290,14 @@ impl Own<'_> {
 
     /// The registers that the drive keeps its last faults in.
     fn kept_registers(&self) -> impl Iterator<Item = u16> {
-        self.profile.fault_history().filter(|entry| entry.kind() == EntryKind::Register).filter_map(Entry::address)
+        let is_kept = |entry: &&Entry| entry.kind() == EntryKind::Register && entry.table() == Table::Holding;
+        self.profile.fault_history().filter(is_kept).filter_map(Entry::address)
     }
 
     fn registers(&self, states: [u16; 4]) -> Vec<Register> {
         let entries = self.profile.entries().filter(|entry| entry.kind() == EntryKind::Register);
-        let kept: Vec<u16> = self.kept_registers().collect();
-        let placed = entries.filter_map(|entry| Some((entry, entry.address()?)));
+        let kept: Vec<u32> = self.kept_registers().map(u32::from).collect();
+        let placed = entries.filter_map(|entry| Some((entry, entry.place()?.number())));
         let placed = placed.filter(|(_, address)| !kept.contains(address));
         let registers = placed
             .flat_map(|(entry, address)| {
@@ -304,13 +311,14 @@ impl Own<'_> {
                     _ => Range::Within(bounds(self.profile, entry.quantity())),
                 };
                 let shows = self.shows(entry, states);
-                if entry.words() == 1 {
+                let beside = entry.place().zip(low_word(entry)).filter(|_| entry.words() == 2);
+                let Some((place, low)) = beside else {
                     return vec![Register { address, access, range, shows }];
-                }
+                };
                 // Two words are only read, and nothing that is shown fills the high one.
-                let low = low_word(entry).unwrap_or(address);
-                let high = if low == address { address.wrapping_add(1) } else { address };
-                vec![Register::read(low, shows), Register::read(high, Shows::Zero)]
+                let high = if low == place.address { place.address.wrapping_add(1) } else { place.address };
+                let at = |address| Place { address, ..place }.number();
+                vec![Register::read(at(low), shows), Register::read(at(high), Shows::Zero)]
             })
             .collect();
         register::joined(registers)

@@ -7,7 +7,8 @@ use crate::drive::map::Access;
 /// A register of the bus.
 #[derive(Debug, Clone)]
 pub(crate) struct Register {
-    pub(crate) address: u16,
+    /// With its table: [`spot`](crate::drive::places::spot).
+    pub(crate) address: u32,
     pub(crate) access: Access,
     pub(crate) range: Range,
     pub(crate) shows: Shows,
@@ -33,12 +34,12 @@ pub(crate) enum Shows {
     /// What was last written there.
     Written,
     /// What was last written to another register.
-    WrittenTo(u16),
+    WrittenTo(u32),
     /// What was last written to a register while a parameter has a value, and another parameter otherwise.
     WrittenIf {
         parameter: u16,
         is: u16,
-        register: u16,
+        register: u32,
         otherwise: Option<u16>,
     },
     /// A code each for forward, reverse, stopped and fault, and bits beside it.
@@ -49,9 +50,9 @@ pub(crate) enum Shows {
     Fault,
     Identification,
     /// The digital inputs, together with those that the bus sets at an address.
-    Inputs(Option<u16>),
+    Inputs(Option<u32>),
     /// The digital outputs that the bus sets at an address, and relay 1 while the motor runs.
-    Outputs(u16),
+    Outputs(u32),
     /// An analog input, from 0.
     Analog(usize),
     /// Bits 0 to 15 (0) or 16 to 31 (1) of the energy meter.
@@ -112,7 +113,7 @@ pub(crate) enum Bit {
     /// Two bits: who gives the commands.
     Channel(u8),
     /// Two bits: the motor that the low bits of a register choose.
-    Motor(u8, u16),
+    Motor(u8, u32),
     /// The same bits always.
     Always(u16),
     /// One number, from its lowest bit on, while something is so, and another while it is not.
@@ -181,17 +182,17 @@ impl Bounds {
 
 impl Register {
     /// One that the bus sets and may read back.
-    pub(crate) const fn set(address: u16, range: Range) -> Self {
+    pub(crate) const fn set(address: u32, range: Range) -> Self {
         Self { address, access: Access::Always, range, shows: Shows::Written }
     }
 
     /// One that the bus sets and cannot read.
-    pub(crate) const fn write_only(address: u16, range: Range) -> Self {
+    pub(crate) const fn write_only(address: u32, range: Range) -> Self {
         Self { address, access: Access::WriteOnly, range, shows: Shows::Written }
     }
 
     /// One that can only be read.
-    pub(crate) const fn read(address: u16, shows: Shows) -> Self {
+    pub(crate) const fn read(address: u32, shows: Shows) -> Self {
         Self { address, access: Access::ReadOnly, range: Range::Words(0, u16::MAX), shows }
     }
 }

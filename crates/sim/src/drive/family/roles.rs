@@ -11,6 +11,8 @@ pub(crate) struct Roles {
     pub(crate) channel: Option<u16>,
     /// The speed comes from the bus while these parameters have these values. Without them: while the bus is obeyed.
     pub(crate) speed_source: Option<Vec<(u16, u16)>>,
+    /// The word that says which way a run turns, and what it is for reverse.
+    pub(crate) direction: Option<(u32, u16)>,
     /// The speed that the bus sets.
     pub(crate) speed: Option<Speed>,
     /// The speed where it does not come from the bus, Hz.
@@ -62,7 +64,7 @@ impl Scaled {
 /// How the bus sets a speed.
 #[derive(Debug, Clone)]
 pub(crate) struct Speed {
-    pub(crate) register: u16,
+    pub(crate) register: u32,
     /// A parameter that decides what the register counts, and what its words decide.
     pub(crate) unit: Option<(u16, Vec<(u16, SpeedScale)>)>,
     /// What it counts otherwise.
@@ -89,7 +91,7 @@ pub(crate) enum SpeedUnit {
 
 impl Speed {
     /// Hundredths of a hertz, always.
-    pub(crate) const fn hertz(register: u16) -> Self {
+    pub(crate) const fn hertz(register: u32) -> Self {
         let usual = SpeedScale { unit: SpeedUnit::Hertz, counts: 100.0, bounds: Bounds::NONE };
         Self { register, unit: None, usual }
     }
@@ -133,6 +135,7 @@ impl Roles {
         obeys: Vec::new(),
         channel: None,
         speed_source: None,
+        direction: None,
         speed: None,
         keypad_frequency: None,
         max_frequency: None,

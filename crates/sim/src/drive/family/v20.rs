@@ -18,7 +18,7 @@ use super::{
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::Refusal;
 
-const COMMAND: u16 = 0x0063;
+const COMMAND: u32 = 0x0063;
 const REFERENCE: u16 = 0x000F;
 const ACCELERATION: u16 = 0x000A;
 const DECELERATION: u16 = 0x000B;
