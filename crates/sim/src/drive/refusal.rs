@@ -22,3 +22,15 @@ pub(crate) enum Refusal {
     /// A password is set, and nobody has unlocked the drive.
     Locked,
 }
+
+/// The exception codes of the Modbus specification, and 04H for what the drive does not do now.
+///
+/// Assumption, where the manual of a family does not say which it sends.
+pub(crate) fn by_the_specification(refusal: Refusal) -> u8 {
+    match refusal {
+        Refusal::Function => 0x01,
+        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
+        Refusal::Structure | Refusal::Value => 0x03,
+        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
+    }
+}

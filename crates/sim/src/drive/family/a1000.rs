@@ -20,7 +20,7 @@ use super::{
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const FREQUENCY_SOURCE: u16 = 0x0180;
 const COMMAND_SOURCE: u16 = 0x0181;
@@ -33,7 +33,7 @@ pub(crate) fn a1000() -> Family {
         functions: vec![0x03, 0x08, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0x0001),
@@ -59,15 +59,6 @@ pub(crate) fn a1000() -> Family {
 /// A parameter that only the keypad changes.
 fn set_up(address: u16, factory: u16) -> Parameter {
     Parameter { address, access: Access::ReadOnly, bounds: Bounds::NONE, factory }
-}
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
-    }
 }
 
 /// 0001H, p. 559.

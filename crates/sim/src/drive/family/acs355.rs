@@ -15,7 +15,7 @@ use super::{
     Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const COMMAND_SOURCE: u16 = 1000;
 const SETPOINT_SOURCE: u16 = 1102;
@@ -29,7 +29,7 @@ pub(crate) fn acs355() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0),
@@ -59,15 +59,6 @@ const fn hertz(reference: f64) -> SpeedScale {
         unit: SpeedUnit::Hertz,
         counts: 20_000.0 / reference,
         bounds: Bounds { signed: true, ..Bounds::new(-0x7FFF, 0x7FFF) },
-    }
-}
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
     }
 }
 

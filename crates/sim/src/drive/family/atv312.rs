@@ -17,7 +17,7 @@ use super::{
     Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const COMMAND: u32 = 8501;
 const MAX_FREQUENCY: u16 = 3103;
@@ -35,7 +35,7 @@ pub(crate) fn atv312() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: 29,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(COMMAND),
@@ -65,15 +65,6 @@ pub(crate) fn atv312() -> Family {
 /// In tenths of a hertz; a negative one turns the other way (assumed).
 const SPEED: SpeedScale =
     SpeedScale { unit: SpeedUnit::Hertz, counts: 10.0, bounds: Bounds { signed: true, ..Bounds::new(-5_000, 5_000) } };
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
-    }
-}
 
 const COMMANDS: &[(u16, Command)] = &[
     (0x0000, Command::Coast),

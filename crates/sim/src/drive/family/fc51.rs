@@ -23,7 +23,7 @@ use super::{
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const CONTROL_WORD: u32 = 49_999;
 const REFERENCE: u32 = 50_009;
@@ -42,7 +42,7 @@ pub(crate) fn fc51() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(CONTROL_WORD),
@@ -76,15 +76,6 @@ pub(crate) fn fc51() -> Family {
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,
         faults: Faults { overload: None, silent_bus: None },
-    }
-}
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Running | Refusal::Password | Refusal::Locked => 0x04,
     }
 }
 

@@ -18,7 +18,7 @@ use super::{
     USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const FREQUENCY_SOURCE: u16 = 0x0014;
 const COMMAND_SOURCE: u16 = 0x0015;
@@ -30,7 +30,7 @@ pub(crate) fn ms300() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0x2000),
@@ -50,16 +50,6 @@ pub(crate) fn ms300() -> Family {
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,
         faults: Faults { overload: Some(21), silent_bus: None },
-    }
-}
-
-/// p. 803 has 01H to 04H.
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
     }
 }
 

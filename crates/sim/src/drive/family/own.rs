@@ -23,7 +23,7 @@ use super::{
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::{Access, bounds, low_word};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 /// What the bus reads at a register that has this name and this unit.
 const MEASURES: [(&str, &str, Measure); 6] = [
@@ -73,7 +73,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         functions: profile.functions().to_vec(),
         max_words: profile.max_words(),
         across_groups: profile.requests().across_groups,
-        exception,
+        exception: by_the_specification,
         memory: match profile.memory() {
             Some(memory) if memory.means == MemoryBit::Ram => Memory::BitMeansRam(memory.mask()),
             Some(memory) => Memory::BitMeansEeprom(memory.mask()),
@@ -93,16 +93,6 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         max_hertz: own.highest_hertz().unwrap_or(USUAL_MAX_HZ),
         faults: Faults { overload: own.fault(OVERLOAD), silent_bus: own.fault(SILENT_BUS) },
     })
-}
-
-/// Assumption, beyond 01H to 03H.
-pub(super) fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
-    }
 }
 
 /// A profile that is looked through for what a simulation needs.

@@ -13,7 +13,7 @@ use super::{
     Family, Faults, Kind, MAX_WORDS, Measure, Memory, Range, Register, Roles, Shows, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 pub(crate) fn saj8000m() -> Family {
     Family {
@@ -22,7 +22,7 @@ pub(crate) fn saj8000m() -> Family {
         functions: vec![0x03, 0x06],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0x1000),
@@ -42,15 +42,6 @@ pub(crate) fn saj8000m() -> Family {
 
 /// A parameter that is not there has no value.
 const NEVER: (u16, u16) = (u16::MAX, 0);
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
-    }
-}
 
 /// 1000H, p. 142.
 const COMMANDS: &[(u16, Command)] = &[

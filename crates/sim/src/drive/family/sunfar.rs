@@ -15,7 +15,7 @@ use super::{
     USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 pub(crate) fn e300() -> Family {
     Family {
@@ -24,7 +24,7 @@ pub(crate) fn e300() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: 6,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0x1001),
@@ -46,15 +46,6 @@ pub(crate) fn e300() -> Family {
 fn speed() -> Speed {
     let usual = SpeedScale { unit: SpeedUnit::Hertz, counts: 10.0, bounds: Bounds::NONE };
     Speed { register: 0x1002, unit: None, usual }
-}
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
-    }
 }
 
 /// 1001H, p. 64.

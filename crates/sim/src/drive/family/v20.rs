@@ -16,7 +16,7 @@ use super::{
     Shows, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::Refusal;
+use crate::drive::refusal::by_the_specification;
 
 const COMMAND: u32 = 0x0063;
 const REFERENCE: u16 = 0x000F;
@@ -30,7 +30,7 @@ pub(crate) fn v20() -> Family {
         functions: vec![0x03, 0x06, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(COMMAND),
@@ -64,15 +64,6 @@ const fn hertz(reference: f64) -> SpeedScale {
         unit: SpeedUnit::Hertz,
         counts: 16_384.0 / reference,
         bounds: Bounds { signed: true, ..Bounds::new(-0x7FFF, 0x7FFF) },
-    }
-}
-
-fn exception(refusal: Refusal) -> u8 {
-    match refusal {
-        Refusal::Function => 0x01,
-        Refusal::Address | Refusal::Unreadable | Refusal::ReadOnly => 0x02,
-        Refusal::Structure | Refusal::Value => 0x03,
-        Refusal::Password | Refusal::Running | Refusal::Locked => 0x04,
     }
 }
 

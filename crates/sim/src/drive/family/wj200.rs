@@ -11,12 +11,10 @@
 
 use drivebus_rtu::Table;
 
-use super::{
-    Bit, Family, Faults, Kind, MAX_WORDS, Measure, Memory, Range, Register, Roles, Shows, Speed, USUAL_DELAY,
-    own::exception,
-};
+use super::{Bit, Family, Faults, Kind, MAX_WORDS, Measure, Memory, Range, Register, Roles, Shows, Speed, USUAL_DELAY};
 use crate::drive::machine::{Command, Direction};
 use crate::drive::places::spot;
+use crate::drive::refusal::by_the_specification;
 
 const RUN: u32 = spot(Table::Coil, 0x0000);
 const DIRECTION: u32 = spot(Table::Coil, 0x0001);
@@ -30,7 +28,7 @@ pub(crate) fn wj200() -> Family {
         functions: vec![0x01, 0x03, 0x05, 0x06, 0x08, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception,
+        exception: by_the_specification,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(RUN),
