@@ -144,6 +144,18 @@ def test_a_coil_can_be_read_as_one_thing_and_written_as_another(tmp_path: Path) 
     assert profile.command_reason("run_forward") is None
 
 
+@pytest.mark.parametrize("command", ["stop", "coast"])
+def test_nothing_comes_before_what_halts_a_motor(tmp_path: Path, command: str) -> None:
+    row = f'{command} = {{ register = "way", code = 1 }}\n'
+    manifest = MANIFEST.replace("[commands.first]\n", f"[commands.first]\n{row}").replace(
+        "stop = 0\n", f"{command} = 0\n"
+    )
+    [mistake] = Profile.check(folder(tmp_path, manifest))
+    assert mistake["reason"] == (
+        f"way is written before {command}, so it must come before a start: a stop and a reset wait for nothing"
+    )
+
+
 def test_what_comes_first_can_be_bits(tmp_path: Path) -> None:
     manifest = MANIFEST.replace('"run_command", "way"]', '"run_command", "brake"]')
     for code, bits in ((1, "{ free = 1, ahead = 1 }"), (0, "{ free = 1 }")):

@@ -175,6 +175,9 @@ fn first(
     if register.place.is_none() {
         needs("needs an address");
     }
+    if !is_start(command) {
+        needs("must come before a start: a stop and a reset wait for nothing");
+    }
     Some((register.place?, code))
 }
 
@@ -184,6 +187,11 @@ fn number(key: &str) -> Option<u16> {
         Some(digits) if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) => u16::from_str_radix(digits, 16).ok(),
         _ => key.parse().ok(),
     }
+}
+
+/// Whether `command` makes a motor turn.
+fn is_start(command: Command) -> bool {
+    matches!(command, Command::RunForward | Command::RunReverse | Command::JogForward | Command::JogReverse)
 }
 
 /// Whether a unit without a motor can have `command`.
