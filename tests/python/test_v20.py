@@ -14,10 +14,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
+from drivebus.cli import cli
 
 OFF = "01 06 00 63 04 7E FB 34"
 FORWARD_10_OF_50_HZ = "01 10 00 63 00 02 04 04 7F 0C CD 41 EF"
@@ -154,3 +156,22 @@ def test_a_whole_job_awaited(line: Simulator) -> None:
 
     asyncio.run(main())
     assert written(line) == WHOLE
+
+
+def test_the_command_waits_for_the_speed_that_it_gave() -> None:
+    """No register tells the setpoint in force, so a start without one has nothing to wait for."""
+    words = [
+        "--port",
+        "sim://v20?clock=virtual",
+        "--profile",
+        "v20",
+        "--unverified",
+        "--variant",
+        "base_frequency=50 Hz",
+    ]
+    done = CliRunner().invoke(cli, [*words, "run", "10", "--yes", "--wait", "60"])
+    assert (done.exit_code, "forward" in done.stdout) == (0, True), done.output
+    refused = CliRunner().invoke(cli, [*words, "run", "--yes", "--wait", "60"])
+    assert refused.exit_code == 2
+    assert "does not tell its setpoint" in refused.output
+    assert "Nothing was sent" in refused.output
