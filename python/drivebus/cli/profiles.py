@@ -34,16 +34,17 @@ def profiles(context: click.Context, session: Session) -> None:
         totals = [counts[kind]["total"] for kind in KINDS]
         share = _printed(counts)
         if session.out.as_json:
-            rows.append([name, profile.title, profile.kind, *totals, share])
+            doubtful = [sum(counts[kind][how] for kind in KINDS) for how in ("unverified", "assumed")]
+            rows.append([name, profile.title, profile.kind, *totals, share, *doubtful])
         else:
             rows.append([name, profile.title, sum(totals), "" if share is None else f"{int(share * 100)} %"])
     if session.out.as_json:
-        session.out.rows(["name", "title", "kind", *KINDS, "verified"], rows)
+        session.out.rows(["name", "title", "kind", *KINDS, "verified", "unverified", "assumed"], rows)
         return
     session.out.rows(["name", "title", "rows", "verified"], rows)
     session.out.say(
         "rows: registers, parameters and faults that are known. verified: those that a document of this very family "
-        "prints. `drivebus profiles show NAME` has more."
+        "prints. `drivebus profiles show NAME` counts those that are unverified and assumed, and has more."
     )
 
 
