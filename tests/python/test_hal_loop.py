@@ -229,9 +229,9 @@ def test_the_brake_opens_before_the_motor_starts(cell: Cell) -> None:
     at_the_start: list[object] = []
     carry_out = cell.motor.carry_out
 
-    def told(action: Action, counts: float) -> None:
+    def told(action: Action) -> None:
         at_the_start.append((cell.pins["brake"], cell.machine.state))
-        carry_out(action, counts)
+        carry_out(action)
 
     assert cell.pins["brake"] is True
     cell.motor.carry_out = told  # type: ignore[method-assign]
@@ -319,3 +319,20 @@ def test_the_module_of_another_python_is_named(tmp_path: Path) -> None:
 def test_a_module_that_is_not_there_is_told_where_to_get(tmp_path: Path) -> None:
     with pytest.raises(drivebus.NotAllowed, match=r"linuxcnc-uspace.*--hal-path"):
         module(str(tmp_path))
+
+
+def test_a_drive_that_counts_shares_of_a_frequency_gets_whole_counts() -> None:
+    """V20: 047EH, then 047FH or 0C7FH at 0063H, and 16384 counts at 0064H are 50 Hz: 20 Hz are 6553.6 of them."""
+    with Simulator({1: "v20"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        cell = Cell(simulator, bus.drive(1, "v20", unverified=True, variants={"base_frequency": "50 Hz"}))
+        with cell.motor:
+            cell.on(1200.0)
+            cell.until(cell.shows(at_speed=True, forward=True))
+            assert cell.taken() == [(0x63, 0x047E), (0x63, 0x047F), (0x64, 6554)]
+            cell.pins["speed-command"] = 1000.0
+            cell.until(lambda: cell.pins["at-speed"] and abs(float(cell.pins["frequency-out"]) - 1000 / 60) < 0.02)
+            assert cell.taken() == [(0x64, 5461)]
+            cell.pins["spindle-on"] = False
+            cell.until(cell.shows(stopped=True))
+            assert cell.taken() == [(0x63, 0x047E)]
+        assert cell.said == []

@@ -88,7 +88,7 @@ class Loop:
 
     def _carry_out(self, action: Action) -> None:
         try:
-            self._motor.carry_out(action, self._spindle.counts)
+            self._motor.carry_out(action)
         except DrivebusError as error:
             final = isinstance(error, (NotAllowed, Refused))
             self._spindle.failed(action, str(error), final=final, sent=isinstance(error, Unconfirmed))

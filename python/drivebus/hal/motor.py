@@ -51,6 +51,7 @@ class Motor:
         self._watchdog: Watchdog | None = None
         self._block: MotorBlock | None = None
         self._leaving = False
+        self._settled = unit_of(drive)
         self.unstopped = ""
         self._has_current = _CURRENT in drive.profile.monitor_names() and self._is_readable(_CURRENT)
 
@@ -60,7 +61,7 @@ class Motor:
         Raises:
             NotAllowed: It takes no setpoint in Hz over the bus.
         """
-        unit = at_once(setpoints.with_setpoint(unit_of(self._drive), "frequency"))
+        unit = self._settled = at_once(setpoints.with_setpoint(unit_of(self._drive), "frequency"))
         register = setpoints.register_of(unit, "frequency")
         described = unit.profile.describe(register)
         if described.unit != "Hz":
@@ -87,18 +88,22 @@ class Motor:
             link.good / link.asked if link.asked else 1.0,
         )
 
-    def carry_out(self, action: Action, counts: float) -> None:
+    def carry_out(self, action: Action) -> None:
         """Tells the drive, once. Raises what came of it; a start of which nothing is known was then stopped."""
         if isinstance(action, Run):
-            self._run(action.course.word / counts, action.course.reverse)
+            self._run(self._hertz(action.course.word), action.course.reverse)
         elif isinstance(action, Speed):
-            self._drive.setpoint = action.word / counts
+            self._drive.setpoint = self._hertz(action.word)
         elif isinstance(action, Reset):
             self._drive.reset_fault()
         elif isinstance(action, Coast):
             self._drive.coast()
         else:
             self._stop()
+
+    def _hertz(self, word: int) -> float:
+        """The frequency that the drive counts so: given back, it is the same word."""
+        return float(self._settled.profile.decode(setpoints.register_of(self._settled, "frequency"), word))
 
     def forget_watchdog(self) -> None:
         """Takes the drive's time-out for forgotten, as it is by one that was switched off: the next start sets it."""

@@ -82,7 +82,7 @@ def _surprises(profile: Profile, answer: Answer, refused: tuple[int, ...]) -> bo
         rows = codes.listed_for(profile, answer.address, answer.word)
         return not set(codes.families_in(rows)) & set(profile.reports_as())
     state = profile.role("state")
-    is_state = state is not None and profile.describe(state).address == answer.address
+    is_state = state is not None and profile.describe(state).place == answer.address
     return is_state and profile.state(answer.word) == "unknown"
 
 
