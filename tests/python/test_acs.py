@@ -7,15 +7,14 @@ Line* V1.02, section 6.2.2.
 
 from __future__ import annotations
 
-import asyncio
-import inspect
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Simulator, State, Unconfirmed
+
+from .jobs import asked, carry_out_awaited
 
 READY = "01 06 00 00 04 76 0A EC"
 FORWARD_10_OF_50_HZ = "01 10 00 00 00 02 04 04 7F 0F A0 C6 CF"
@@ -38,10 +37,6 @@ def drive(line: Simulator) -> Iterator[Drive]:
         drive = bus.drive(1, "acs355", unverified=True)
         drive.prepare_control(store=True)
         yield drive
-
-
-def asked(line: Simulator) -> list[str]:
-    return [frame.hex(" ").upper() for _, who, frame in line.line.trace() if who == "master"]
 
 
 def commanded(line: Simulator) -> list[str]:
@@ -129,12 +124,5 @@ def test_a_whole_job(line: Simulator, drive: Drive) -> None:
 
 
 def test_a_whole_job_awaited(line: Simulator) -> None:
-    async def main() -> None:
-        async with drivebus.aio.Bus(line) as bus:
-            for step in program(line, await bus.drive(1, "acs355", unverified=True)):
-                result = step()
-                if inspect.isawaitable(result):
-                    await result
-
-    asyncio.run(main())
+    carry_out_awaited(line, "acs355", program)
     assert commanded(line) == WHOLE

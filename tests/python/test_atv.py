@@ -7,18 +7,16 @@ their CRCs computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02,
 
 from __future__ import annotations
 
-import asyncio
-import inspect
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
-import drivebus
-import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
 from drivebus.cli import cli
+
+from .jobs import asked, carry_out_awaited
 
 CMD, LFR, ETA, FR1 = 8501, 8502, 3201, 8413
 
@@ -49,10 +47,6 @@ def drive(line: Simulator) -> Iterator[Drive]:
         drive = bus.drive(1, "atv312", unverified=True)
         drive.prepare_control(store=True)
         yield drive
-
-
-def asked(line: Simulator) -> list[str]:
-    return [frame.hex(" ").upper() for _, who, frame in line.line.trace() if who == "master"]
 
 
 def from_first_write(frames: list[str]) -> list[str]:
@@ -251,14 +245,7 @@ def test_a_whole_job(line: Simulator) -> None:
 
 
 def test_a_whole_job_awaited(line: Simulator) -> None:
-    async def main() -> None:
-        async with drivebus.aio.Bus(line) as bus:
-            for step in program(line, await bus.drive(1, "atv312", unverified=True)):
-                result = step()
-                if inspect.isawaitable(result):
-                    await result
-
-    asyncio.run(main())
+    carry_out_awaited(line, "atv312", program)
     assert written(line) == WHOLE
 
 

@@ -8,18 +8,16 @@ Serial Line* V1.02, section 6.2.2.
 
 from __future__ import annotations
 
-import asyncio
-import inspect
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
-import drivebus
-import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
 from drivebus.cli import cli
+
+from .jobs import asked, carry_out_awaited
 
 OFF = "01 06 00 63 04 7E FB 34"
 FORWARD_10_OF_50_HZ = "01 10 00 63 00 02 04 04 7F 0C CD 41 EF"
@@ -40,10 +38,6 @@ def line() -> Iterator[Simulator]:
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
         yield bus.drive(1, "v20", unverified=True)
-
-
-def asked(line: Simulator) -> list[str]:
-    return [frame.hex(" ").upper() for _, who, frame in line.line.trace() if who == "master"]
 
 
 def written(line: Simulator) -> list[str]:
@@ -147,14 +141,7 @@ def test_a_whole_job(line: Simulator, drive: Drive) -> None:
 
 
 def test_a_whole_job_awaited(line: Simulator) -> None:
-    async def main() -> None:
-        async with drivebus.aio.Bus(line) as bus:
-            for step in program(line, await bus.drive(1, "v20", unverified=True)):
-                result = step()
-                if inspect.isawaitable(result):
-                    await result
-
-    asyncio.run(main())
+    carry_out_awaited(line, "v20", program)
     assert written(line) == WHOLE
 
 

@@ -11,8 +11,8 @@
 //! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
 
 use super::{
-    Bounds, Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows,
-    Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows, Speed,
+    SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -55,11 +55,7 @@ pub(crate) fn acs355() -> Family {
 
 /// 20000 counts are the reference.
 const fn hertz(reference: f64) -> SpeedScale {
-    SpeedScale {
-        unit: SpeedUnit::Hertz,
-        counts: 20_000.0 / reference,
-        bounds: Bounds { signed: true, ..Bounds::new(-0x7FFF, 0x7FFF) },
-    }
+    SpeedScale::share(20_000.0, reference)
 }
 
 const COMMANDS: &[(u16, Command)] = &[

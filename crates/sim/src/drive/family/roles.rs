@@ -80,6 +80,17 @@ pub(crate) struct SpeedScale {
     pub(crate) bounds: Bounds,
 }
 
+impl SpeedScale {
+    /// Hertz of which `reference` are `counts`; below zero it turns the other way.
+    pub(crate) const fn share(counts: f64, reference: f64) -> Self {
+        Self {
+            unit: SpeedUnit::Hertz,
+            counts: counts / reference,
+            bounds: Bounds { signed: true, ..Bounds::new(-0x7FFF, 0x7FFF) },
+        }
+    }
+}
+
 /// A unit of speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SpeedUnit {
