@@ -665,6 +665,20 @@ class SimulatedDrive:
     """Digital inputs, bit 0 = S1."""
     def trip(self, code: int, /) -> None:
         """Trips the drive with fault *code*."""
+    def refuse(
+        self,
+        code: int,
+        /,
+        *,
+        asked: str = "anything",
+        share: float = 1.0,
+        seconds: float | None = None,
+        count: int | None = None,
+        taken: bool = False,
+    ) -> None:
+        """Lets the drive refuse by exception *code* (1..=255); *asked* is `"anything"`, `"reads"` or `"writes"`."""
+    def refuse_no_more(self) -> None:
+        """The drive refuses only what its family refuses."""
     def power_cycle(self) -> None:
         """Switches the drive off and on: RAM is lost, EEPROM stays."""
     def factory_reset(self) -> None:
