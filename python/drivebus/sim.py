@@ -148,6 +148,13 @@ class SimulatedDrive:
             taken=checks.flag("taken", taken),
         )
 
+    def limit(self, address: int, highest: int) -> None:
+        """Lets the drive take no more than *highest* where more is written to *address* by 06H; its answer says so.
+
+        The address is that of the request, with the bit for the other memory if it has one.
+        """
+        self._native.limit(checks.address(address), checks.whole("highest", highest, 0, 0xFFFF, hexadecimal=True))
+
     def refuse_no_more(self) -> None:
         """Lets the drive refuse only what its family refuses."""
         self._native.refuse_no_more()

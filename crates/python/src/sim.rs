@@ -291,6 +291,12 @@ impl SimulatedDrive {
         self.0.refuse_no_more();
     }
 
+    #[pyo3(signature = (address, highest, /))]
+    fn limit(&self, address: &Bound<'_, PyAny>, highest: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.limit(one_word("address", address)?, one_word("highest", highest)?);
+        Ok(())
+    }
+
     fn power_cycle(&self) {
         self.0.power_cycle();
     }

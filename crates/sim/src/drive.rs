@@ -20,7 +20,7 @@ mod settings;
 mod store;
 mod words;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -81,6 +81,8 @@ pub(crate) struct Drive {
     led_up: usize,
     /// What it was told to refuse.
     refusing: Option<Refusing>,
+    /// The highest words that it was told to take, by address.
+    limits: BTreeMap<u16, u16>,
 }
 
 /// Frames counted since the power came, over and over from 65 535.
@@ -117,6 +119,7 @@ impl Drive {
             frames: Frames::default(),
             led_up: 0,
             refusing: None,
+            limits: BTreeMap::new(),
         }
     }
 
@@ -191,6 +194,11 @@ impl Drive {
     /// Refuses only what its family refuses.
     pub(crate) fn refuse_no_more(&mut self) {
         self.refusing = None;
+    }
+
+    /// Takes no more than `highest` at `address` by 06H, and says so in its answer.
+    pub(crate) fn limit(&mut self, address: u16, highest: u16) {
+        self.limits.insert(address, highest);
     }
 
     pub(crate) fn set_load(&mut self, load: f64) {

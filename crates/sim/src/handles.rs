@@ -161,6 +161,12 @@ impl SimulatedDrive {
         self.with(Drive::refuse_no_more);
     }
 
+    /// Lets the drive take no more than `highest` where more is written to `address` by 06H: it takes that instead, and its answer
+    /// says so.
+    pub fn limit(&self, address: u16, highest: u16) {
+        self.with(|drive| drive.limit(address, highest));
+    }
+
     /// Switches the drive off and on: RAM is lost, EEPROM stays, the motor coasts to a stop.
     pub fn power_cycle(&self) {
         let mut world = self.shared.present();

@@ -114,7 +114,11 @@ impl Drive {
                 }
                 return Answer::read_of(table, words).map_err(|_| Refusal::Structure);
             }
-            Request::WriteSingle { address, value, .. } => self.write(now, address.into(), Words::new(&[value]))?,
+            Request::WriteSingle { address, value, .. } => {
+                let taken = self.limits.get(&address).map_or(value, |&highest| highest.min(value));
+                self.write(now, address.into(), Words::new(&[taken]))?;
+                return Answer::confirming(&Request::write(address, taken)).ok_or(Refusal::Function);
+            }
             Request::WriteCoil { address, on, .. } => {
                 self.write(now, spot(Table::Coil, address), Words::new(&[on.into()]))?;
             }
