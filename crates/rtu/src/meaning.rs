@@ -71,7 +71,7 @@ impl Meanings {
     /// Those of the specification.
     pub const STANDARD: Self = {
         let mut meanings = Self([0; WORDS]);
-        let mut code = 0;
+        let mut code = 0_u16;
         while code <= 0xFF {
             #[expect(clippy::cast_possible_truncation, reason = "at most FFH")]
             let of = ExceptionCode(code as u8);

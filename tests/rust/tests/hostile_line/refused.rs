@@ -20,9 +20,9 @@ fn refusal(request: &[u8], code: u8) -> Vec<u8> {
 
 /// A unit that answers its first requests by these exceptions, and then does as it is told.
 fn refusing(codes: &[u8]) -> Rig {
-    let mut codes = codes.to_vec().into_iter();
-    Rig::new(move |_, request| match codes.next() {
-        Some(code) => at_once(&refusal(request, code)),
+    let codes = codes.to_vec();
+    Rig::new(move |number, request| match codes.get(number) {
+        Some(&code) => at_once(&refusal(request, code)),
         None => at_once(&right(request)),
     })
 }
