@@ -38,6 +38,7 @@ __all__ = [
     "encode_read",
     "encode_write",
     "end_of_program",
+    "exception_means",
     "fault_kinds",
     "open_bus",
     "port_facts",
@@ -253,6 +254,8 @@ class Bus:
         """
     def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None:
         """What *unit* needs otherwise than the bus, in seconds; None keeps what the bus has."""
+    def set_meanings(self, unit: int, profile: Profile, /) -> None:
+        """The exceptions of *unit* mean what *profile* says; until then what the specification does."""
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
     @property
@@ -527,6 +530,8 @@ class Profile:
     def exceptions(self) -> dict[int, tuple[str, str]]: ...
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code."""
+    def exception_means(self, code: int, /) -> str:
+        """Whether it is a decision: `"no_such"`, `"not_now"`, `"ask_again"` or `"taken"`."""
 
 @final
 class Plan:
@@ -628,6 +633,9 @@ class Simulator:
     @property
     def line(self) -> SimulatedLine: ...
 
+def exception_means(code: int, /) -> str:
+    """Whether an exception (0..=255) is a decision by the specification: as `Profile.exception_means`."""
+
 def end_of_program() -> None:
     """To be called last of all at exit, by the thread that ends the program; others raise SystemExit from here on.
 
@@ -665,6 +673,22 @@ class SimulatedDrive:
     """Digital inputs, bit 0 = S1."""
     def trip(self, code: int, /) -> None:
         """Trips the drive with fault *code*."""
+    def refuse(
+        self,
+        code: int,
+        /,
+        *,
+        asked: str = "anything",
+        share: float = 1.0,
+        seconds: float | None = None,
+        count: int | None = None,
+        taken: bool = False,
+    ) -> None:
+        """Lets the drive refuse by exception *code* (1..=255); *asked* is `"anything"`, `"reads"` or `"writes"`."""
+    def limit(self, address: int, highest: int, /) -> None:
+        """Lets the drive take no more than *highest* by 06H at *address*, and say so in its answer."""
+    def refuse_no_more(self) -> None:
+        """The drive refuses only what its family refuses."""
     def power_cycle(self) -> None:
         """Switches the drive off and on: RAM is lost, EEPROM stays."""
     def factory_reset(self) -> None:

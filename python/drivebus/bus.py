@@ -26,7 +26,7 @@ from drivebus.operations.face import LivingDrives
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.poll import Poll
-from drivebus.profile import Profile
+from drivebus.profile import Profile, native_of
 
 __all__ = ["Bus"]
 
@@ -191,6 +191,7 @@ class Bus(BusFace, Requests):
         known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
+        self._native.set_meanings(unit, native_of(known))
         self._living.add(drive)
         return drive
 

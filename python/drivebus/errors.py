@@ -99,23 +99,44 @@ class CrcError(BadAnswer):
 class Refused(DrivebusError):
     """The drive refused: an exception answer.
 
-    Did the drive take it? No. What it was doing before, it still does.
+    Did the drive take it? No: what it was doing before, it still does. Only where *means* is `"taken"` it did, and is
+    at it.
 
     Attributes:
         code: The exception code, 1..255.
         name: Its short name, such as `"illegal_address"`.
         meaning: What this family of drives means by it; empty from a `Bus`, which knows no family.
+        means: Whether that is a decision. `"no_such"`: there is no such function, address or value. `"not_now"`: it is
+            not allowed now, which another state of the drive may change. `"ask_again"`: the drive is busy, or the
+            request reached it damaged; it was asked again as often as the bus may. `"taken"`: the drive took it and is
+            still at it. From a `Bus` as the Modbus specification has the code.
     """
 
     code: int
     name: str
     meaning: str
+    means: str
 
-    def __init__(self, message: str = "", *, code: int = 0, name: str = "", meaning: str = "", **details: Any) -> None:
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        code: int = 0,
+        name: str = "",
+        meaning: str = "",
+        means: str = "not_now",
+        **details: Any,
+    ) -> None:
         super().__init__(message, **details)
         self.code = code
         self.name = name
         self.meaning = meaning
+        self.means = means
+
+    @property
+    def is_decision(self) -> bool:
+        """Whether the drive has decided that it does not do it: *means* is `"no_such"` or `"not_now"`."""
+        return self.means in ("no_such", "not_now")
 
 
 class Unconfirmed(DrivebusError):

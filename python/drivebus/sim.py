@@ -32,6 +32,9 @@ SERVED = ("pty", "tcp", "process")
 _IN_WORDS = {"pty": "pseudo-terminal", "tcp": "TCP port", "process": "simulation in this process"}
 _SERVED_BY = {"pty": "by a pseudo-terminal", "tcp": "over TCP", "process": "in this process only"}
 
+_ASKED = ("anything", "reads", "writes")
+"""What a drive can be told to refuse."""
+
 _T = TypeVar("_T")
 
 
@@ -109,6 +112,52 @@ class SimulatedDrive:
             hint = checks.closest(mnemonic, [fault.mnemonic for fault in self._profile.faults() if fault.mnemonic])
             raise NotAllowed(f"{self.profile} has no fault {checks.shown(mnemonic)}{hint}")
         return fault.code
+
+    def refuse(
+        self,
+        code: int = 0x06,
+        *,
+        asked: str = "anything",
+        share: float = 1.0,
+        seconds: float | None = None,
+        count: int | None = None,
+        taken: bool = False,
+    ) -> None:
+        """Lets the drive refuse requests, from now on and instead of what it was told to refuse before.
+
+        A request that is refused is not carried out, and counts as heard. Broadcasts are not refused.
+
+        Args:
+            code: The exception, 1..255.
+            asked: Which requests: `"anything"`, `"reads"` (01H to 04H) or `"writes"` (all others).
+            share: Only this share of them, 0.0..1.0, by chance from the simulation's seed.
+            seconds: Only for so long.
+            count: Only so many of them.
+            taken: The drive does what it is asked, and answers by the exception all the same: 05H acknowledges. What it
+                would refuse by itself it refuses so.
+
+        Raises:
+            NotAllowed: An argument is wrong; nothing was changed.
+        """
+        self._native.refuse(
+            checks.whole("code", code, 1, 0xFF, hexadecimal=True),
+            asked=checks.one_of("asked", asked, _ASKED),
+            share=checks.number("share", share, 0.0, 1.0),
+            seconds=None if seconds is None else checks.number("seconds", seconds, 0.0),
+            count=None if count is None else checks.whole("count", count, 0, 2**64 - 1),
+            taken=checks.flag("taken", taken),
+        )
+
+    def limit(self, address: int, highest: int) -> None:
+        """Lets the drive take no more than *highest* where more is written to *address* by 06H; its answer says so.
+
+        The address is that of the request, with the bit for the other memory if it has one.
+        """
+        self._native.limit(checks.address(address), checks.whole("highest", highest, 0, 0xFFFF, hexadecimal=True))
+
+    def refuse_no_more(self) -> None:
+        """Lets the drive refuse only what its family refuses."""
+        self._native.refuse_no_more()
 
     def power_cycle(self) -> None:
         """Switches the drive off and on: RAM is lost, EEPROM stays."""

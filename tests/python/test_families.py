@@ -149,6 +149,8 @@ def test_requests_exceptions_and_codes_are_those_of_the_table(family: dict[str, 
     assert profile.requests()["across_groups"] == family["across_groups"]
     for code, name in words(family["exceptions"]).items():
         assert profile.exception(code)[0] == name, f"{code:02X}"
+        if name != "unknown":
+            assert profile.exception_means(code) == TABLE["means"][name], f"{code:02X}"
     table = family["identification"]
     assert {row["code"]: row["family"] for row in profile.identifications()} == words(table)
     register = given(table["register"])

@@ -14,7 +14,7 @@ use drivebus_rtu::{RequestError, SerialFormatError};
 /// | [`kind`](Self::kind) | did the drive take it? |
 /// | --- | --- |
 /// | [`NotAllowed`](ErrorKind::NotAllowed) | no: nothing was sent |
-/// | [`Refused`](ErrorKind::Refused) | no: what it was doing before, it still does |
+/// | [`Refused`](ErrorKind::Refused) | no: what it was doing before, it still does; only an acknowledgement (05H) is none |
 /// | [`NoAnswer`](ErrorKind::NoAnswer) | it may have: it has not heard the request, or its answer was lost |
 /// | [`BadAnswer`](ErrorKind::BadAnswer), [`Crc`](ErrorKind::Crc) | it may have: only its answer is known to be bad |
 /// | [`Port`](ErrorKind::Port) | if the port was lost after the request had left, it may have |

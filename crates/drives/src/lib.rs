@@ -76,7 +76,7 @@ pub use entry::{Access, AccessError, Entry, Kind, Store};
 pub use evidence::Evidence;
 pub use load::ProfileError;
 pub use parts::command::{Command, CommandCode, Control, ParseCommandError, StartWord, Until};
-pub use parts::fault::{Exception, Fault};
+pub use parts::fault::{Exception, Fault, Means};
 pub use parts::identification::{Identification, Signature};
 pub use parts::memory::{Memory, MemoryBit};
 pub use parts::rules::{Requests, UnitKind};

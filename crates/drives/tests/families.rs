@@ -7,12 +7,13 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use drivebus_drives::{Command, Entry, Evidence, Input, Place, Profile, Store, UnitKind, Value};
+use drivebus_drives::{Command, Entry, Evidence, Input, Means, Place, Profile, Store, UnitKind, Value};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
+    means: BTreeMap<String, String>,
     family: Vec<Family>,
     example: Vec<Example>,
 }
@@ -246,6 +247,7 @@ fn the_memory_bit_is_never_set_on_a_register() {
 
 #[test]
 fn requests_and_exceptions_are_those_of_the_table() {
+    let document = document();
     for (family, profile) in families() {
         assert_eq!(profile.functions(), family.functions, "{}", family.name);
         assert_eq!(profile.max_words(), family.max_words, "{}", family.name);
@@ -256,6 +258,13 @@ fn requests_and_exceptions_are_those_of_the_table() {
             let exception = profile.exception(u8::try_from(hex(code)).unwrap());
             assert_eq!(&exception.name, name, "{} {code}", family.name);
             assert!(!exception.meaning.is_empty(), "{} {code}", family.name);
+            let means = exception.means.map(|means| match means {
+                Means::NoSuch => "no_such",
+                Means::NotNow => "not_now",
+                Means::AskAgain => "ask_again",
+                Means::Taken => "taken",
+            });
+            assert_eq!(means, document.means.get(name).map(String::as_str), "{} {code}", family.name);
             known += usize::from(name != "unknown");
         }
         assert_eq!(profile.exceptions().count(), known, "{}", family.name);

@@ -29,7 +29,7 @@ pub(crate) mod workers;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Meanings, Request, UnitAddress};
 
 use crate::ask::Done;
 use crate::bus::call::Call;
@@ -168,6 +168,16 @@ impl Bus {
         }
     }
 
+    /// Says what the exceptions of `unit` mean, for every call from now on: until then those of the specification hold.
+    ///
+    /// A read that is refused by one that means [`Meaning::AskAgain`](drivebus_rtu::Meaning::AskAgain) is asked again as after
+    /// a damaged answer, and so is a write whose words can be read back. In a forked child nothing is set.
+    pub fn set_meanings(&self, unit: UnitAddress, meanings: Meanings) {
+        if self.shared.is_of_this_process() {
+            self.shared.meanings.set(unit, meanings);
+        }
+    }
+
     /// Of the last ten exchanges with `unit`, how many brought an answer.
     pub fn link(&self, unit: UnitAddress) -> Link {
         if !self.shared.is_of_this_process() {
@@ -231,6 +241,11 @@ impl Bus {
     /// Whether frames are told apart by something else than silence.
     pub(crate) fn is_gapless(&self) -> bool {
         self.shared.gapless
+    }
+
+    /// Whether `unit` could not take a request, as it says by `failure`, and may the next time.
+    pub(crate) fn asks_again(&self, unit: UnitAddress, failure: &Failure) -> bool {
+        self.shared.is_of_this_process() && self.shared.meanings.asks_again(unit, failure)
     }
 
     /// The least silence before a request to `unit`.

@@ -5,7 +5,9 @@ pub(crate) mod kind;
 use std::fmt;
 use std::time::Duration;
 
-use drivebus_rtu::{AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Request, Table};
+use drivebus_rtu::{
+    AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table,
+};
 
 use crate::error::kind::ErrorKind;
 use crate::line::PortError;
@@ -44,9 +46,17 @@ impl fmt::Display for CallError {
             write!(f, "; came: {}", Hex(&self.raw))?;
         }
         match (request, self.sent, &self.failure) {
-            (Some(request), Some(_), failure)
-                if request.is_write() && !matches!(failure, Failure::Refused { .. } | Failure::NotTaken { .. }) =>
-            {
+            (_, _, Failure::Refused { code, .. }) if code.meaning() == Meaning::Taken => {
+                f.write_str(", by which a unit says that it took the request and is at it")
+            }
+            (
+                Some(Request::WriteSingle { .. }),
+                Some(_),
+                Failure::Wrong(AnswerError::Echo { asked: [asked, _], came: [came, took] }),
+            ) if asked == came => {
+                write!(f, "; it was sent once, and the unit says that it took {took} ({took:04X}H) instead")
+            }
+            (Some(request), Some(_), failure) if request.is_write() && !tells_all(failure) => {
                 f.write_str("; it was sent once, and the unit may have taken it")
             }
             (Some(request), None, Failure::NoAnswer { .. } | Failure::Wrong(_) | Failure::Corrupt(_))
@@ -57,6 +67,12 @@ impl fmt::Display for CallError {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether `failure` leaves no question what became of a write that was sent, or says itself what is known of it.
+fn tells_all(failure: &Failure) -> bool {
+    use Failure::{Acknowledged, Limited, NotTaken, Refused, Unheard};
+    matches!(failure, Refused { .. } | NotTaken { .. } | Limited { .. } | Acknowledged { .. } | Unheard { .. })
 }
 
 /// A request in words.
@@ -166,6 +182,30 @@ pub enum Failure {
         /// What was read back.
         shows: Vec<u16>,
     },
+    /// The unit confirmed the write with another value than was sent.
+    #[error("the unit says that it took {took} ({took:04X}H) instead{}", and_shows(*took, *shows))]
+    Limited {
+        /// What it says.
+        took: u16,
+        /// What was read back.
+        shows: u16,
+    },
+    /// The unit said that it took the write and is at it, and has not shown the words since.
+    #[error("the unit acknowledged it (exception {:02X}H), and shows {} still", code.0, Shown(shows))]
+    Acknowledged {
+        /// By which exception.
+        code: ExceptionCode,
+        /// What was read back last.
+        shows: Vec<u16>,
+    },
+    /// The unit could not take the request, however often it was asked: it is busy, or the request came damaged.
+    #[error("the unit is busy, or the request reached it damaged (exception {:02X}H){}", code.0, times(*attempts))]
+    Unheard {
+        /// By which exception it says so.
+        code: ExceptionCode,
+        /// How often it was asked.
+        attempts: u32,
+    },
     /// The line was never silent long enough to send. Nothing was sent.
     #[error("the line was never silent for {} ms: another master, or noise from a missing bias", timeout.as_millis())]
     Busy {
@@ -207,6 +247,10 @@ impl fmt::Display for Shown<'_> {
         }
         Ok(())
     }
+}
+
+fn and_shows(took: u16, shows: u16) -> String {
+    if took == shows { String::new() } else { format!(", and it shows {shows} ({shows:04X}H)") }
 }
 
 fn times(attempts: u32) -> String {

@@ -6,13 +6,16 @@ pub(crate) mod delays;
 pub(crate) mod echo;
 pub(crate) mod exchange;
 mod longer_reads;
+pub(crate) mod meanings;
 pub(crate) mod opener;
 pub(crate) mod resync;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Attribution, Destination, Instant, Master, Request, SerialFormat, Tally, UnitAddress};
+use drivebus_rtu::{
+    Answer, Attribution, Destination, Instant, Master, Meaning, Request, SerialFormat, Tally, UnitAddress,
+};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
@@ -26,6 +29,7 @@ use crate::owner::dead_units::DeadUnits;
 use crate::owner::delays::Delays;
 use crate::owner::exchange::exchange;
 use crate::owner::longer_reads::Longer;
+use crate::owner::meanings::UnitMeanings;
 use crate::owner::opener::LineOpener;
 use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
 use crate::trace::{Trace, Watched};
@@ -63,6 +67,8 @@ pub(crate) struct Owner {
     resync: Resync,
     /// Which reads can be asked in a longer form.
     pub(crate) longer: Longer,
+    /// What its units say by their exceptions.
+    pub(crate) meanings: Arc<UnitMeanings>,
     links: Arc<Mutex<Links>>,
     /// Units that were heard when they were asked last, by their number.
     heard: [bool; 256],
@@ -101,6 +107,7 @@ impl Owner {
             echo,
             resync: Resync::default(),
             longer: Longer::default(),
+            meanings: Arc::default(),
             links: Arc::default(),
             heard: [false; 256],
             delays: Delays::default(),
@@ -342,10 +349,11 @@ impl Owner {
             }
             match &result {
                 Ok(_) => self.resync.answered(unit, ask.request, false),
-                Err(error) if matches!(error.failure, Failure::Refused { .. }) => {
-                    self.resync.answered(unit, ask.request, true);
-                }
-                Err(_) => {}
+                Err(error) => match self.meanings.of(unit, &error.failure) {
+                    Some(Meaning::AskAgain) => self.resync.was_busy(unit, ask.request),
+                    Some(_) => self.resync.answered(unit, ask.request, true),
+                    None => {}
+                },
             }
         }
         let sent = match &result {

@@ -17,6 +17,7 @@ use crate::convert::{bytes_of, one_word, unit_address, words_of};
 use crate::ending::{Inside, detached};
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::profile::Profile;
 use crate::{overhear, trace};
 
 /// The table that is meant where nothing is said.
@@ -224,6 +225,12 @@ impl Bus {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         let gap = gap.map(|time| duration("gap", time)).transpose()?;
         self.core.configure(unit_address(unit)?, UnitOptions::new().timeout(timeout).gap(gap));
+        Ok(())
+    }
+
+    #[pyo3(signature = (unit, profile, /))]
+    fn set_meanings(&self, unit: &Bound<'_, PyAny>, profile: &Profile) -> PyResult<()> {
+        self.core.set_meanings(unit_address(unit)?, profile.meanings());
         Ok(())
     }
 

@@ -98,7 +98,8 @@ pub(crate) fn refused(
         details(keywords)?;
         keywords.set_item("code", code.0)?;
         keywords.set_item("name", name)?;
-        keywords.set_item("meaning", "")
+        keywords.set_item("meaning", "")?;
+        keywords.set_item("means", code.meaning().name())
     })
 }
 

@@ -49,7 +49,7 @@ mod _native {
     #[pymodule_export]
     use crate::poll::{Batch, Poller};
     #[pymodule_export]
-    use crate::profile::Profile;
+    use crate::profile::{Profile, exception_means};
     #[pymodule_export]
     use crate::requests::{Asked, Requests, open_bus};
     #[pymodule_export]

@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Input, Place, ProfileError, Setpoint, Store};
+use drivebus_drives::{self as drives, Command, Entry, Input, Means, Place, ProfileError, Setpoint, Store};
+use drivebus_rtu::{ExceptionCode, Meaning, Meanings};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
@@ -22,6 +23,17 @@ impl Profile {
     /// What it is in the core.
     pub(crate) fn core(&self) -> Arc<drives::Profile> {
         Arc::clone(&self.0)
+    }
+
+    /// What its exceptions mean: what the profile says, and of the others what the specification does.
+    pub(crate) fn meanings(&self) -> Meanings {
+        self.0.exceptions().fold(Meanings::STANDARD, |meanings, row| match row.means {
+            None => meanings,
+            Some(Means::NoSuch) => meanings.with(ExceptionCode(row.code), Meaning::NoSuch),
+            Some(Means::NotNow) => meanings.with(ExceptionCode(row.code), Meaning::NotNow),
+            Some(Means::AskAgain) => meanings.with(ExceptionCode(row.code), Meaning::AskAgain),
+            Some(Means::Taken) => meanings.with(ExceptionCode(row.code), Meaning::Taken),
+        })
     }
 }
 
@@ -420,6 +432,13 @@ impl Profile {
         let exception = self.0.exception(code).into_owned();
         Ok((exception.name, exception.meaning))
     }
+
+    #[pyo3(signature = (code, /))]
+    fn exception_means(&self, code: &Bound<'_, PyAny>) -> PyResult<&'static str> {
+        let code =
+            code.extract().map_err(|_| not_allowed(format!("code {} is not a number from 0 to 255", shown(code))))?;
+        Ok(self.meanings().of(ExceptionCode(code)).name())
+    }
 }
 
 impl Profile {
@@ -427,6 +446,13 @@ impl Profile {
     fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<Cow<'_, Entry>> {
         self.0.resolve(&text("name", name)?).map_err(refuse)
     }
+}
+
+/// What an exception means by the specification.
+#[pyfunction]
+#[pyo3(signature = (code, /))]
+pub(crate) fn exception_means(code: u8) -> &'static str {
+    ExceptionCode(code).meaning().name()
 }
 
 fn path(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {

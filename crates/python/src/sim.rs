@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use drivebus_drives::{Place, Table};
 use drivebus_line::{Line, PortError, PortErrorKind};
-use drivebus_sim::{self as sim, Model, Options, SimError, WriteRecord};
+use drivebus_sim::{self as sim, Asked, Model, Options, Refusals, SimError, WriteRecord};
 use pyo3::prelude::*;
 
 use crate::convert::{one_word, shown, unit_address};
@@ -259,6 +259,42 @@ impl SimulatedDrive {
     #[pyo3(signature = (code, /))]
     fn trip(&self, code: &Bound<'_, PyAny>) -> PyResult<()> {
         self.0.trip(one_word("fault", code)?).map_err(refuse)
+    }
+
+    #[pyo3(signature = (code, /, *, asked = "anything", share = 1.0, seconds = None, count = None, taken = false))]
+    fn refuse(
+        &self,
+        code: u8,
+        asked: &str,
+        share: f64,
+        seconds: Option<f64>,
+        count: Option<u64>,
+        taken: bool,
+    ) -> PyResult<()> {
+        let asked = match asked {
+            "anything" => Asked::Anything,
+            "reads" => Asked::Reads,
+            "writes" => Asked::Writes,
+            other => return Err(not_allowed(format!("asked {other:?} is not \"anything\", \"reads\" or \"writes\""))),
+        };
+        let mut refusals = Refusals::new(code).of(asked).share(share);
+        if let Some(seconds) = seconds {
+            refusals = refusals.time(duration(seconds)?);
+        }
+        if let Some(count) = count {
+            refusals = refusals.count(count);
+        }
+        self.0.refuse(if taken { refusals.taken() } else { refusals }).map_err(refuse)
+    }
+
+    fn refuse_no_more(&self) {
+        self.0.refuse_no_more();
+    }
+
+    #[pyo3(signature = (address, highest, /))]
+    fn limit(&self, address: &Bound<'_, PyAny>, highest: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.0.limit(one_word("address", address)?, one_word("highest", highest)?);
+        Ok(())
     }
 
     fn power_cycle(&self) {

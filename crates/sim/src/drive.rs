@@ -15,11 +15,12 @@ mod machine;
 mod map;
 mod places;
 mod refusal;
+mod refusing;
 mod settings;
 mod store;
 mod words;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,6 +32,8 @@ use family::{Kind, OnSilence, Scaled, Silence};
 use machine::{Command, Machine, RunState, Settings};
 pub(crate) use map::Map;
 use refusal::Refusal;
+use refusing::Refusing;
+pub use refusing::{Asked, Refusals};
 use settings::all_are;
 use store::Store;
 
@@ -76,6 +79,10 @@ pub(crate) struct Drive {
     frames: Frames,
     /// How many of the words before a run have come.
     led_up: usize,
+    /// What it was told to refuse.
+    refusing: Option<Refusing>,
+    /// The highest words that it was told to take, by address.
+    limits: BTreeMap<u16, u16>,
 }
 
 /// Frames counted since the power came, over and over from 65 535.
@@ -111,6 +118,8 @@ impl Drive {
             words_written: 0,
             frames: Frames::default(),
             led_up: 0,
+            refusing: None,
+            limits: BTreeMap::new(),
         }
     }
 
@@ -175,6 +184,21 @@ impl Drive {
         self.unlocked = false;
         self.settings_may_have_changed();
         true
+    }
+
+    /// Refuses what `refusals` say, from `now` on, and nothing that it was told to refuse before.
+    pub(crate) fn refuse(&mut self, now: Instant, refusals: Refusals, seed: u64) {
+        self.refusing = Some(Refusing::new(refusals, now, seed));
+    }
+
+    /// Refuses only what its family refuses.
+    pub(crate) fn refuse_no_more(&mut self) {
+        self.refusing = None;
+    }
+
+    /// Takes no more than `highest` at `address` by 06H, and says so in its answer.
+    pub(crate) fn limit(&mut self, address: u16, highest: u16) {
+        self.limits.insert(address, highest);
     }
 
     pub(crate) fn set_load(&mut self, load: f64) {

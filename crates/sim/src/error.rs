@@ -97,6 +97,15 @@ pub enum SimError {
         /// What was given.
         share: f64,
     },
+    /// No answer has this code.
+    #[error("0 is not an exception; exception codes are 1 to 255")]
+    NoException,
+    /// The share of requests to refuse is not one of 0.0..=1.0.
+    #[error("share {share} is not a number from 0.0 to 1.0 of the requests")]
+    Share {
+        /// What was given.
+        share: f64,
+    },
     /// The system has no port to give.
     #[error("cannot serve the simulated line: {0}")]
     Io(#[from] std::io::Error),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use drivebus_rtu::{ExceptionCode, UnitAddress};
 
-use crate::drive::{Drive, WriteRecord};
+use crate::drive::{Drive, Refusals, WriteRecord};
 use crate::error::SimError;
 use crate::simulator::Shared;
 
@@ -139,6 +139,32 @@ impl SimulatedDrive {
     /// Takes the cause of a held fault away. The fault stays until it is reset.
     pub fn release_fault(&self) {
         self.with(Drive::release_fault);
+    }
+
+    /// Lets the drive refuse requests as `refusals` say, from now on, instead of what it was told to refuse before.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::NoException`]: the code is 0. [`SimError::Share`]: the share is not in 0.0..=1.0.
+    pub fn refuse(&self, refusals: Refusals) -> Result<(), SimError> {
+        refusals.check()?;
+        let mut world = self.shared.present();
+        let (now, seed) = (world.now(), world.seed() ^ u64::from(self.unit.get()));
+        if let Some(drive) = world.drive(self.unit) {
+            drive.refuse(now, refusals, seed);
+        }
+        Ok(())
+    }
+
+    /// The drive refuses only what its family refuses.
+    pub fn refuse_no_more(&self) {
+        self.with(Drive::refuse_no_more);
+    }
+
+    /// Lets the drive take no more than `highest` where more is written to `address` by 06H: it takes that instead, and its answer
+    /// says so.
+    pub fn limit(&self, address: u16, highest: u16) {
+        self.with(|drive| drive.limit(address, highest));
     }
 
     /// Switches the drive off and on: RAM is lost, EEPROM stays, the motor coasts to a stop.

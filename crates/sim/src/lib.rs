@@ -111,7 +111,7 @@ mod wire;
 mod wire_handle;
 mod world;
 
-pub use drive::WriteRecord;
+pub use drive::{Asked, Refusals, WriteRecord};
 #[cfg(target_os = "linux")]
 pub use ear::EarServer;
 pub use error::SimError;

@@ -30,6 +30,8 @@ pub(crate) struct World {
     masters: Vec<Master>,
     next_listener: u64,
     plug: Plug,
+    /// Where chance comes from.
+    seed: u64,
 }
 
 /// One of those who listen.
@@ -63,7 +65,13 @@ impl World {
             masters: Vec::new(),
             next_listener: 0,
             plug: Plug { is_in: true, pulls: 0, back_at: None },
+            seed,
         }
+    }
+
+    /// Where chance comes from.
+    pub(crate) fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// How far time has come.

@@ -30,7 +30,7 @@ from drivebus.line.stats import Link
 from drivebus.operations.face import LivingDrives, documented_by
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
-from drivebus.profile import Profile
+from drivebus.profile import Profile, native_of
 
 __all__ = ["Bus"]
 
@@ -237,6 +237,7 @@ class Bus(BusFace):
         known, code = await profile_of(self, unit, profile, variants, unverified)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known)
+        self._core().set_meanings(unit, native_of(known))
         self._living.add(drive)
         return drive
 

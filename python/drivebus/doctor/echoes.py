@@ -67,7 +67,11 @@ class Echoes:
         try:
             self.turnarounds.append(max(bus.echo(self.unit) - on_the_wire, 0.0))
         except Refused as error:
-            self.refused = error
+            # By 06H a unit says that the request came damaged, or that it is busy, and not that it knows no echo.
+            if error.means == "ask_again":
+                self.damaged += 1
+            else:
+                self.refused = error
         except NoAnswer:
             self.silent += 1
         except CrcError:

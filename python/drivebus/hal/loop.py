@@ -90,7 +90,7 @@ class Loop:
         try:
             self._motor.carry_out(action)
         except DrivebusError as error:
-            final = isinstance(error, (NotAllowed, Refused))
+            final = isinstance(error, NotAllowed) or (isinstance(error, Refused) and error.is_decision)
             self._spindle.failed(action, str(error), final=final, sent=isinstance(error, Unconfirmed))
             self._trouble = self._spindle.trouble
             if final or not isinstance(action, Speed):

@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from typing import NamedTuple
 
-from drivebus.profile import Profile
+from drivebus import places
+from drivebus.errors import BadAnswer, Refused
+from drivebus.profile import Profile, standard_means
 
-__all__ = ["LOCKED", "NO_FUNCTION", "UNREACHED", "Answer", "no_such_address", "passes", "tells_nothing"]
+__all__ = [
+    "LOCKED",
+    "NO_FUNCTION",
+    "UNREACHED",
+    "Answer",
+    "Read",
+    "answer_at",
+    "no_such_address",
+    "passes",
+    "tells_nothing",
+]
+
+Read = Callable[..., Awaitable[list[int]]]
+"""Asks a unit for the word at an address; with the keyword `table`, of another one than the holding registers."""
 
 _ILLEGAL_ADDRESS = 0x02
 """In the Modbus specification, and under this name in the profiles that list their exceptions."""
@@ -20,12 +36,11 @@ LOCKED = 0x09
 UNREACHED = (0x0A, 0x0B)
 """Exceptions by which a gateway says that the unit behind it is silent or out of reach. Modbus V1.1b3, section 7."""
 
-_PASSING = (0x06, LOCKED, *UNREACHED)
-"""Exceptions that say nothing of a unit, for they pass: it is busy or got a damaged request, a password locks it, or a
-gateway does not reach it."""
+_ASK_AGAIN = "ask_again"
+"""What an exception means by which a unit says that it is busy, or got a damaged request."""
 
-_DAMAGED = "frame_error"
-"""What profiles call an exception by which a unit says that the request came damaged, whatever its code."""
+_AGAIN = 4
+"""How often a word is asked for once more where the refusal of it decides nothing. A unit says so at once."""
 
 
 class Answer(NamedTuple):
@@ -44,10 +59,46 @@ def no_such_address(profile: Profile, exception: int) -> bool:
 
 def passes(answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, whatever the unit is."""
-    return answer.exception in _PASSING
+    code = answer.exception
+    return code is not None and (code in (LOCKED, *UNREACHED) or standard_means(code) == _ASK_AGAIN)
 
 
 def tells_nothing(profile: Profile, answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, and so tells nothing of a unit of *profile*."""
     code = answer.exception
-    return code is not None and (passes(answer) or profile.exception(code)[0] == _DAMAGED)
+    return code is not None and (passes(answer) or profile.exception_means(code) == _ASK_AGAIN)
+
+
+async def answer_at(read: Read, unit: int, place: int) -> Answer:
+    """How *unit*, of which nothing is known, answers the question for the word at *place*.
+
+    A refusal by which it decides nothing is no answer: it is asked again. So is one by 01H for holding registers: each
+    family reads them, and one says by that code that the request came damaged.
+
+    Raises:
+        NoAnswer, BadAnswer, PortError: From *read*; `BadAnswer` also where it says each time that it is busy, or gets
+            requests damaged.
+    """
+    address, table = places.at(place)
+    again = 0
+    while True:
+        try:
+            [word] = await read(unit, address, **table)
+        except Refused as error:
+            decides = error.code in UNREACHED or error.means != _ASK_AGAIN
+            odd = error.code == NO_FUNCTION and not table
+            if again < _AGAIN and (odd or not decides):
+                again += 1
+                continue
+            if not decides:
+                raise BadAnswer(
+                    f"unit {unit} is busy, or gets requests damaged: it refused {places.shown(place)} with exception "
+                    f"{error.code:02X}H {again + 1} times",
+                    unit=unit,
+                    request=error.request,
+                    raw=error.raw,
+                    started=error.started,
+                    ended=error.ended,
+                ) from error
+            return Answer(place, None, error.code)
+        return Answer(place, word, None)

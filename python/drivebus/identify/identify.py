@@ -8,12 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivebus import places
-from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
-from drivebus.identify.answers import LOCKED, UNREACHED, no_such_address
+from drivebus.identify.answers import LOCKED, UNREACHED, Read, answer_at, no_such_address
 from drivebus.identify.families import all_of, one_of, shipped
 from drivebus.identify.results import Identification
-from drivebus.identify.signatures import Read
 from drivebus.profile import Profile
 
 __all__ = ["Read", "identify"]
@@ -31,15 +30,16 @@ async def identify(read: Read, unit: int) -> Identification:
     told: list[str] = []
     code: int | None = None
     for address in codes.registers():
-        try:
-            [code] = await read(unit, address)
-        except Refused as error:
-            if error.code in UNREACHED:
-                raise NoAnswer(f"no answer, says a gateway: {error}", unit=unit, raw=error.raw) from error
+        answer = await answer_at(read, unit, address)
+        code = answer.word
+        if answer.exception is not None:
+            if answer.exception in UNREACHED:
+                raise NoAnswer(f"no answer, says a gateway (exception {answer.exception:02X}H)", unit=unit)
             answered[address] = False
-            why = _PASSWORD if error.code == LOCKED else ""
-            told.append(f"it refuses {address:04X}H (exception {error.code:02X}H{why})")
+            why = _PASSWORD if answer.exception == LOCKED else ""
+            told.append(f"it refuses {address:04X}H (exception {answer.exception:02X}H{why})")
             continue
+        assert code is not None
         answered[address] = True
         rows = codes.listed_at(address, code)
         if rows:
@@ -91,18 +91,17 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
     if known is None or about is None or about.place is None or about.evidence == "assumed":
         return found
     try:
-        address, table = places.at(about.place)
-        [word] = await read(found.unit, address, **table)
-    except Refused as error:
-        if not no_such_address(known, error.code):
-            return found
-        against = "refuses"
+        answer = await answer_at(read, found.unit, about.place)
     except (NoAnswer, BadAnswer):
         return found
-    else:
-        if known.state(word) != "unknown":
+    if answer.word is None:
+        if answer.exception is None or not no_such_address(known, answer.exception):
             return found
-        against = f"says {word} at"
+        against = "refuses"
+    else:
+        if known.state(answer.word) != "unknown":
+            return found
+        against = f"says {answer.word} at"
     reason = (
         f"{found.reason}; but it {against} {places.shown(about.place)}, where such a drive has its state: "
         f"{place:04X}H may have another meaning"

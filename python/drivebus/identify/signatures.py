@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Awaitable, Callable
 
-from drivebus import places
-from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.errors import BadAnswer, NoAnswer
+from drivebus.identify.answers import Read, answer_at, passes
 from drivebus.profile import Profile, profiles
 
 __all__ = ["Read", "Signature", "listed", "shown_by", "signature_of"]
-
-Read = Callable[..., Awaitable[list[int]]]
-"""Asks a unit for the word at an address; with the keyword `table`, of another one than the holding registers."""
 
 Signature = dict[str, list[int]]
 """The addresses that a unit `answers`, and those that it `refuses`: see `Profile.signature`."""
@@ -41,15 +37,14 @@ async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[st
         wanted += [(place, False) for place in signature["refuses"]]
         for place, yes in wanted:
             if place not in answered:
-                address, table = places.at(place)
                 try:
-                    await read(unit, address, **table)
-                    answered[place] = True
-                except Refused:
-                    answered[place] = False
+                    answer = await answer_at(read, unit, place)
                 except (NoAnswer, BadAnswer):
                     # Neither, then: no signature has it.
                     break
+                if passes(answer):
+                    break
+                answered[place] = answer.word is not None
             if answered[place] is not yes:
                 break
         else:

@@ -66,10 +66,10 @@ async def _store(unit: Unit, run: Sequence[Planned], is_told: bool) -> None:
 
 async def _send(unit: Unit, run: Sequence[Planned], read_back: int | None) -> None:
     if len(run) == 1:
-        await words.write(unit, run[0].address, run[0].raw, read_back=read_back)
+        await words.write(unit, run[0].address, run[0].raw, read_back=read_back, absolute=True)
         return
     try:
-        await words.write(unit, run[0].address, [item.raw for item in run], read_back=read_back)
+        await words.write(unit, run[0].address, [item.raw for item in run], read_back=read_back, absolute=True)
     except Refused as error:
         # Whether a drive takes none of the words then, or those before the wrong one, is not printed.
         if hasattr(error, "add_note"):

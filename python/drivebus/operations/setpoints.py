@@ -158,7 +158,8 @@ def _frequency_in_hz(unit: Unit) -> str:
 async def write_word(unit: Unit, word: int) -> None:
     """Writes the frequency, as the drive counts it."""
     register = register_of(unit, "frequency")
-    await words.write(unit, unit.profile.address(register), word, read_back=unit.profile.read_back(register))
+    read_back = unit.profile.read_back(register)
+    await words.write(unit, unit.profile.address(register), word, read_back=read_back, absolute=True)
 
 
 async def word_of(unit: Unit, hz: float) -> int:

@@ -22,6 +22,9 @@ _LOCKED = ("password_error", "password_protected")
 _TABLES = {0x01: "coil", 0x02: "discrete", 0x04: "input", 0x05: "coil"}
 """The functions that are not for holding registers, and whose table they are for."""
 
+_AGAIN = 4
+"""How often an absolute value is sent once more to a drive that could not take it, as it says."""
+
 _UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
 """What an exception is called that no profile names, and one that the specification does not name either."""
 
@@ -50,7 +53,7 @@ async def write_words(unit: Unit, address: int, value: int | Sequence[int], forc
         NotAllowed: Out of range, or such a command; or another drive answers at this address since the port was
             opened again. Nothing was sent.
         NoAnswer, BadAnswer, PortError: The drive may have taken it, unless the error's `started` is None.
-        Refused: The drive did not take it.
+        Refused: The drive did not take it. An exception by which it says that it took it and is at it is none.
     """
     address, words = checks.address(address), checks.payload(value)
     if not checks.flag("force", force):
@@ -68,17 +71,30 @@ async def write(
     read_back: int | None = None,
     force: bool = False,
     judged: bool = True,
+    absolute: bool = False,
 ) -> None:
-    """Writes to the unit, if it still is the one it was and, where that is *judged*, does not say it is another."""
+    """Writes to the unit, if it still is the one it was and, where that is *judged*, does not say it is another.
+
+    An *absolute* value is no command: where the drive says that it is busy or got the request damaged, so that it did
+    not take it, it is sent again. With *read_back* the bus does that, and looks first.
+    """
+    again = 0 if absolute and read_back is None else _AGAIN
     connection = await unit.memory.identity.check(unit.bus, judged=judged)
-    try:
-        await send(unit, address, value, read_back=read_back, connection=connection, force=force)
-    except PortError as error:
-        if error.started is not None or unit.bus.reconnects == connection:
-            raise
-        # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
-        connection = await unit.memory.identity.check(unit.bus, judged=judged)
-        await send(unit, address, value, read_back=read_back, connection=connection, force=force)
+    while True:
+        try:
+            await send(unit, address, value, read_back=read_back, connection=connection, force=force)
+        except PortError as error:
+            if error.started is not None or unit.bus.reconnects == connection:
+                raise
+            # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
+            connection = await unit.memory.identity.check(unit.bus, judged=judged)
+            await send(unit, address, value, read_back=read_back, connection=connection, force=force)
+        except Refused as error:
+            if again >= _AGAIN or error.means != "ask_again":
+                raise
+            again += 1
+            continue
+        return
 
 
 async def send(
@@ -103,10 +119,15 @@ async def send(
     first, table = places.at(address)
     if read_back is not None:
         read_back, _ = places.at(read_back)
-    with explained(unit):
-        await unit.bus.write(
-            unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **forced, **table
-        )
+    try:
+        with explained(unit):
+            await unit.bus.write(
+                unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **forced, **table
+            )
+    except Refused as error:
+        # Where the words can be read, the bus has looked whether they are there.
+        if error.means != "taken":
+            raise
 
 
 @contextmanager
@@ -125,6 +146,7 @@ def explained(unit: Unit) -> Iterator[None]:
             code=error.code,
             name=name,
             meaning=meaning,
+            means=unit.profile.exception_means(error.code),
             unit=error.unit,
             request=error.request,
             raw=error.raw,

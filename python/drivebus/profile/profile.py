@@ -15,7 +15,7 @@ from drivebus.errors import NotAllowed
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
-__all__ = ["Profile", "native_of", "profiles"]
+__all__ = ["Profile", "native_of", "profiles", "standard_means"]
 
 _PLANS_KEPT = 256
 """Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
@@ -382,6 +382,10 @@ class Profile:
         """Name and meaning of an exception code in this family."""
         return self._native.exception(code)
 
+    def exception_means(self, code: int, /) -> str:
+        """Whether an exception is a decision: see `Refused.means`. Where the profile says nothing, as in Modbus."""
+        return self._native.exception_means(code)
+
     def identifies(self, code: int) -> str | None:
         """The family that identification *code* names, as far as this profile knows; None if it does not."""
         return self._native.identify(code)
@@ -454,6 +458,11 @@ def profiles() -> list[str]:
 def native_of(profile: Profile) -> _native.Profile:
     """What *profile* is in the core."""
     return profile._native
+
+
+def standard_means(code: int) -> str:
+    """Whether an exception is a decision by the Modbus specification: see `Refused.means`."""
+    return _native.exception_means(code)
 
 
 @functools.cache

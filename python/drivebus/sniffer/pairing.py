@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TypedDict
 
-from drivebus._native import SerialFormat, Sniffer, crc16, decode_answer
+from drivebus._native import SerialFormat, Sniffer, crc16, decode_answer, exception_means
 from drivebus.capture import Captured
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
@@ -131,9 +131,10 @@ class Pairing:
         unit, code = answer[0], answer[2]
         profile: Profile | None = self._families.of(unit)
         name, meaning = ("", "") if profile is None else profile.exception(code)
+        means = exception_means(code) if profile is None else profile.exception_means(code)
         known = f" ({name}: {meaning})" if name else ""
         text = f"unit {unit} refused function {request[1]:02X}H with exception {code:02X}H{known}"
-        return Refused(text, code=code, name=name, meaning=meaning, unit=unit, request=request, raw=answer)
+        return Refused(text, code=code, name=name, meaning=meaning, means=means, unit=unit, request=request, raw=answer)
 
     def _beside(self, piece: _Piece) -> Exchange:
         """What belongs to no request that is open."""

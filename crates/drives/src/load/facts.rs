@@ -11,7 +11,7 @@ use super::{File, ProfileError};
 use crate::bits::BitField;
 use crate::decimal::{Counts, Decimal};
 use crate::parts::command::Control;
-use crate::parts::fault::Exception;
+use crate::parts::fault::{Exception, Means};
 use crate::parts::identification::{Identification, Signature};
 use crate::parts::memory::Memory;
 use crate::parts::serial::SerialDefaults;
@@ -21,6 +21,9 @@ use crate::place::Place;
 use crate::quantity::{Quantity, limits};
 use crate::scale::Scale;
 use crate::text::parse_address;
+
+/// By the specification the code by which a unit says that it took a request. Families that list it mean something else.
+const ACKNOWLEDGE: u8 = 0x05;
 
 /// Checks that `low` ≤ `item` ≤ `high`.
 pub(super) fn within<T>(file: &File, item: &Placed<T>, low: T, high: T, what: &str) -> Result<T, ProfileError>
@@ -206,6 +209,7 @@ pub(super) fn exceptions(
             code: row.code,
             name: row.name.clone(),
             meaning: row.meaning.clone(),
+            means: row.means.or((row.code == ACKNOWLEDGE).then_some(Means::NotNow)),
             source: row.source.clone(),
         };
         known.insert(row.code, exception);

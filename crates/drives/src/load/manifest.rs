@@ -14,6 +14,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::placed::Placed;
 use super::{File, ProfileError, line_of, shape};
+use crate::parts::fault::Means;
 use crate::parts::memory::MemoryBit;
 use crate::parts::rules::UnitKind;
 use crate::parts::setpoint::Setpoint;
@@ -298,6 +299,9 @@ pub(super) struct Exception {
     pub(super) name: String,
     /// What it means.
     pub(super) meaning: String,
+    /// Whether it is a decision. Without it as the specification has the code, but 05H as `not_now`: drives that list it
+    /// hardly ever acknowledge by it.
+    pub(super) means: Option<Means>,
     /// Where it is printed: document and page.
     pub(super) source: String,
 }

@@ -45,6 +45,21 @@ impl Fault {
     }
 }
 
+/// What a drive says by an exception: whether it is a decision, and whether the request was carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Means {
+    /// There is no such function, address, count or value: a decision, and the next answer will be the same.
+    NoSuch,
+    /// It is not allowed or not possible now: a decision that another state of the drive may change.
+    NotNow,
+    /// The drive is busy, or the request reached it damaged: it was not carried out, and may be the next time.
+    AskAgain,
+    /// The drive took the request and is still at it.
+    Taken,
+}
+
 /// A reason for which a drive refuses a request: the code of a Modbus exception, in this family's meaning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -55,6 +70,8 @@ pub struct Exception {
     pub name: String,
     /// What it means, as a clause.
     pub meaning: String,
+    /// Whether it is a decision; `None`: as the specification has the code.
+    pub means: Option<Means>,
     /// Where it is printed; may be empty.
     pub source: String,
 }
@@ -66,6 +83,7 @@ impl Exception {
             code,
             name: "unknown".to_owned(),
             meaning: format!("exception code {code:02X}H is not documented for this drive"),
+            means: None,
             source: String::new(),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! | kind | after silence or a damaged answer |
 //! | --- | --- |
-//! | a read | asked again, as often as the bus is set to; a damaged answer, which took no time-out, counts half |
+//! | a read | asked again, as often as the bus is set to; a damaged answer, which took no time-out, counts half, and so does a refusal by which the unit decides nothing (06H: busy) |
 //! | a write whose words can be read back | read back; written again only where the unit shows other words |
 //! | any other write, an echo, a custom request | never: the caller is told |
 //!
@@ -11,14 +11,15 @@
 
 mod attempt;
 mod course;
+mod value;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Request, Table, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Meaning, Request, UnitAddress};
 
 use crate::ask::{Ask, Done};
-use crate::bus::call::course::{Course, is_unanswered};
+use crate::bus::call::course::Course;
 use crate::bus::errand::Errand;
 use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
@@ -253,7 +254,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 Err(error) => error,
             };
             let is_port = matches!(error.failure, Failure::Port(_));
-            if !course.goes_on(&error, asked) || !self.is_wanted() {
+            if !course.goes_on(&error, asked, self.is_to_ask_again(&error)) || !self.is_wanted() {
                 // How the port was lost tells more than that it is still not there. But where the request went out only
                 // the second time, that has to be said.
                 let lost = lost.filter(|_| is_port && error.sent.is_none());
@@ -266,71 +267,14 @@ impl<'b, 'r> Call<'b, 'r> {
         }
     }
 
-    /// Writes words that can be read back at `address`.
-    ///
-    /// Where the confirmation is missing the unit is asked what it has. What it does not show by then it has not taken:
-    /// no request from before is open any more when it answers. All of it happens over the connection that the write went
-    /// out over: behind another one, another unit may answer.
-    fn write_value(
-        &self,
-        turn: &mut Turn<'b, Errand>,
-        course: &mut Course,
-        address: u16,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        let (table, written) = match *self.ask.request {
-            Request::WriteSingle { value, .. } => (Table::Holding, vec![value]),
-            Request::WriteMultiple { words, .. } => (Table::Holding, words.iter().collect()),
-            Request::WriteCoil { on, .. } => (Table::Coil, vec![u16::from(on)]),
-            _ => return self.once(turn, course, give_up, take),
-        };
-        let count = u16::try_from(written.len()).unwrap_or(u16::MAX);
-        let Ok(read) = Request::read_of(table, address, count) else {
-            return self.once(turn, course, give_up, take);
-        };
-        let mut writing = Call { ..*self };
-        let (mut times, mut before) = (0, None);
-        loop {
-            let outcome = writing.once(turn, course, give_up, take);
-            let is_unproven = course.take_unproven();
-            let mut error = match outcome {
-                Ok(done) if !is_unproven => return Ok(done),
-                Ok(done) => {
-                    let failure = Failure::NoAnswer { timeout: self.ask.timeout, attempts: 1 };
-                    self.ask.failed(failure, Some(done.sent), done.ended, &[])
-                }
-                Err(error) => error,
-            };
-            let Some(sent) = error.sent.filter(|_| is_unanswered(&error.failure)) else {
-                // It may not have gone out this time, but it has before.
-                error.sent = error.sent.or(before);
-                return Err(error);
-            };
-            before = Some(sent);
-            times += 1;
-            writing.connection = Some(self.bus.lock().stats().reconnects);
-            // What is read back decides: it is never asked in doubt, not even for a write that was.
-            let ask = Ask { request: &read, in_doubt: false, ..self.ask };
-            let reading = Call { ask, read_back: None, ..writing };
-            let mut shows = Vec::new();
-            course.go_on_with(self.ask.timeout, self.retries);
-            let outcome = reading.repeat(turn, course, give_up, &mut |answer| {
-                if let Answer::Read { words, .. } = answer {
-                    shows = words.iter().collect();
-                }
-            });
-            match outcome {
-                Ok(done) if shows == written => return Ok(Done { sent, ended: done.ended }),
-                Ok(done) if times > self.retries => {
-                    return Err(self.ask.failed(Failure::NotTaken { times, shows }, Some(sent), done.ended, &[]));
-                }
-                Ok(_) => {}
-                // It is still not known whether the write was taken.
-                Err(silent) if is_unproven => return Err(Box::new(CallError { sent: Some(sent), ..*silent })),
-                Err(_) => return Err(error),
-            }
-        }
+    /// Whether the unit could not take the request, as it says itself by `error`, and may the next time.
+    fn is_to_ask_again(&self, error: &CallError) -> bool {
+        self.unit.is_some_and(|unit| self.bus.meanings.asks_again(unit, &error.failure))
+    }
+
+    /// What the unit says by `error`, if that is a refusal.
+    fn means(&self, error: &CallError) -> Option<Meaning> {
+        self.unit.and_then(|unit| self.bus.meanings.of(unit, &error.failure))
     }
 }
 

@@ -19,6 +19,7 @@ use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
 use crate::owner::Owner;
+use crate::owner::meanings::UnitMeanings;
 use crate::owner::resync::FreshWords;
 use crate::ports::key::PortKey;
 use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
@@ -36,6 +37,8 @@ pub(crate) struct Shared {
     /// What can be asked for while somebody waits on the line.
     pub(super) stats: Arc<Mutex<Stats>>,
     pub(super) links: Arc<Mutex<Links>>,
+    /// What its units say by their exceptions.
+    pub(crate) meanings: Arc<UnitMeanings>,
     pub(super) words: Arc<FreshWords>,
     notes: Mutex<Vec<String>>,
     /// What the system refused to the threads of the bus's own.
@@ -77,6 +80,7 @@ impl Shared {
             queue: Arc::new(Queue::with_room(options.queue)),
             stats,
             links: owner.shared_links(),
+            meanings: Arc::clone(&owner.meanings),
             words,
             notes: Mutex::new(notes),
             priority_refused: OnceLock::new(),

@@ -1,6 +1,6 @@
 //! Errors by whose fault they are: the names that every language has for them, and whether the unit may have acted.
 
-use drivebus_rtu::FrameError;
+use drivebus_rtu::{FrameError, Meaning};
 
 use crate::error::{CallError, Failure};
 
@@ -16,7 +16,8 @@ pub enum ErrorKind {
     BadAnswer,
     /// The bytes that came do not match their own CRC: a [`BadAnswer`](Self::BadAnswer) too.
     Crc,
-    /// The unit said no. What it was doing before, it still does.
+    /// The unit answered by an exception. What it was doing before, it still does, unless that is an acknowledgement
+    /// ([`Meaning::Taken`]).
     Refused,
     /// What was asked was sent, and its effect is not known.
     Unconfirmed,
@@ -35,7 +36,7 @@ impl Failure {
             Self::Port(_) | Self::Reopened | Self::Forked | Self::Closed => ErrorKind::Port,
             Self::NotBegun(_) | Self::ReadOnly { .. } | Self::QueueFull { .. } => ErrorKind::NotAllowed,
             Self::Doubtful | Self::NotAsked { .. } | Self::Unreached => ErrorKind::NoAnswer,
-            Self::NotTaken { .. } => ErrorKind::Unconfirmed,
+            Self::NotTaken { .. } | Self::Limited { .. } | Self::Acknowledged { .. } => ErrorKind::Unconfirmed,
             Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,
             Self::Corrupt(FrameError::Crc { .. }) => ErrorKind::Crc,
             Self::Refused { .. } => ErrorKind::Refused,
@@ -52,8 +53,14 @@ impl CallError {
         self.failure.kind_of(!self.raw.is_empty())
     }
 
-    /// Whether the unit may have done what was asked: the request went out, and the unit did not refuse it.
+    /// Whether the unit may have done what was asked: the request went out, and the unit did not refuse it. One that
+    /// acknowledges by an exception (05H by the specification) may have.
     pub fn may_have_acted(&self) -> bool {
-        self.sent.is_some() && !matches!(self.failure, Failure::Refused { .. })
+        let refused = match self.failure {
+            Failure::Refused { code, .. } => code.meaning() != Meaning::Taken,
+            Failure::Unheard { .. } => true,
+            _ => false,
+        };
+        self.sent.is_some() && !refused
     }
 }

@@ -18,6 +18,9 @@ const SILENT_BEFORE_READ: u32 = 1;
 /// After how many it is taken for one that knows no echo, and is not echoed first any more.
 const SILENT_FOR_GOOD: u32 = 5;
 
+/// How many echoes in a row a unit must refuse as busy, or damaged, until it is taken for one that knows none.
+const BUSY_FOR_GOOD: u32 = 3;
+
 /// How many reads of another length one doubt is worth. Each that stays open is one more answer to wait for, and only time
 /// helps with a unit that answers none of them.
 const OTHER_READS: u32 = 2;
@@ -109,6 +112,8 @@ struct Known {
     echo: Option<Echo>,
     /// Echoes in a row that it was silent on.
     silent_echoes: u32,
+    /// Echoes in a row that it could not take, as it said.
+    busy_echoes: u32,
     /// A holding register that it answered a read of.
     readable: Option<u16>,
     /// The latest probe was an echo.
@@ -127,6 +132,18 @@ impl Known {
 }
 
 impl Resync {
+    /// `unit` could not take `request`, as it said: it is busy, or got it damaged. That tells nothing of what it knows.
+    pub(crate) fn was_busy(&mut self, unit: UnitAddress, request: &Request<'_>) {
+        let known = self.0.of(unit);
+        known.alive = true;
+        if matches!(request, Request::Echo { .. }) {
+            known.busy_echoes += 1;
+            if known.busy_echoes >= BUSY_FOR_GOOD {
+                known.echo = Some(Echo::Refused);
+            }
+        }
+    }
+
     /// `unit` answered `request`, or refused it.
     pub(crate) fn answered(&mut self, unit: UnitAddress, request: &Request<'_>, refused: bool) {
         let known = self.0.of(unit);
@@ -135,6 +152,7 @@ impl Resync {
             Request::Echo { .. } => {
                 known.echo = Some(if refused { Echo::Refused } else { Echo::Returned });
                 known.silent_echoes = 0;
+                known.busy_echoes = 0;
             }
             Request::Read { table: Table::Holding, address, .. } if !refused => known.readable = Some(*address),
             _ => {}

@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Instant, Request};
+use drivebus_rtu::{Answer, Instant, Request, UnitAddress};
 
+use crate::ask::Done;
 use crate::bus::Bus;
-use crate::error::Failure;
+use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::poll::ring::PollSample;
 use crate::poll::samples::Samples;
@@ -109,14 +110,7 @@ impl Runner {
             let Ok(request) = Request::read_of(table, address, count) else {
                 continue; // checked when the poll began
             };
-            // What does not come is asked for in the next cycle; repeating it now would keep the others waiting.
-            let options = CallOptions { priority: Some(Priority::Poll), retries: Some(0), ..CallOptions::default() };
-            let words = &mut self.words;
-            let result = self.bus.call((*unit).into(), &request, options, give_up, &mut |answer| {
-                if let Answer::Read { words: came, .. } = answer {
-                    words.extend(came.iter());
-                }
-            });
+            let result = self.bus.ask_polled(*unit, &request, &mut self.words, give_up);
             let (sent, ended) = match &result {
                 Ok(done) => (done.sent, done.ended),
                 Err(error) => {
@@ -142,6 +136,41 @@ impl Runner {
         self.schedule.asked(self.bus.now(), heard);
         samples.put(sample, &self.words, &self.schedule);
         Progress::Asked
+    }
+}
+
+impl Bus {
+    /// Asks `unit` for `words`. What does not come is asked for in the next cycle: repeating it now would keep the others
+    /// waiting. A refusal by which the unit decides nothing comes at once, so that one is: within the bus's retries, and as
+    /// a call of its own each time, which whatever is more urgent goes before.
+    fn ask_polled(
+        &self,
+        unit: UnitAddress,
+        request: &Request<'_>,
+        words: &mut Vec<u16>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Done, Box<CallError>> {
+        let options = CallOptions { priority: Some(Priority::Poll), retries: Some(0), ..CallOptions::default() };
+        let most = self.options().retries.saturating_mul(2).saturating_add(1);
+        let mut attempts = 1;
+        loop {
+            let result = self.call(unit.into(), request, options, give_up, &mut |answer| {
+                if let Answer::Read { words: came, .. } = answer {
+                    words.extend(came.iter());
+                }
+            });
+            let mut error = match result {
+                Err(error) if self.asks_again(unit, &error.failure) => error,
+                result => return result,
+            };
+            if attempts >= most {
+                if let Failure::Refused { code, .. } = error.failure {
+                    error.failure = Failure::Unheard { code, attempts };
+                }
+                return Err(error);
+            }
+            attempts += 1;
+        }
     }
 }
 

@@ -103,6 +103,9 @@ impl From<&Failure> for Said {
             Failure::NotAsked { left } => Self::NotAsked { left: nanos(*left) },
             Failure::Disagreeing { asked } => Self::Disagreeing { asked: *asked },
             Failure::NotTaken { times, shows } => Self::NotTaken { times: *times, shows: shows.clone() },
+            // They have no forms of their own here yet: sent once, and this is what the unit shows.
+            Failure::Limited { shows, .. } => Self::NotTaken { times: 1, shows: vec![*shows] },
+            Failure::Acknowledged { shows, .. } => Self::NotTaken { times: 1, shows: shows.clone() },
             Failure::Busy { timeout } => Self::Busy { timeout: nanos(*timeout) },
             Failure::Corrupt(FrameError::TooShort { len }) => Self::TooShort { len: whole(*len) },
             Failure::Corrupt(FrameError::TooLong { len }) => Self::TooLong { len: whole(*len) },
@@ -110,7 +113,7 @@ impl From<&Failure> for Said {
                 Self::Crc { computed: *computed, received: *received }
             }
             Failure::Refused { function, code } => Self::Refused { function: *function, code: code.0 },
-            Failure::Wrong(_) | Failure::Corrupt(_) | Failure::Elsewhere { .. } => {
+            Failure::Wrong(_) | Failure::Corrupt(_) | Failure::Unheard { .. } | Failure::Elsewhere { .. } => {
                 Self::BadAnswer { message: failure.to_string() }
             }
         }

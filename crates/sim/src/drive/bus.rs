@@ -29,7 +29,11 @@ enum Target {
 impl Drive {
     /// As [`handle`](Self::handle), for a request that is for this unit alone: its answer goes on the line.
     pub(crate) fn answer(&mut self, now: Instant, pdu: &[u8]) -> Option<Adu> {
-        let answer = self.handle(now, pdu)?;
+        let told = self.refusing.as_mut().zip(pdu.first()).and_then(|(told, &function)| told.of(now, function));
+        let answer = match told {
+            None => self.handle(now, pdu)?,
+            Some((code, taken)) => self.refuse_as_told(now, pdu, code, taken)?,
+        };
         self.frames.sent = self.frames.sent.wrapping_add(1);
         Some(answer)
     }
@@ -38,10 +42,7 @@ impl Drive {
     ///
     /// `None`: the PDU is empty or an exception, so that it is somebody's answer and no request.
     pub(crate) fn handle(&mut self, now: Instant, pdu: &[u8]) -> Option<Adu> {
-        self.advance(now);
-        let function = *pdu.first().filter(|&&code| code & function::EXCEPTION_BIT == 0)?;
-        self.last_heard = Some(now);
-        self.frames.received = self.frames.received.wrapping_add(1);
+        let function = self.hear(now, pdu)?;
         let mut words = [0; MOST_WORDS];
         let answer = match Request::parse(pdu) {
             _ if !self.family().functions.contains(&function) => Err(Refusal::Function),
@@ -53,6 +54,29 @@ impl Drive {
         };
         let answer = answer.unwrap_or_else(|refusal| Answer::exception(function, self.exception(refusal)));
         Some(Adu::answer(self.unit, &answer))
+    }
+
+    /// A request has come: its function. `None`: it is none.
+    fn hear(&mut self, now: Instant, pdu: &[u8]) -> Option<u8> {
+        self.advance(now);
+        let function = *pdu.first().filter(|&&code| code & function::EXCEPTION_BIT == 0)?;
+        self.last_heard = Some(now);
+        self.frames.received = self.frames.received.wrapping_add(1);
+        Some(function)
+    }
+
+    /// Refuses by `code` what it was told to refuse; if it is `taken`, only behind having done it.
+    fn refuse_as_told(&mut self, now: Instant, pdu: &[u8], code: ExceptionCode, taken: bool) -> Option<Adu> {
+        let function = if taken {
+            let answer = self.handle(now, pdu)?;
+            match answer.as_bytes().get(1) {
+                Some(&function) if function & function::EXCEPTION_BIT == 0 => function,
+                _ => return Some(answer),
+            }
+        } else {
+            self.hear(now, pdu)?
+        };
+        Some(Adu::answer(self.unit, &Answer::exception(function, code)))
     }
 
     /// The word at `address` as the bus would read it at this moment, or the exception code.
@@ -90,7 +114,11 @@ impl Drive {
                 }
                 return Answer::read_of(table, words).map_err(|_| Refusal::Structure);
             }
-            Request::WriteSingle { address, value, .. } => self.write(now, address.into(), Words::new(&[value]))?,
+            Request::WriteSingle { address, value, .. } => {
+                let taken = self.limits.get(&address).map_or(value, |&highest| highest.min(value));
+                self.write(now, address.into(), Words::new(&[taken]))?;
+                return Answer::confirming(&Request::write(address, taken)).ok_or(Refusal::Function);
+            }
             Request::WriteCoil { address, on, .. } => {
                 self.write(now, spot(Table::Coil, address), Words::new(&[on.into()]))?;
             }

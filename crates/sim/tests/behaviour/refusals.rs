@@ -1,6 +1,10 @@
 //! Every refusal, and the manual's worked examples.
 
+use std::time::Duration;
+
+use drivebus_line::Line;
 use drivebus_rtu::ExceptionCode;
+use drivebus_sim::{Asked, Options, Refusals, SimError};
 
 use crate::bench::{Bench, hex, pdu, write_many_pdu};
 
@@ -164,4 +168,58 @@ fn a_password_locks_everything_until_it_is_given() {
     bench.write(0x0700, 0);
     bench.drive().power_cycle();
     assert_eq!(bench.read::<1>(0x2100), [3], "without a password nothing locks");
+}
+
+#[test]
+fn a_drive_refuses_what_it_was_told_to_for_as_long_as_was_said() {
+    let mut bench = Bench::new();
+    let (read, write) = (pdu(0x03, &[0x2100, 1]), pdu(0x06, &[0x000B, 50]));
+
+    bench.drive().refuse(Refusals::new(0x06).of(Asked::Writes).time(Duration::from_secs(2))).unwrap();
+    let from = bench.line.now();
+    assert_eq!(bench.ask(1, &write), Some(vec![0x86, 0x06]));
+    assert_eq!(bench.ask(1, &read), Some(vec![0x03, 2, 0, 3]));
+    assert_eq!(bench.ask(3, &write), Some(write.clone()), "another drive was told nothing");
+    assert_eq!(bench.drive().writes(), []);
+    bench.go_to(from, 1.9);
+    assert_eq!(bench.ask(1, &write), Some(vec![0x86, 0x06]));
+    bench.go_to(from, 2.0);
+    assert_eq!(bench.ask(1, &write), Some(write.clone()));
+
+    bench.drive().refuse(Refusals::new(0x0A).of(Asked::Reads).count(2)).unwrap();
+    let told: Vec<_> = (0..3).map(|_| bench.ask(1, &read).unwrap()[0]).collect();
+    assert_eq!(told, [0x83, 0x83, 0x03]);
+
+    bench.drive().refuse(Refusals::new(0x06)).unwrap();
+    bench.drive().refuse_no_more();
+    assert_eq!(bench.ask(1, &read), Some(vec![0x03, 2, 0, 3]));
+}
+
+#[test]
+fn an_acknowledgement_is_a_refusal_of_what_was_done() {
+    let mut bench = Bench::new();
+    bench.drive().refuse(Refusals::new(0x05).taken()).unwrap();
+    assert_eq!(bench.ask(1, &pdu(0x06, &[0x000B, 50])), Some(vec![0x86, 0x05]));
+    assert_eq!(bench.drive().register(0x000B), Ok(50));
+    // Out of range: what the family refuses is refused as the family does, and not acknowledged.
+    assert_eq!(bench.ask(1, &pdu(0x06, &[0x000B, 36_001])), Some(vec![0x86, 0x04]));
+}
+
+#[test]
+fn a_share_of_the_requests_is_refused_by_chance_from_the_seed() {
+    let refused = |seed| {
+        let mut bench = Bench::with(Options::default().seed(seed));
+        bench.drive().refuse(Refusals::new(0x06).share(0.05)).unwrap();
+        let answers = (0..1_000).map(|_| bench.ask(1, &pdu(0x03, &[0x2100, 1])).unwrap() == [0x83, 0x06]);
+        answers.collect::<Vec<bool>>()
+    };
+    // Five standard deviations of 6.9 around 50.
+    let count = refused(1).into_iter().filter(|&refused| refused).count();
+    assert!((16..=84).contains(&count), "{count}");
+    assert_eq!(refused(1), refused(1));
+    assert_ne!(refused(1), refused(2));
+
+    let drive = Bench::new().drive();
+    assert!(matches!(drive.refuse(Refusals::new(0)), Err(SimError::NoException)));
+    assert!(matches!(drive.refuse(Refusals::new(6).share(1.5)), Err(SimError::Share { .. })));
 }

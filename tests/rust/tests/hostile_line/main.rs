@@ -9,6 +9,7 @@ mod hints;
 mod masters_table;
 mod odd;
 mod probes;
+mod refused;
 mod repeated;
 mod scripted;
 mod silent;

@@ -54,7 +54,7 @@ impl<'b> Call<'b, '_> {
                 Question::Same(Form::Apart(count)) | Question::Apart(count) => {
                     let again = matches!(question, Question::Same(_));
                     match self.ask_apart(course, &mut owner, count, again, give_up, take) {
-                        Err(error) if is_refusal(&error.failure) => {
+                        Err(error) if is_refusal(&error.failure) && !self.is_to_ask_again(&error) => {
                             // It may be meant for something else that was asked, or for the words that nobody asked for.
                             apart = false;
                             course.asks_otherwise();
@@ -183,6 +183,7 @@ impl<'b> Call<'b, '_> {
         if count > asked {
             match &result {
                 Ok(_) => owner.longer.given(unit, (table, address)),
+                Err(error) if owner.meanings.asks_again(unit, &error.failure) => {}
                 Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, (table, address), count),
                 Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, (table, address), count),
                 Err(_) => {}
@@ -251,6 +252,9 @@ impl<'b> Call<'b, '_> {
                     course.leaves_open(&self.ask, Form::Repeated, &result, |unit| owner.asked(unit));
                     return result.map(|_: Done| None);
                 };
+                if owner.meanings.asks_again(unit, &error.failure) {
+                    return Err(error);
+                }
                 if agreement.hear(unit, &Answer::exception(function, code)) {
                     return Err(error);
                 }

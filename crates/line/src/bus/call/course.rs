@@ -170,17 +170,18 @@ impl Course {
     }
 
     /// Whether there is another attempt after one that ended with `error`, before which it had been `asked` so often.
-    pub(crate) fn goes_on(&mut self, error: &CallError, asked: u32) -> bool {
+    /// `to_ask_again`: it is a refusal by which the unit decided nothing.
+    pub(crate) fn goes_on(&mut self, error: &CallError, asked: u32, to_ask_again: bool) -> bool {
         self.attempts += 1;
         let cost = match self.asked > asked {
-            true if is_damaged(&error.failure) => 1,
+            true if to_ask_again || is_damaged(&error.failure) => 1,
             true => 2,
             false => 0,
         };
         let is_over = (cost > 0 && self.left == 0) || self.attempts > self.asked.saturating_add(PROBED_IN_VAIN);
         self.left = self.left.saturating_sub(cost);
         let in_time = error.ended.is_some_and(|ended| self.is_in_time(ended));
-        !is_over && self.requests > 0 && is_passing(&error.failure) && in_time
+        !is_over && self.requests > 0 && (to_ask_again || is_passing(&error.failure)) && in_time
     }
 }
 

@@ -225,3 +225,21 @@ fn the_other_read_has_a_length_that_no_open_answer_has() {
     lives(&mut doubt, &Request::read(50, 1).unwrap(), false);
     assert_eq!(doubt.attempt(), [ECHO], "no unit known here gives more");
 }
+
+/// A unit that was busy, or got an echo damaged, may know echoes all the same; one that says so each time is taken at its word.
+#[test]
+fn an_echo_that_a_unit_could_not_take_does_not_tell_that_it_knows_none() {
+    let (unit, echo) = (UnitAddress::MIN, Request::echo(7));
+    let mut resync = Resync::default();
+    for _ in 1..BUSY_FOR_GOOD {
+        resync.was_busy(unit, &echo);
+        assert!(!resync.knows_no_echo(unit) && !resync.refuses_echoes(unit));
+    }
+    resync.answered(unit, &echo, false);
+    for refuses in [false, false, true] {
+        resync.was_busy(unit, &echo);
+        assert_eq!(resync.refuses_echoes(unit), refuses);
+    }
+    resync.answered(unit, &echo, false);
+    assert!(!resync.refuses_echoes(unit), "it has returned one since");
+}

@@ -61,13 +61,13 @@ fn failed(failure: Failure, ended: impl Into<Option<Instant>>) -> CallError {
 fn asks_and_fails(course: &mut Course, failure: Failure) -> bool {
     let asked = course.asked();
     course.asks(at(0));
-    course.goes_on(&failed(failure, at(0)), asked)
+    course.goes_on(&failed(failure, at(0)), asked, false)
 }
 
 /// An attempt that ends before the question: whether there is another one.
 fn fails_before_asking(course: &mut Course, failure: Failure) -> bool {
     let asked = course.asked();
-    course.goes_on(&failed(failure, at(0)), asked)
+    course.goes_on(&failed(failure, at(0)), asked, false)
 }
 
 /// How often may be asked when all ends in `failure`.
@@ -180,7 +180,7 @@ fn no_attempt_begins_when_the_time_is_over() {
     for (ended, goes_on) in [(Some(at(199)), true), (Some(at(200)), false), (None, false)] {
         let mut course = Course::new(TIMEOUT, 1);
         course.asks(at(0));
-        assert_eq!(course.goes_on(&failed(SILENCE, ended), 0), goes_on, "{ended:?}");
+        assert_eq!(course.goes_on(&failed(SILENCE, ended), 0, false), goes_on, "{ended:?}");
     }
 }
 

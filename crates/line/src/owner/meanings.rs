@@ -1,0 +1,44 @@
+//! What the exceptions of each unit mean: as the specification has them, unless its family is known to mean something else.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use drivebus_rtu::{AnswerError, ExceptionCode, Meaning, Meanings, UnitAddress};
+
+use crate::error::Failure;
+
+/// The meanings by unit; of others those of the specification hold.
+#[derive(Debug, Default)]
+pub(crate) struct UnitMeanings(Mutex<BTreeMap<UnitAddress, Meanings>>);
+
+impl UnitMeanings {
+    /// The exceptions of `unit` mean this from now on.
+    pub(crate) fn set(&self, unit: UnitAddress, meanings: Meanings) {
+        self.lock().insert(unit, meanings);
+    }
+
+    /// What `unit` says by `failure`, if that is a refusal.
+    pub(crate) fn of(&self, unit: UnitAddress, failure: &Failure) -> Option<Meaning> {
+        let Failure::Refused { code, .. } = *failure else { return None };
+        Some(self.code(unit, code))
+    }
+
+    /// Whether `unit` says by `failure` that it could not take a request, this one or one before it, and may the next time.
+    pub(crate) fn asks_again(&self, unit: UnitAddress, failure: &Failure) -> bool {
+        match *failure {
+            Failure::Refused { code, .. } | Failure::Wrong(AnswerError::Refusal { code }) => {
+                self.code(unit, code) == Meaning::AskAgain
+            }
+            _ => false,
+        }
+    }
+
+    fn code(&self, unit: UnitAddress, code: ExceptionCode) -> Meaning {
+        self.lock().get(&unit).unwrap_or(&Meanings::STANDARD).of(code)
+    }
+
+    /// A thread that panicked cannot have left them half set.
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<UnitAddress, Meanings>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
