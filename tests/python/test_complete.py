@@ -234,7 +234,7 @@ def test_a_write_that_is_refused_says_whether_the_drive_took_it(
 def test_a_write_that_was_taken_is_looked_at_and_never_sent_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The documents of an ATV312 print no exceptions: 05H is the specification's, the unit has taken it, and is still at it."""
+    """The documents of an ATV312 print no exceptions: 05H is the specification's, "taken"."""
     with Simulator({1: "atv312"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
         drive = bus.drive(1, "atv312", unverified=True)
         kept = drive.backup()
