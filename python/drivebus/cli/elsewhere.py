@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import drivebus
 from drivebus import places
 from drivebus.line.write_guard import code_text
-from drivebus.profile import Profile, profiles
 
 __all__ = ["Started", "started_by"]
 
@@ -43,9 +43,9 @@ class Started(NamedTuple):
         )
 
 
-def started_by(profile: Profile) -> Iterator[Started]:
+def started_by(profile: drivebus.Profile) -> Iterator[Started]:
     """The halts of *profile* that start shipped families other than its own."""
-    others = [other for other in map(Profile.builtin, profiles()) if other.family != profile.family]
+    others = [other for other in map(drivebus.Profile.builtin, drivebus.profiles()) if other.family != profile.family]
     known = profile.commands()
     for halt in (name for name in _HALTS if name in known):
         place, code = profile.command(halt)
@@ -62,7 +62,7 @@ def started_by(profile: Profile) -> Iterator[Started]:
                 yield Started(halt, place, code, function, command, families)
 
 
-def _function(profile: Profile, place: int) -> int:
+def _function(profile: drivebus.Profile, place: int) -> int:
     """By which function a single word goes to *place*."""
     table, _ = places.split(place)
     if table == "coil":

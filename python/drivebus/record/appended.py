@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from drivebus.record.standing import Standing
+from drivebus.capture.standing import Standing
 
 __all__ = ["Appended"]
 

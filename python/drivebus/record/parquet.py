@@ -17,7 +17,7 @@ from pathlib import Path
 import pyarrow
 import pyarrow.parquet
 
-from drivebus.record.standing import Standing
+from drivebus.capture.standing import Standing
 from drivebus.record.table import FIXED, Row, Table
 
 __all__ = ["open_new"]

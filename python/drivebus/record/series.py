@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from time import time
 
+from drivebus.capture.standing import LOOK
 from drivebus.errors import DrivebusWarning, NotAllowed
 from drivebus.record.files import Sink, sink_for
 from drivebus.record.table import Row, Table
@@ -23,9 +24,6 @@ _KEPT = 100_000
 
 _AGAIN = 1.0
 """Seconds after which a file that could not be written is tried again."""
-
-_LOOK = 1.0
-"""Seconds between two looks whether the file stands at its path."""
 
 _EARLY = 0.05
 """Seconds by which a write may come too early: the recorder looks up as often as that."""
@@ -194,7 +192,7 @@ class Series:
         """Whether the file stands at its path, or goes on in a new one; once a second, or where *look* says so."""
         if self._sink is None or not (look or self._is_gone or now >= self._look_at):
             return True
-        self._look_at = now + _LOOK
+        self._look_at = now + LOOK
         why = self._sink.gone()
         if why:
             return self._go_on(self._sink, why, now)
@@ -288,7 +286,7 @@ class Series:
             path.unlink(missing_ok=True)
             raise NotAllowed(f"{path} cannot be written: {error.strerror or error}; nothing was recorded") from None
         self.files.append(path)
-        self._began, self._look_at, self._rows_before = now, now + _LOOK, self.rows
+        self._began, self._look_at, self._rows_before = now, now + LOOK, self.rows
         return sink
 
     def _end_row(self, goes_on: str = "") -> Row:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from drivebus.record.standing import Standing
+from drivebus.capture.standing import Standing
 from drivebus.record.table import FIXED, Row, Table, moment
 
 __all__ = ["open_new"]
