@@ -106,6 +106,7 @@ ON_THE_CORE = {
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
     "cli": {
+        "backup",
         "capture",
         "drivebus",
         "hal",

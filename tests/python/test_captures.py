@@ -159,6 +159,26 @@ def test_a_bus_writes_what_it_sends_and_hears(tmp_path: Path) -> None:
     assert [frame.asks for frame in read(path)][-2:] == [True, False]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="an open file cannot be removed there")
+def test_a_trace_whose_file_is_removed_says_so_and_the_line_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "bus.pcapng"
+    with drivebus.Bus("sim://gd350?clock=virtual", trace=path) as bus:
+        bus.read(1, 0x2100)
+        path.unlink()
+        poll = bus.poll({bus.drive(1): ["status_word_1"]}, 0.1)
+        with pytest.warns(drivebus.DrivebusWarning, match=r"bus\.pcapng was not there any more: it was removed"):
+            poll.wait(1.5)
+        poll.close()
+        assert bus.read(1, 0x2100) == [3]
+    assert not path.exists()
+    bus = drivebus.Bus("sim://gd350?clock=virtual", trace=path)
+    (tmp_path / "other").write_text("mine")
+    (tmp_path / "other").replace(path)
+    with pytest.warns(drivebus.DrivebusWarning, match="another file stands there"):
+        bus.close()
+    assert path.read_text() == "mine"
+
+
 def test_a_trace_that_cannot_be_written_opens_nothing(tmp_path: Path) -> None:
     for wrong in (tmp_path, tmp_path / "no" / "where.pcapng", "", 3, "a\0b"):
         with pytest.raises(drivebus.NotAllowed, match=r"trace is|cannot be written"):

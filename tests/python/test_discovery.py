@@ -12,6 +12,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, NoAnswer, NotAllowed, Profile, Simulator
+from drivebus.backup.unread import Unread
 from drivebus.discovery.walk import LAST, Walk
 from drivebus.sim import FAULT_KINDS
 
@@ -264,7 +265,7 @@ def test_the_walk_finds_what_is_there_in_few_reads(most: int) -> None:
             if have >= {*range(first, first + count)}:
                 walk.answered([1000 + number for number in range(first, first + count)])
             else:
-                walk.was_refused(count, "")
+                walk.was_refused(count, Unread("", "not there"))
         assert walk.found == {number: 1000 + number for number in have}
         assert {*walk.refused} == {*range(LAST + 1)} - have
         runs = sum(number - 1 not in have for number in have)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ import drivebus
 from drivebus import Exchange
 from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
+from drivebus.cli.kept import Kept
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
 
@@ -269,6 +272,48 @@ def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> Non
     assert again.exit_code == 2
     assert "is there already; give another name, or --force" in again.stderr
     assert list(read(path)) == kept
+
+
+def test_a_capture_whose_file_is_removed_says_so(
+    tmp_path: Path, capture: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is looked at once a second of the line's time, and in the end; what stands there now is not touched."""
+    frames = list(read(capture))[:2]
+    path = tmp_path / "heard.pcapng"
+    with Kept(str(path), False, "port", "9600 8N1", "upper") as kept:
+        kept.write(replace(frames[0], time=100.0))
+        path.unlink()
+        kept.write(replace(frames[1], time=100.9))
+        assert not kept.gone
+        kept.write(replace(frames[0], time=101.0))
+        assert "it was removed" in kept.gone
+        path.write_text("mine")
+    assert path.read_text() == "mine"
+    assert capsys.readouterr().err.count("heard.pcapng was not there any more: it was removed") == 1
+    with Kept(str(tmp_path / "new.pcapng"), False, "port", "9600 8N1", "upper") as kept:
+        (tmp_path / "new.pcapng").rename(tmp_path / "old.pcapng")
+        (tmp_path / "new.pcapng").write_text("mine")
+    assert (tmp_path / "new.pcapng").read_text() == "mine"
+
+
+def test_sniff_says_by_its_exit_code_that_its_file_was_removed(simulator: Simulator, tmp_path: Path) -> None:
+    path = tmp_path / "heard.pcapng"
+    words = ["-f", "8N1", "--json", "sniff", simulator.port, "-w", str(path)]
+    with (
+        drivebus.Bus(simulator.port, parity="N") as bus,
+        subprocess.Popen(
+            [sys.executable, "-m", "drivebus", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process,
+    ):
+        assert process.stdout is not None
+        heard = threading.Thread(target=process.stdout.readline)
+        heard.start()
+        while heard.is_alive():
+            bus.read(1, 0x2100, 3)
+        path.unlink()
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate()
+    assert (process.returncode, "was not there any more" in err) == (1, True)
 
 
 def sniffed(port: str, *words: str) -> Result:

@@ -9,12 +9,14 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus.cli import cli
+from drivebus.cli.csv_rows import CsvRows
 
 HIGHEST, RISE, FALL = 0x0003, 0x000B, 0x000C
 """Where a GD350 has P00.03 in hundredths of Hz, and P00.11 and P00.12 in tenths of a second."""
@@ -224,6 +226,25 @@ class TestCommand:
     @staticmethod
     def run(simulator: drivebus.Simulator, *words: str) -> Result:
         return CliRunner().invoke(cli, ["--port", simulator.port, *words], prog_name="drivebus")
+
+    def test_a_file_that_is_removed_meanwhile_is_told(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        file = tmp_path / "step.csv"
+        write = CsvRows.write
+
+        def removing(rows: CsvRows, *what: Any) -> None:
+            write(rows, *what)
+            file.unlink(missing_ok=True)
+
+        monkeypatch.setattr(CsvRows, "write", removing)
+        words = ["try", "step", "--from", "10", "--to", "30", "--max-current", "40", "--for", "1", "--csv", str(file)]
+        with drivebus.Simulator({1: "gd350"}, transport="pty") as simulator:
+            with drivebus.Bus(simulator) as bus:
+                drive = bus.drive(1)
+                drive.prepare_control()
+                drive.write({"P00.11": 2.0, "P00.12": 2.0})
+            done = self.run(simulator, "--json", *words, "--yes")
+            assert json.loads(done.stdout)["aborted"] is None
+            assert (done.exit_code, "was not there any more: it was removed" in done.stderr) == (1, True)
 
     def test_it_asks_tells_and_keeps_what_it_recorded(self, tmp_path: Path) -> None:
         file = str(tmp_path / "step.csv")

@@ -12,11 +12,17 @@ if TYPE_CHECKING:
     from drivebus.backup.compare import Diff, Difference
     from drivebus.backup.model import Backup, Origin
     from drivebus.backup.report import Restoration, Restored
+    from drivebus.backup.unread import Unread
 
-__all__ = ["Backup", "Diff", "Difference", "Origin", "Restoration", "Restored"]
+__all__ = ["Backup", "Diff", "Difference", "Origin", "Restoration", "Restored", "Unread"]
 
 if not TYPE_CHECKING:
     __getattr__ = later(
         __name__,
-        {"compare": ("Diff", "Difference"), "model": ("Backup", "Origin"), "report": ("Restoration", "Restored")},
+        {
+            "compare": ("Diff", "Difference"),
+            "model": ("Backup", "Origin"),
+            "report": ("Restoration", "Restored"),
+            "unread": ("Unread",),
+        },
     )

@@ -8,11 +8,16 @@ from typing import overload
 
 from drivebus.backup.rules import Rules
 from drivebus.backup.text import worded
+from drivebus.backup.unread import Unread, in_words, is_open
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.values import Choice, Value, counted
 
 __all__ = ["Diff", "Difference", "Side", "amount", "compare", "factory", "shown"]
+
+
+_UNTOLD = ("closed", "refused", "lost")
+"""Why a side has no value that it may have all the same."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +47,14 @@ class Difference:
 
 
 class Diff(Sequence[Difference]):
-    """The parameters that differ, in code order: empty, and false, if none differs.
+    """The parameters that differ, in code order: empty if none differs, and false if it is complete, too.
 
     Attributes:
         left, right: What was compared, in words.
         compared: How many parameters were.
         uncompared: Why others were not, by code.
+        complete: Whether nothing was left out because it was lost, or refused for a reason that says nothing of the
+            drive. A diff that is not complete is never false.
     """
 
     __slots__ = ("_differences", "compared", "left", "right", "uncompared")
@@ -76,12 +83,29 @@ class Diff(Sequence[Difference]):
     def __len__(self) -> int:
         return len(self._differences)
 
+    def __bool__(self) -> bool:
+        return bool(self._differences) or not self.complete
+
+    @property
+    def complete(self) -> bool:
+        """See the class."""
+        return not self.unsettled()
+
+    def unsettled(self) -> dict[str, Unread]:
+        """What was lost, or refused for a reason that says nothing of the drive, and so not compared: why, by code."""
+        return {code: why for code, why in self.uncompared.items() if isinstance(why, Unread) and why.open}
+
     def __str__(self) -> str:
-        lines = [f"{self.left} -> {self.right}: {len(self)} of {self.compared} parameters differ"]
-        return "\n".join([*lines, *map(str, self)])
+        rest = [f"{code}: not compared, {why.why}: {why}" for code, why in self.unsettled().items()]
+        return "\n".join([self._head(), *map(str, self), *rest])
 
     def __repr__(self) -> str:
-        return f"<Diff of {self.left} and {self.right}: {len(self)} of {self.compared} parameters differ>"
+        return f"<Diff of {self._head()}>"
+
+    def _head(self) -> str:
+        lost = self.unsettled()
+        rest = f", {len(lost)} could not be compared: {in_words(lost.values())}" if lost else ""
+        return f"{self.left} -> {self.right}: {len(self)} of {self.compared} parameters differ{rest}"
 
 
 @dataclass(frozen=True)
@@ -100,6 +124,10 @@ class Side:
     unread: Mapping[str, str]
     partial: str = ""
 
+    def closed(self) -> set[str]:
+        """What it has, or may have, and did not tell: that is no difference."""
+        return {code for code, why in self.unread.items() if isinstance(why, Unread) and why.why in _UNTOLD}
+
     def lacks(self, code: str) -> str:
         """Why it has no *code*."""
         return self.partial or self.unread.get(code, f"{self.name} does not have it")
@@ -115,12 +143,10 @@ def compare(profile: Profile, left: Side, right: Side, *, everything: bool = Fal
     differences: list[Difference] = []
     uncompared: dict[str, str] = {}
     compared = 0
-    for code in sorted({*left.raw, *right.raw}, key=rules.place):
-        reason = None if everything else rules.uncompared(code)
+    for code in sorted({*left.raw, *right.raw, *left.closed(), *right.closed()}, key=rules.place):
         sides = (left.raw.get(code), right.raw.get(code))
-        lacking = next((side for side, word in zip((left, right), sides, strict=True) if word is None), None)
-        if reason is None and lacking is not None and lacking.partial:
-            reason = lacking.lacks(code)
+        lacking = [side for side, word in zip((left, right), sides, strict=True) if word is None]
+        reason = (None if everything else rules.uncompared(code)) or _untold(code, lacking)
         if reason is not None:
             uncompared[code] = reason
             continue
@@ -129,9 +155,16 @@ def compare(profile: Profile, left: Side, right: Side, *, everything: bool = Fal
             continue
         known = profile.describe(code)
         values = [None if word is None else worded(profile, code, word) for word in sides]
-        why = "" if lacking is None else lacking.lacks(code)
+        why = lacking[0].lacks(code) if lacking else ""
         differences.append(Difference(code, known.label, known.unit, values[0], values[1], why))
     return Diff(differences, left.name, right.name, compared, uncompared)
+
+
+def _untold(code: str, lacking: Sequence[Side]) -> str | None:
+    """Why *code* cannot be compared where the sides *lacking* have no value of it; None if that is a difference."""
+    partial = next((side.partial for side in lacking if side.partial), None)
+    untold = [side.lacks(code) for side in lacking if code in side.closed()]
+    return partial or next(filter(is_open, untold), None) or next(iter(untold), None)
 
 
 def factory(profile: Profile) -> Side:

@@ -39,6 +39,10 @@ async def backup(
     With *path* the backup goes into that file, in one step when it is complete. Until then it grows in
     `PATH.part`: after a break (a pulled cable, a killed process) the same call goes on where it was.
 
+    It is `complete` if nothing lacks but what the drive has not, or keeps closed; `unread` has the reason of each. What
+    was lost is asked for once more, after the rest. If it stays lost, or was refused for another reason, the backup is
+    not complete and stays in `PATH.part`, and the same call asks for what it lacks.
+
     Args:
         path: Where to keep it; None keeps no file. `Backup.save` writes one later.
         resume: Go on with what a break left behind; False begins anew.
@@ -49,7 +53,7 @@ async def backup(
     Raises:
         NotAllowed: The file is another drive's, or cannot be written; or the family has no known parameters.
         Refused: The drive is locked by a password.
-        NoAnswer, BadAnswer, PortError: The line failed; what was read until then is kept.
+        NoAnswer, BadAnswer, PortError: Nothing is answered any more; what was read until then is kept.
     """
     from drivebus.backup import taking
 
@@ -76,7 +80,8 @@ async def restore(
 
     Limits come before what they limit, and what decides where commands come from comes last. Left alone are the
     settings of the serial line, the data of the motor, what can only be read, the fault history, what does something
-    when it is written, and what nothing is known of; the report says so of each. Cut off at any moment, the same call
+    when it is written, and what nothing is known of; the report says so of each. What the drive has and does not tell
+    is not written either: it ends as `"unread"`. Cut off at any moment, the same call
     goes on where it was: the memory of no parameter is written twice, unless *twice*.
 
     Args:
@@ -117,7 +122,8 @@ async def diff(
     """How the drive differs from *backup*. None: how it differs from the factory settings, as far as they are known.
 
     Only what *backup* has is read and compared. What tells nothing about how the drive is set (the fault history,
-    what can only be read) is left out, unless *everything*. The result is false where nothing differs.
+    what can only be read) is left out, unless *everything*. The result is false where nothing differs and nothing was
+    lost, or refused for a reason that says nothing: `Diff.complete`.
 
     Args:
         backup: A backup, its file, or None.
@@ -152,7 +158,9 @@ async def diff(
             )
         left = Side(os.fspath(backup) if isinstance(backup, (str, os.PathLike)) else "backup", kept.raw, kept.unread)
     rules = Rules(unit.profile)
-    unasked = {code: reason for code in left.raw if (reason := rules.unread(code, unit.unverified)) is not None}
+    unasked: dict[str, str] = {
+        code: reason for code in left.raw if (reason := rules.unread(code, unit.unverified)) is not None
+    }
     left = replace(left, raw={code: word for code, word in left.raw.items() if code not in unasked})
     codes = [code for code in left.raw if everything or rules.uncompared(code) is None]
     words = await Reader(unit, sorted(codes, key=rules.place)).rest()
@@ -170,7 +178,7 @@ def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
     from drivebus.backup.model import Backup
 
     kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), unit.profile)
-    if not kept.complete:
+    if kept.interrupted:
         raise NotAllowed(
             f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
             "again with the same path to have the rest",

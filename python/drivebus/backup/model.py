@@ -15,6 +15,7 @@ from drivebus import checks
 from drivebus.backup import disk, parse, text
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
+from drivebus.backup.unread import Unread, is_open
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.values import Value
@@ -72,24 +73,27 @@ class Backup(Mapping[str, Value]):
     Attributes:
         origin: Whose they are.
         raw: The word of each as the drive told it; a parameter of two words is one number.
-        unread: Why each of the others is not among them.
-        complete: Whether all that can be read was read; a backup that was interrupted is not.
+        unread: Why each of the others is not among them: texts, each with its kind in `why` (`"not asked"`, `"not
+            there"`, `"closed"`, `"refused"`, `"lost"`).
+        interrupted: Whether it was broken off before all was asked for.
+        complete: Whether all was read but what the drive has not, or keeps closed: nothing was interrupted, lost, or
+            refused for another reason.
         profile: What its words mean.
         told: The words that the drive told: those of `raw`, unless a file was changed by hand.
         in_ram: What the program that took it had written to RAM alone before: lost when the drive is switched off.
         translated_from: The family whose codes they were, where the same values stand under the codes of another.
     """
 
-    __slots__ = ("complete", "in_ram", "origin", "profile", "raw", "told", "translated_from", "unread")
+    __slots__ = ("in_ram", "interrupted", "origin", "profile", "raw", "told", "translated_from", "unread")
 
     def __init__(
         self,
         origin: Origin,
         raw: Mapping[str, int],
-        unread: Mapping[str, str],
+        unread: Mapping[str, Unread],
         profile: Profile,
         *,
-        complete: bool = True,
+        interrupted: bool = False,
         told: Mapping[str, int] | None = None,
         in_ram: Iterable[str] = (),
         translated_from: str | None = None,
@@ -97,9 +101,9 @@ class Backup(Mapping[str, Value]):
         place = Rules(profile).place
         self.origin = origin
         self.raw: Mapping[str, int] = dict(sorted(raw.items(), key=lambda item: place(item[0])))
-        self.unread: Mapping[str, str] = dict(sorted(unread.items(), key=lambda item: place(item[0])))
+        self.unread: Mapping[str, Unread] = dict(sorted(unread.items(), key=lambda item: place(item[0])))
         self.profile = profile
-        self.complete = complete
+        self.interrupted = interrupted
         self.told: Mapping[str, int] = self.raw if told is None else dict(told)
         self.in_ram = frozenset(in_ram)
         self.translated_from = translated_from
@@ -121,12 +125,17 @@ class Backup(Mapping[str, Value]):
         return cls(
             Origin(**found.origin),
             found.raw,
-            {},
+            found.unread,
             found.profile,
-            complete=found.complete,
+            interrupted=found.interrupted,
             told=found.told,
             in_ram=found.in_ram,
         )
+
+    @property
+    def complete(self) -> bool:
+        """See the class."""
+        return not self.interrupted and not any(map(is_open, self.unread.values()))
 
     def diff(self, other: Backup | None = None, *, everything: bool = False) -> Diff:
         """How *other* differs from this backup. None: how this differs from the factory settings, as far as known.
@@ -151,7 +160,7 @@ class Backup(Mapping[str, Value]):
     def translated(self, profile: Profile) -> Backup:
         """The same values in the words of another family, where a code has the same name; the others in `unread`."""
         raw: dict[str, int] = {}
-        unread: dict[str, str] = {}
+        unread = {code: why for code, why in self.unread.items() if why.open}
         for code, value in self.items():
             here = self.profile.describe(code)
             try:
@@ -162,9 +171,9 @@ class Backup(Mapping[str, Value]):
                     raise NotAllowed(f"{code} is another thing in a {profile.title}: {there.label}")
                 raw[code] = profile.encode(code, value)
             except NotAllowed as error:
-                unread[code] = str(error)
+                unread[code] = Unread(str(error), "not there")
         return Backup(
-            self.origin, raw, unread, profile, complete=self.complete, told={}, translated_from=self.origin.family
+            self.origin, raw, unread, profile, interrupted=self.interrupted, told={}, translated_from=self.origin.family
         )
 
     def unproved(self, code: str) -> str | None:
@@ -196,7 +205,7 @@ class Backup(Mapping[str, Value]):
 
     def __repr__(self) -> str:
         of = self.origin
-        rest = "" if self.complete else ", not complete"
+        rest = "" if self.complete else ", interrupted" if self.interrupted else ", not complete"
         return (
             f"<Backup of unit {of.unit}, {of.family}, {of.taken:%Y-%m-%d %H:%M:%S}: {len(self.raw)} parameters{rest}>"
         )

@@ -5,18 +5,42 @@ from __future__ import annotations
 from typing import Any
 
 from drivebus import checks
+from drivebus.backup.unread import WHY, Unread
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.values import Description, counted
 
-__all__ = ["FIELDS", "Wrong", "word"]
+__all__ = ["FIELDS", "Wrong", "lacking", "word"]
 
-FIELDS = ("value", "unit", "raw", "told", "beyond", "ram")
-"""What may stand in the line of a parameter."""
+_VALUE = ("value", "unit", "raw", "told", "beyond", "ram")
+_LACKING = ("unread", "reason")
+
+FIELDS = (*_VALUE, *_LACKING)
+"""What may stand in the line of a parameter: its value, or why there is none."""
 
 
 class Wrong(Exception):
     """What is wrong with one line."""
+
+
+def lacking(profile: Profile, code: str, fields: object) -> Unread | None:
+    """Why the drive did not tell *code*, where its line says so; None where the line is to have a value.
+
+    Raises:
+        Wrong: Something does not fit.
+    """
+    if not isinstance(fields, dict) or "unread" not in fields:
+        return None
+    _known(profile, code)
+    why, reason = (fields.get(key) for key in _LACKING)
+    if why not in WHY[1:]:
+        raise Wrong(f"{code}: unread {_shown(why)} is none of {', '.join(WHY[1:])}")
+    if not isinstance(reason, str):
+        raise Wrong(f"{code} is unread, and its line needs the reason: a text")
+    for key in fields:
+        if key not in _LACKING:
+            raise Wrong(f"{code} is unread, and its line has {_shown(key)} all the same: take one of them out")
+    return Unread(reason, why)
 
 
 def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
@@ -29,11 +53,11 @@ def word(profile: Profile, code: str, fields: object) -> tuple[int, int | None]:
     if not isinstance(fields, dict):
         raise Wrong(f"{code} must be {_example(profile, known)}, and is {_shown(fields)}")
     for key in fields:
-        if key not in FIELDS:
+        if key not in _VALUE:
             raise Wrong(f'{code} has no field "{key}"{checks.closest(key, FIELDS)}')
     if "value" not in fields:
         raise Wrong(f"{code} lacks its value; write {_example(profile, known)}")
-    value, unit, raw, told, beyond, _ = (fields.get(key) for key in FIELDS)
+    value, unit, raw, told, beyond, _ = (fields.get(key) for key in _VALUE)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise Wrong(f"{code}: value {_shown(value)} is not a number")
     if "unit" in fields and unit != known.unit:

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
-from drivebus.backup.parameter import FIELDS, Wrong, word
+from drivebus.backup.parameter import FIELDS, Wrong, lacking, word
 from drivebus.backup.text import FORMAT, printable
+from drivebus.backup.unread import Unread
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 
@@ -37,7 +38,11 @@ _SHOWN_OF_NO_BACKUP = 20
 _ANYBODYS = "not TOML, or nothing that a backup has"
 """Said of a line where nothing says that the file is a backup: it may be anybody's, and none of it is repeated."""
 
-_TOP: dict[str, tuple[type, str]] = {"format": (int, "a number"), "complete": (bool, "true or false")}
+_TOP: dict[str, tuple[type, str]] = {
+    "format": (int, "a number"),
+    "complete": (bool, "true or false"),
+    "interrupted": (bool, "true or false"),
+}
 _DRIVE: dict[str, tuple[type, str]] = {
     "family": (str, "a text"),
     "profile": (str, "a text"),
@@ -62,7 +67,8 @@ class Parsed:
         raw: The word of each parameter.
         told: The word that the drive told, of those whose line has that.
         in_ram: The codes whose line says that the drive had them in RAM alone.
-        complete: Whether the backup was finished.
+        unread: Why the drive did not tell others, of those whose line has that.
+        interrupted: Whether not all was asked for.
     """
 
     profile: Profile
@@ -70,7 +76,8 @@ class Parsed:
     raw: dict[str, int]
     told: dict[str, int]
     in_ram: frozenset[str]
-    complete: bool
+    unread: dict[str, Unread]
+    interrupted: bool
 
 
 @dataclass
@@ -137,7 +144,7 @@ def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) 
         raise file.refuse()
     if callable(profile):
         profile = profile(file.drive["family"])
-    raw, told = _parameters(file, profile)
+    raw, told, unread = _parameters(file, profile)
     if file.wrong:
         raise file.refuse(profile)
     origin = {
@@ -152,7 +159,8 @@ def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) 
         **file.drive,
     }
     in_ram = frozenset(code for _, code, fields in file.parameters if isinstance(fields, dict) and fields.get("ram"))
-    return Parsed(profile, origin, raw, told, in_ram, file.top.get("complete", True))
+    interrupted = file.top.get("interrupted", not file.top.get("complete", True))
+    return Parsed(profile, origin, raw, told, in_ram, unread, interrupted)
 
 
 def _line(file: _File, number: int, data: bytes) -> None:
@@ -224,13 +232,17 @@ def _check_head(file: _File) -> None:
         file.lack('the file does not name its drive: [drive] lacks a line such as family = "gd350"')
 
 
-def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str, int]]:
-    """The word of each parameter, and what the drive told where a line has that; what is wrong is noted."""
+def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str, int], dict[str, Unread]]:
+    """The word of each parameter, what the drive told where a line has that, or why not; what is wrong is noted."""
     raw: dict[str, int] = {}
     told: dict[str, int] = {}
+    unread: dict[str, Unread] = {}
     lines: dict[str, int] = {}
     for number, code, value in file.parameters:
         try:
+            if (why := lacking(profile, code, value)) is not None:
+                unread[code] = why
+                continue
             meant, was = word(profile, code, value)
             if code in lines:
                 raise Wrong(f"{code} is given twice; the first is in line {lines[code]}")
@@ -239,4 +251,5 @@ def _parameters(file: _File, profile: Profile) -> tuple[dict[str, int], dict[str
                 told[code] = was
         except Wrong as error:
             file.wrong.append((number, str(error)))
-    return raw, told
+    # A value that somebody put there holds.
+    return raw, told, {code: why for code, why in unread.items() if code not in raw}

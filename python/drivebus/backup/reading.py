@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus.errors import Refused
+from drivebus.backup.unread import Unread, lost, refused
+from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.operations import words as bus_words
 from drivebus.operations.unit import Unit
 
@@ -12,6 +13,10 @@ __all__ = ["Reader", "Words"]
 
 _LOCKED = "password_protected"
 """By this name every profile calls a refusal that meets whatever is asked."""
+
+_DEAD = 8
+"""Reads in a row without an answer after which the line counts as failed: cutting out one silent parameter takes
+fewer."""
 
 
 class Words:
@@ -24,18 +29,25 @@ class Words:
 
     __slots__ = ("raw", "unread")
 
-    def __init__(self, raw: dict[str, int], unread: dict[str, str]) -> None:
+    def __init__(self, raw: dict[str, int], unread: dict[str, Unread]) -> None:
         self.raw = raw
         self.unread = unread
 
 
 class Reader:
-    """Reads *codes*, request by request. One that is refused is cut in two, down to the parameter that is meant."""
+    """Reads *codes*, request by request. One that is refused is cut in two, down to the parameter that is meant.
+
+    What was lost is asked for once more, after all others, and cut in two only then.
+    """
 
     def __init__(self, unit: Unit, codes: Sequence[str]) -> None:
         self._unit = unit
         self._waiting = [list(codes)] if codes else []
         self._planned: list[tuple[int, int, list[str]]] = []
+        self._lost: list[str] = []
+        self._is_second_round = False
+        self._silent = 0
+        self._answers = 0
 
     async def next(self) -> Words | None:
         """What the next request brought; None when all was asked.
@@ -43,9 +55,12 @@ class Reader:
         Raises:
             Refused: The drive is locked by a password: it would refuse each.
             NotAllowed: Another drive answers at this address since the port was opened again.
-            NoAnswer, BadAnswer, PortError: See each.
+            NoAnswer, BadAnswer: Nothing was answered at all, or nothing any more.
+            PortError: See there.
         """
         if not self._planned:
+            if not self._waiting and self._lost:
+                self._waiting, self._lost, self._is_second_round = [self._lost], [], True
             if not self._waiting:
                 return None
             self._plan(self._waiting.pop())
@@ -59,21 +74,38 @@ class Reader:
         except Refused as error:
             if error.name == _LOCKED:
                 raise
-            if len(inside) == 1:
-                return Words({}, {inside[0]: _reason(error)})
-            half = len(inside) // 2
-            self._waiting += [inside[half:], inside[:half]]
-            return Words({}, {})
+            self._heard()
+            return self._lacks(inside, refused(unit.profile, error))
+        except (NoAnswer, BadAnswer) as error:
+            self._silent += 1
+            if self._silent == _DEAD or (self._is_second_round and not self._answers):
+                raise
+            return self._lacks(inside, lost(error))
+        self._heard()
         return Words({code: self._word(code, words, address) for code in inside}, {})
 
     async def rest(self) -> Words:
         """What all requests that are left bring."""
         raw: dict[str, int] = {}
-        unread: dict[str, str] = {}
+        unread: dict[str, Unread] = {}
         while (words := await self.next()) is not None:
             raw.update(words.raw)
             unread.update(words.unread)
         return Words(raw, unread)
+
+    def _heard(self) -> None:
+        self._silent, self._answers = 0, self._answers + 1
+
+    def _lacks(self, inside: list[str], why: Unread) -> Words:
+        """What a read of *inside* brought that failed for *why*; who is asked again, and how, is noted."""
+        if why.why == "lost" and not self._is_second_round:
+            self._lost += inside
+            return Words({}, {})
+        if len(inside) == 1:
+            return Words({}, {inside[0]: why})
+        half = len(inside) // 2
+        self._waiting += [inside[half:], inside[:half]]
+        return Words({}, {})
 
     def _plan(self, codes: Sequence[str]) -> None:
         profile = self._unit.profile
@@ -87,9 +119,3 @@ class Reader:
         place = self._unit.profile.address(code) - address
         known = self._unit.profile.describe(code)
         return known.number(words[place : place + known.words])
-
-
-def _reason(error: Refused) -> str:
-    if not error.meaning:
-        return str(error)
-    return f"the drive refused to tell it: exception {error.code:02X}H, {error.name}: {error.meaning}"

@@ -20,10 +20,11 @@ RESULTS = {
     "blocked": "not sent: the drive would not take it",
     "differs": "the drive shows another value, after it was written or another parameter was",
     "missing": "the drive does not have it",
+    "unread": "what the drive, or the backup, has could not be read",
 }
 """What can become of a parameter."""
 
-FAILED = ("refused", "blocked", "differs", "missing")
+FAILED = ("refused", "blocked", "differs", "missing", "unread")
 """What leaves the drive otherwise than the backup."""
 
 
@@ -39,8 +40,8 @@ class Restored:
         wanted: What the backup has; None where that means nothing to this drive.
         after: What the drive has now; None where it did not tell.
         result: One of `"restored"`, `"planned"` (in a dry run), `"same"`, `"skipped"`, and of those that failed:
-            `"refused"`, `"blocked"`, `"differs"`, `"missing"`.
-        reason: Why, where it was not restored.
+            `"refused"`, `"blocked"`, `"differs"`, `"missing"`, `"unread"`.
+        reason: Why, where it was not restored, and whether the drive took what was sent.
     """
 
     code: str
@@ -54,7 +55,7 @@ class Restored:
 
     @property
     def failed(self) -> bool:
-        """Whether the drive has another value than the backup."""
+        """Whether the drive has another value than the backup, or may have."""
         return self.result in FAILED
 
     def __str__(self) -> str:

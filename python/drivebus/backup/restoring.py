@@ -22,14 +22,12 @@ from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
 from drivebus.operations import sending, state
 from drivebus.operations.unit import Unit
+from drivebus.profile.refusals import means
 
 __all__ = ["Restore"]
 
-_MOVED = {
-    "restored": "it was restored, and another parameter changed it afterwards",
-    "same": "the drive had it, and another parameter changed it since",
-}
-"""What is said where a parameter does not stay as it was restored, or as it was before."""
+_HAD = {"restored": "it was written and read back", "same": "the drive had it"}
+"""What was seen of a parameter before the last look at it."""
 
 
 class Restore:
@@ -46,10 +44,9 @@ class Restore:
         self._pending = self._done = 0
         self._had: dict[str, int] = {}
         self._has: dict[str, int] = {}
-        # What the backup of another family has and this one does not.
-        lost = backup.unread if backup.translated_from else {}
-        self._results: dict[str, tuple[str, str]] = {code: ("missing", reason) for code, reason in lost.items()}
+        self._results: dict[str, tuple[str, str]] = {}
         self._refused: list[str] = []
+        self._to_ask_again: set[str] = set()
         self._raw: Collection[str] = ()
         self._order: list[str] = []
 
@@ -88,8 +85,20 @@ class Restore:
         if not self._dry_run:
             await self._look_again()
         await self._change_line(lines)
-        lost = [code for code in self._results if code not in self._backup]
-        return Restoration([self._item(code) for code in (*chosen, *lost)], self._order, self._dry_run)
+        lacking = self._lacking(groups)
+        return Restoration([self._item(code) for code in (*chosen, *lacking)], self._order, self._dry_run)
+
+    def _lacking(self, groups: Sequence[str] | None) -> list[str]:
+        """What the backup does not have: of another family what this one lacks, and what could not be read then."""
+        unread = self._backup.unread
+        lost = self._rules.selected([code for code, why in unread.items() if why.open], groups)
+        for code in lost:
+            self._results[code] = ("unread", f"the backup does not have it: {unread[code].why}: {unread[code]}")
+        # What a drive of the same family had not is no part of what it was set to.
+        other = [code for code, why in unread.items() if self._backup.translated_from and not why.open]
+        for code in other:
+            self._results[code] = ("missing", unread[code])
+        return [code for code in unread if code in self._results]
 
     def _named(self, raw: Sequence[str]) -> Sequence[str]:
         """*raw*, if the backup has each.
@@ -129,8 +138,9 @@ class Restore:
         words = await Reader(self._unit, sorted({*wanted, *readable}, key=self._rules.place)).rest()
         self._had, self._has = words.raw, dict(words.raw)
         for code in wanted:
-            if code in words.unread:
-                self._results[code] = ("missing", words.unread[code])
+            if (why := words.unread.get(code)) is not None:
+                is_there = why.why != "not there"
+                self._results[code] = ("unread", f"not written, {why.why}: {why}") if is_there else ("missing", why)
             elif words.raw[code] == self._backup.raw[code] and (
                 self._to_ram(code) or not sending.is_in_ram(self._unit, code)
             ):
@@ -180,20 +190,30 @@ class Restore:
         written = -1
         while written != len(self._order):
             written = len(self._order)
-            order.again(self._refused)
-            self._refused.clear()
-            while (step := order.next()) is not None:
-                await self._take(step, order)
+            await self._write_all(order, self._refused)
             if not self._refused:
                 break
+        passing = [code for code in self._refused if code in self._to_ask_again]
+        if passing:
+            # These were not judged: the drive was busy, or the request came damaged.
+            await self._write_all(order, passing)
         self._say_what_hindered(order)
+
+    async def _write_all(self, order: Order, again: Sequence[str]) -> None:
+        """Writes what *order* has, and *again* what was refused before; what is refused now is noted."""
+        order.again(again)
+        self._refused = []
+        while (step := order.next()) is not None:
+            await self._take(step, order)
 
     def _say_what_hindered(self, order: Order) -> None:
         passing = order.passing(self._would_pass)
         for code in order.rest:
             by = order.hindrance(code, float(self._backup[code]))
             limit = "another parameter" if by is None else f"{by}, which the drive has at {self._shown(by)}"
-            self._results[code] = ("blocked", f"it would be beyond {limit}{_by_way_of(passing.get(code, ()))}")
+            other, why = self._results.get(by or "", ("", ""))
+            cause = f"; that was refused: {why}" if other == "refused" else _by_way_of(passing.get(code, ()))
+            self._results[code] = ("blocked", f"it would be beyond {limit}{cause}")
         for code, (result, reason) in self._results.items():
             if result in ("refused", "blocked") and self._has[code] != self._had[code]:
                 self._results[code] = (result, f"{reason}; on the way there it was given {self._shown(code)}")
@@ -269,7 +289,9 @@ class Restore:
                 shown = await write(self._unit, code, raw, self._has[code], store=store)
             except Refused as error:
                 if final:
-                    self._results[code] = ("refused", _meaning(error))
+                    self._results[code] = ("refused", f"{_meaning(error)}; the drive did not take it")
+                if means(self._profile, error.code) == "ask_again":
+                    self._to_ask_again.add(code)
                 raise
             self._has[code] = shown
         self._order.append(code)
@@ -288,12 +310,14 @@ class Restore:
         """Reads once more what the drive is to have now: one parameter may have moved another."""
         if not self._order:
             return
-        had = {code: result for code, (result, _) in self._results.items() if result in _MOVED}
+        had = {code: result for code, (result, _) in self._results.items() if result in _HAD}
         words = await Reader(self._unit, sorted(had, key=self._rules.place)).rest()
         self._has.update(words.raw)
         for code, result in had.items():
-            if words.raw.get(code) != self._backup.raw[code]:
-                self._results[code] = ("differs", _MOVED[result])
+            if (why := words.unread.get(code)) is not None:
+                self._results[code] = ("unread", f"{_HAD[result]}; what it has now could not be read, {why.why}: {why}")
+            elif words.raw[code] != self._backup.raw[code]:
+                self._results[code] = ("differs", f"{_HAD[result]}, and another parameter changed it since")
 
     def _note(self, error: BaseException) -> None:
         """Has *error* say what was restored before it."""

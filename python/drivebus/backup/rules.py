@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from drivebus import checks
+from drivebus.backup.unread import Unread
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.values import group_of
@@ -37,8 +38,12 @@ class Rules:
             address = None
         return (1 << 16 if address is None else address, code)
 
-    def unread(self, code: str, unverified: bool) -> str | None:
+    def unread(self, code: str, unverified: bool) -> Unread | None:
         """Why *code* is not read; None if it is."""
+        reason = self._left_out(code, unverified)
+        return None if reason is None else Unread(reason, "not asked")
+
+    def _left_out(self, code: str, unverified: bool) -> str | None:
         known = self.profile.describe(code)
         if known.address is None:
             return "its address is not known"

@@ -12,6 +12,7 @@ from drivebus.backup import disk
 from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
+from drivebus.backup.unread import Unread, refused
 from drivebus.errors import NotAllowed, Refused
 from drivebus.operations import registers, sending, words
 from drivebus.operations.unit import Unit
@@ -37,16 +38,10 @@ async def origin_of(unit: Unit) -> Origin:
     identification = firmware = None
     register = profile.role("identification")
     if register is not None and unit.evidence.unreadable(register) is None:
-        try:
-            [identification] = await words.read_words(unit, profile.address(register))
-        except Refused:
-            identification = None
+        identification = await _told(unit, register)
     if _FIRMWARE in profile.names() and unit.evidence.unreadable(_FIRMWARE) is None:
-        try:
-            [word] = await words.read_words(unit, profile.address(_FIRMWARE))
-            firmware = str(registers.value(unit, _FIRMWARE, word))
-        except Refused:
-            firmware = None
+        word = await _told(unit, _FIRMWARE)
+        firmware = None if word is None else str(registers.value(unit, _FIRMWARE, word))
     now = datetime.now(timezone.utc).replace(microsecond=0)
     return Origin(
         profile.family,
@@ -61,8 +56,30 @@ async def origin_of(unit: Unit) -> Origin:
     )
 
 
+async def _told(unit: Unit, name: str) -> int | None:
+    """The word of the register *name*; None if the drive has none, or does not tell it.
+
+    Raises:
+        Refused: Twice it was busy, or got a damaged request: that does not say who it is.
+    """
+    address = unit.profile.address(name)
+    for last in (False, True):
+        try:
+            [word] = await words.read_words(unit, address)
+        except Refused as error:
+            if refused(unit.profile, error).why != "lost":
+                return None
+            if last:
+                raise
+        else:
+            return word
+    raise AssertionError  # the second read returned or raised
+
+
 async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
     """Reads every parameter that can be read. What was read before a break is not read again.
+
+    What was lost or refused for another reason than that it is not there, or closed, leaves the file's `.part`.
 
     Raises:
         NotAllowed: Where the file would be, another drive's is; nothing but the identity was asked.
@@ -73,7 +90,9 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     codes = rules.codes()
     if not codes:
         raise NotAllowed(f"{unit.profile.name} has no parameters that are known: there is nothing to keep")
-    unread = {code: reason for code in codes if (reason := rules.unread(code, unit.unverified)) is not None}
+    unread: dict[str, Unread] = {
+        code: reason for code in codes if (reason := rules.unread(code, unit.unverified)) is not None
+    }
     codes = [code for code in codes if code not in unread]
     origin = await origin_of(unit)
     raw: dict[str, int] = {}
@@ -92,13 +111,13 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     reader = Reader(unit, [code for code in codes if code not in raw])
     total, done, steps = len(codes), len(raw), 0
 
-    def taken(complete: bool) -> Backup:
+    def taken(interrupted: bool) -> Backup:
         in_ram = [code for code in raw if code in were_in_ram or sending.is_in_ram(unit, code)]
-        return Backup(origin, raw, unread, unit.profile, complete=complete, in_ram=in_ram)
+        return Backup(origin, raw, unread, unit.profile, interrupted=interrupted, in_ram=in_ram)
 
     def keep() -> None:
         if path is not None:
-            taken(complete=False).save(disk.part_of(path))
+            taken(interrupted=True).save(disk.part_of(path))
 
     # Whether it can be written there at all is known before the drive is asked for an hour.
     keep()
@@ -119,8 +138,10 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
         if path is not None and hasattr(error, "add_note"):
             error.add_note(f"{len(raw)} of {total} parameters are in {disk.part_of(path)}; the rest follows")
         raise
-    backup = taken(complete=True)
-    if path is not None:
+    backup = taken(interrupted=False)
+    if path is not None and not backup.complete:
+        backup.save(disk.part_of(path))
+    elif path is not None:
         backup.save(path)
         disk.remove(disk.part_of(path))
     return backup

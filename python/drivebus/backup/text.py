@@ -9,6 +9,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from drivebus.backup.rules import Rules
+from drivebus.backup.unread import Unread
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile
 from drivebus.profile.plan import labelled
@@ -24,6 +25,7 @@ FORMAT = 1
 _HEAD = """\
 # The parameters of one drive. A line may be changed or taken out: change the value, and the raw word with it or take
 # `raw = …` out. `told` is what the drive told where no document of its family says what that means: leave it as it is.
+# `unread` is why there is no value: the drive has no such parameter, keeps it closed, refused it, or it was lost.
 # `drivebus diff` compares this file with the drive, `drivebus restore` shows what it would write first.
 """
 
@@ -32,6 +34,8 @@ def text(backup: Backup) -> str:
     """The whole file."""
     origin, raw, unread, profile = backup.origin, backup.raw, backup.unread, backup.profile
     header: dict[str, Any] = {"format": FORMAT, "complete": backup.complete}
+    if not backup.complete:
+        header["interrupted"] = backup.interrupted
     lines = [_HEAD.rstrip("\n"), *(f"{key} = {_toml(value)}" for key, value in header.items()), "", "[drive]"]
     for key in (
         "family",
@@ -59,7 +63,7 @@ def text(backup: Backup) -> str:
         if code in raw:
             section.append(_line(backup, code, is_set))
         else:
-            section.append(printable(f"# {code} ({profile.describe(code).label}) is not here: {unread[code]}"))
+            section.append(_lacking(profile.describe(code).label, code, unread[code]))
     lines += ["", "[parameters]", *sections["parameters"]]
     if sections["readings"]:
         lines += [
@@ -88,6 +92,13 @@ def _line(backup: Backup, code: str, is_set: bool) -> str:
         comment += "; in RAM alone, where the program that took this had put it: lost when the drive is switched off"
     inside = ", ".join(f"{key} = {shown}" for key, shown in fields.items())
     return printable(f"{code} = {{ {inside} }}  # {comment}")
+
+
+def _lacking(label: str, code: str, why: Unread) -> str:
+    """The line of a parameter that was not read; a remark if it was not asked for, as the profile says so again."""
+    if why.why == "not asked":
+        return printable(f"# {code} ({label}) is not here: {why}")
+    return printable(f"{code} = {{ unread = {_toml(why.why)}, reason = {_toml(str(why))} }}  # {label}")
 
 
 def _is_beyond(profile: Profile, code: str, raw: int) -> bool:

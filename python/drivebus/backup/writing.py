@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from drivebus.errors import LINE_ERRORS, NotAllowed
+from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
 from drivebus.operations import sending, words
 from drivebus.operations.unit import Unit
+from drivebus.profile.refusals import means
 
 __all__ = ["place", "write"]
 
@@ -28,6 +29,10 @@ async def write(unit: Unit, code: str, raw: int, before: int, *, store: bool) ->
     for attempt in range(1, _ATTEMPTS + 1):
         try:
             await _put(unit, code, address, raw, store=store)
+        except Refused as error:
+            # The drive may be still at it: what it shows then is what counts.
+            if means(unit.profile, error.code) != "taken":
+                raise
         except LINE_ERRORS as error:
             # Where the value was in force already, out of RAM, reading does not tell whether it is kept now.
             if error.started is None or raw == before:

@@ -111,7 +111,7 @@ class _Program(click.Group):
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
     },
-    epilog="Exit codes: 0 done, 1 differs or not all restored, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
+    epilog="Exit codes: 0 done, 1 differs or not all of it, 2 usage or not allowed, 3 no answer, 4 refused, 5 port, "
     "6 bad answer, 7 unconfirmed, 130 interrupted. "
     "These options can stand before the command or behind it, or in the environment: DRIVEBUS_PORT, DRIVEBUS_BAUD, "
     "DRIVEBUS_FORMAT, DRIVEBUS_RS485, DRIVEBUS_UNIT, DRIVEBUS_CONFIG, DRIVEBUS_PROFILE, DRIVEBUS_UNVERIFIED, "

@@ -12,6 +12,7 @@ from click.shell_completion import CompletionItem
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import drivebus
+from drivebus.backup.unread import Unread, counts, in_words
 from drivebus.cli.names import complete_group
 from drivebus.cli.output import counted, remark, show
 from drivebus.cli.session import Session, pass_session, yes_option
@@ -34,29 +35,50 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     """Read every parameter the profile knows into FILE, a text for people and version control.
 
     Writes nothing to the drive. After an interruption, the same command continues where it stopped. Passwords are not
-    read.
+    read. Exit code 1: some were lost, or refused for another reason than that they are not there, or closed; then what
+    was read is in FILE.part, and the same command asks for the rest.
     """
     if not force:
         _keep_older(file)
     with session.drive() as drive, progress_bar(session, "reading") as progress:
         kept = drive.backup(file, not fresh, progress, force=force)
+    place = file if kept.complete else file.with_name(f"{file.name}.part")
     if session.out.as_json:
-        origin = {name: value for name, value in vars(kept.origin).items() if name != "taken"}
-        taken = f"{kept.origin.taken:%Y-%m-%dT%H:%M:%SZ}"
-        session.out.record(
-            {"file": str(file), **origin, "taken": taken, "parameters": len(kept), "unread": kept.unread}
-        )
-        return
+        _show_as_json(session, place, kept)
+    else:
+        _show_backup(session, place, kept)
+    if not kept.complete:
+        lost = [why for why in kept.unread.values() if why.open]
+        remark(f"The backup is not complete: {in_words(lost)}, see above. The same command asks for the rest.")
+        raise click.exceptions.Exit(1)
+
+
+def _show_as_json(session: Session, place: Path, kept: drivebus.Backup) -> None:
+    origin = {name: value for name, value in vars(kept.origin).items() if name != "taken"}
+    session.out.record(
+        {
+            "file": str(place),
+            **origin,
+            "taken": f"{kept.origin.taken:%Y-%m-%dT%H:%M:%SZ}",
+            "parameters": len(kept),
+            "complete": kept.complete,
+            "counts": counts(kept.unread.values()),
+            "unread": kept.unread,
+        }
+    )
+
+
+def _show_backup(session: Session, place: Path, kept: drivebus.Backup) -> None:
     begun = f"{kept.origin.taken:%Y-%m-%d %H:%M} UTC"
     profile = kept.profile
     known = sum(profile.describe(name).kind == "parameter" for name in profile.names())
     session.out.say(
-        f"{file}: {len(kept)} of the {known} parameters that the profile {profile.name} knows, of {session.called}, "
+        f"{place}: {len(kept)} of the {known} parameters that the profile {profile.name} knows, of {session.called}, "
         f"{kept.origin.title}, begun {begun}."
     )
     if kept.unread:
-        session.out.say(f"Not read: {len(kept.unread)}.")
-        session.out.rows(["code", "reason"], kept.unread.items())
+        session.out.say(f"Not read: {in_words(kept.unread.values())}.")
+        session.out.rows(["code", "reason", "why"], [[code, why, why.why] for code, why in kept.unread.items()])
 
 
 def _keep_older(file: Path) -> None:
@@ -169,26 +191,35 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
     """Show how B, or the drive, differs from A.
 
     A and B are files. "factory" stands for the factory settings, as far as they are known. Only the parameters in A are
-    compared with the drive. Exit code 0: nothing differs. 1: something differs. Other exit codes are as usual.
+    compared with the drive. Exit code 0: nothing differs. 1: something differs, or could not be compared because it was
+    lost or refused. Other exit codes are as usual.
     """
     found, profile = _diff(session, a, b, everything, force)
+    unsettled = found.unsettled()
     if session.out.as_json:
         for each in found:
             session.out.record(vars(each))
+        for code, why in unsettled.items():
+            session.out.record({"code": code, "not_compared": why.why, "reason": why})
     else:
         sides = (found.left if a == _FACTORY else a, found.right if b is None else b)
-        rest = f" {len(found.uncompared)} were not compared." if found.uncompared else ""
+        told = in_words(why for why in found.uncompared.values() if isinstance(why, Unread))
+        kinds = f" ({told})" if told else ""
+        rest = f" {len(found.uncompared)} were not compared{kinds}." if found.uncompared else ""
         hint = " --all lists them." if rest and not everything else ""
         session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.{rest}{hint}")
-        if found:
+        if len(found):
             rows = [
                 [each.code, *_texts(profile, each.code, each.left, each.right), each.unit, each.label, each.reason]
                 for each in found
             ]
             session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
-        if everything and found.uncompared:
+        listed = found.uncompared if everything else unsettled
+        if listed:
             session.out.say("Not compared:")
-            session.out.rows(["code", "reason"], found.uncompared.items())
+            session.out.rows(["code", "reason"], listed.items())
+    if unsettled:
+        remark(f"{counted(len(unsettled), 'parameter')} could not be compared: {in_words(unsettled.values())}.")
     if found:
         raise click.exceptions.Exit(1)
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+import drivebus
+from drivebus.backup.unread import in_words
 from drivebus.cli.backup import progress_bar
 from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
@@ -24,7 +26,8 @@ def discover(session: Session, folder: Path, groups: tuple[str, ...], fresh: boo
     """Ask the drive which parameters it has, and put those without a row into FOLDER, as a profile to go on with.
 
     Sends reads only, ten thousand or so: three minutes at 19200 baud. After an interruption, the same command continues
-    where it stopped.
+    where it stopped. Exit code 1: of some it is not settled whether the drive has them; the same command asks for them
+    again.
     """
     with session.drive() as drive, progress_bar(session, "asking") as progress:
         found = drive.discover(folder, groups=groups or None, resume=not fresh, progress=progress, base=base)
@@ -39,11 +42,23 @@ def discover(session: Session, folder: Path, groups: tuple[str, ...], fresh: boo
                 "unlisted": found.unlisted,
                 "missing": found.missing,
                 "refused": dict(found.refused),
+                "complete": found.complete,
+                "unsettled": {code: {"why": why.why, "reason": why} for code, why in found.unsettled.items()},
                 "doubtful": list(found.doubtful),
                 "requests": found.requests,
             }
         )
-        return
+    else:
+        _show(session, folder, found)
+    if not found.complete:
+        remark(
+            f"Of {counted(len(found.unsettled), 'number')} it is not settled whether the drive has them: "
+            f"{in_words(found.unsettled.values())}. The same command asks for them again."
+        )
+        raise click.exceptions.Exit(1)
+
+
+def _show(session: Session, folder: Path, found: drivebus.Discovery) -> None:
     new = found.unlisted
     session.out.say(
         f"{folder}: {session.called} has {counted(len(found.words), 'parameter')}. {len(found.words) - len(new)} of "
@@ -54,6 +69,9 @@ def discover(session: Session, folder: Path, groups: tuple[str, ...], fresh: boo
     if found.refused:
         session.out.say("There, but not told:")
         session.out.rows(["code", "reason"], found.refused.items())
+    if found.unsettled:
+        session.out.say("Not settled:")
+        session.out.rows(["code", "why", "reason"], [[code, why.why, why] for code, why in found.unsettled.items()])
     if found.doubtful:
         remark(
             f"{', '.join(found.doubtful)}: the drive answers alike to whatever is asked there, also to numbers that no "

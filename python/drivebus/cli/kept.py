@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +13,8 @@ import click
 
 import drivebus
 from drivebus.capture import Captured, Writer
+from drivebus.capture.standing import LOOK, Standing
+from drivebus.cli.output import remark
 
 __all__ = ["Kept"]
 
@@ -29,6 +32,9 @@ class Kept:
     Raises:
         click.UsageError: The file is there.
         drivebus.NotAllowed: It cannot be written.
+
+    Attributes:
+        gone: Why the file was not there any more, while it was written; empty if it was.
     """
 
     def __init__(self, target: str, force: bool, port: str, settings: str, link: str) -> None:
@@ -37,6 +43,9 @@ class Kept:
         self._writer: Writer | None = None
         self._is_new = False
         self._stream = self._opened(target, force)
+        self._standing = Standing(self._path, os.fstat(self._stream.fileno())) if target != "-" else None
+        self._look_at = float("-inf")
+        self.gone = ""
         if not self._may_be_changed():
             self._begin()
 
@@ -46,11 +55,16 @@ class Kept:
         return self._writer is None
 
     def write(self, frame: Captured) -> None:
-        """Writes *frame*.
+        """Writes *frame*, if the file is there still.
 
         Raises:
             OSError: The disk is full, or who read the pipe has gone.
         """
+        if (frame.time or 0.0) >= self._look_at:
+            self._look_at = (frame.time or 0.0) + LOOK
+            self._look()
+        if self.gone:
+            return
         (self._writer or self._begin()).write(frame)
 
     def __enter__(self) -> Kept:
@@ -59,10 +73,19 @@ class Kept:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._look()
         self._stream.close()
-        # What was there before is not ours.
-        if self._is_new and self.is_empty:
+        # What was there before is not ours, and neither is what stands there now in its place.
+        if self._is_new and self.is_empty and not self.gone:
             self._path.unlink(missing_ok=True)
+
+    def _look(self) -> None:
+        """Says, once, that the file does not stand any more where it was made."""
+        if self.gone or self._standing is None:
+            return
+        self.gone = self._standing.gone()
+        if self.gone:
+            remark(f"Warning: {self._path} was not there any more: {self.gone}; nothing more is kept.")
 
     def _opened(self, target: str, force: bool) -> BinaryIO:
         if target == "-":

@@ -9,6 +9,7 @@ import click
 
 import drivebus
 from drivebus.cli import rules, skeleton
+from drivebus.cli.elsewhere import started_by
 from drivebus.cli.listing import Listing
 from drivebus.cli.names import complete_profile
 from drivebus.cli.output import remark
@@ -80,7 +81,8 @@ def show(session: Session, family: str) -> None:
 def check(context: click.Context, session: Session, folder: Path) -> None:
     """Check the profile in FOLDER. Each mistake is named with its file, its line, and what would be right.
 
-    Ends with exit code 2 if there are mistakes. A profile is read, never executed.
+    Ends with exit code 2 if there are mistakes. A warning says which halts of it start a shipped family: that is no
+    mistake, but a drive of that family at this address would run. A profile is read, never executed.
     """
     problems = drivebus.Profile.check(folder)
     for problem in problems:
@@ -92,10 +94,18 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
         some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
         remark(f"Error: {folder} has {some}; the profile is not used until all is right.")
         context.exit(2)
-    counts = drivebus.Profile.load(folder).counts()
+    profile = drivebus.Profile.load(folder)
+    _warn(profile)
+    counts = profile.counts()
     totals = {kind: counts[kind]["total"] for kind in KINDS}
     rows = ", ".join(f"{total} {kind if total != 1 else kind.removesuffix('s')}" for kind, total in totals.items())
     session.out.say(f"{folder} is sound: {rows}.")
+
+
+def _warn(profile: drivebus.Profile) -> None:
+    """Says which halts of *profile* are a start to other families."""
+    for each in started_by(profile):
+        remark(f"Warning: {profile.name}: {each}; it starts such a drive, where one hangs at the address.")
 
 
 def _placed(problem: dict[str, Any]) -> str:

@@ -23,6 +23,9 @@ from drivebus.record.files import format_of
 
 __all__ = ["COMMANDS"]
 
+_SHOWN = 3
+"""So many of the newest messages about the files stay on the screen."""
+
 _EACH = 0.25
 """Seconds between two looks at how far it has come."""
 
@@ -61,7 +64,8 @@ def record(
     """Record registers into a file until Ctrl-C: all monitor registers, or those named.
 
     FILE ends with .csv, .jsonl, .sqlite, .db or .parquet. `drivebus plot FILE` draws it. Gaps and faults get rows of
-    their own. A kill or a full disk costs the last second at most.
+    their own. A kill or a full disk costs the last second at most. If FILE is removed or replaced meanwhile, that is
+    told at once, and a new file goes on. Exit code 1: that happened, or rows were lost.
     """
     out = session.out
     format_of(target)
@@ -94,6 +98,7 @@ def record(
                     live.enter_context(Live(shown, console=out.console, refresh_per_second=1 / _EACH, transient=True))
                 while not recorder.wait(_EACH):
                     shown.say_problem(session)
+                    shown.say_what_befell(session)
                     if duration is not None and now() - began >= duration:
                         break
                     if count is not None and recorder.rows >= count:
@@ -102,6 +107,7 @@ def record(
             pass
         finally:
             problem = _close(recorder)
+            shown.say_what_befell(session)
     _tell(session, recorder, problem)
 
 
@@ -113,6 +119,7 @@ class _Shown:
         self._now = now
         self._began = now()
         self._problem = ""
+        self._said = 0
 
     def __rich__(self) -> Text:
         recorder, took = self._recorder, self._now() - self._began
@@ -122,7 +129,17 @@ class _Shown:
             f"{printable(recorder.files[-1].name)}  {took:.0f} s  {recorder.rows} rows  {rate:.1f}/s  "
             f"{_bytes(recorder.size)}  {counted(recorder.gaps, 'gap')}  {late}Ctrl-C ends it"
         )
+        for told in recorder.told[-_SHOWN:]:
+            text.append(f"\n{printable(told)}", "yellow")
         return text if not recorder.problem else text.append(f"\nnot written now: {recorder.problem}", "yellow")
+
+    def say_what_befell(self, session: Session) -> None:
+        """Says what befell the files since it was said last; where somebody watches, only in the end."""
+        if session.out.live and not self._recorder.closed:
+            return
+        for told in self._recorder.told[self._said :]:
+            remark(f"Warning: {told}.")
+            self._said += 1
 
     def say_problem(self, session: Session) -> None:
         """Says that the file cannot be written, once, where nobody watches."""
@@ -175,18 +192,24 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
         "missing": recorder.missing,
         "late": recorder.late,
         "lost": recorder.lost,
+        "told": recorder.told,
     }
     if session.out.as_json:
         session.out.record(told)
     else:
         gaps = f", {counted(recorder.gaps, 'gap')} ({recorder.missing} samples missing)"
         into = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
-        whole = "" if recorder.late else ", no gap"
+        whole = "" if recorder.late or recorder.lost else ", no gap"
         session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else whole}.")
         if recorder.late:
             _tell_late(recorder)
     if problem:
         remark(f"Error: {problem}")
+    elif recorder.lost:
+        remark(f"Error: {counted(recorder.lost, 'row')} could not be kept.")
+    elif recorder.told:
+        remark("Error: it was not written as it was to be: see above.")
+    if problem or recorder.lost or recorder.told:
         raise click.exceptions.Exit(1)
     if not recorder.rows and recorder.missing:
         remark(f"Error: no drive answered. `{session.doctor()}` looks at adapter and line.")

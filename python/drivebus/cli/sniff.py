@@ -161,6 +161,8 @@ def _told(session: Session, figures: Figures, target: str | None, kept: Kept | N
             "Nothing was heard: nobody speaks there, the wires are off or crossed, or the adapter only hears itself. "
             f"`{session.doctor()}` looks at the line."
         )
+    if kept is not None and kept.gone:
+        raise click.exceptions.Exit(1)
     if kept is not None and kept.is_empty:
         remark(f"{target} was not written: there was nothing to write.")
     elif target not in (None, "-"):

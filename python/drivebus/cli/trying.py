@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
@@ -15,6 +16,7 @@ from rich.live import Live
 from rich.text import Text
 
 import drivebus
+from drivebus.capture.standing import Standing
 from drivebus.cli import names
 from drivebus.cli.csv_rows import CsvRows
 from drivebus.cli.missing import NamesAllMissing
@@ -192,12 +194,14 @@ def _do(
                     error.add_note(text)
             raise
         _show(session, drive, trial)
+        is_kept = kept is None or kept.is_there()
     if picture is not None:
         from drivebus.plot import draw, of_samples
 
         draw(of_samples(trial.samples, f"{session.called}, {trial.kind} {_path(course)}"), picture)
     if trial.aborted is not None:
         remark(f"Error: the trial was aborted: {trial.aborted}")
+    if trial.aborted is not None or not is_kept:
         raise click.exceptions.Exit(1)
 
 
@@ -215,6 +219,8 @@ class _Kept:
 
     def __init__(self, opened: ExitStack, file: str, drive: drivebus.Drive) -> None:
         self._file = opened.enter_context(_new(file))
+        self._name = file
+        self._standing = Standing(Path(file), os.fstat(self._file.fileno()))
         self._drive = drive
         self._rows: CsvRows | None = None
 
@@ -227,6 +233,13 @@ class _Kept:
             }
             self._rows = CsvRows(self._file, rows, doubtful)
         self._rows.write(time, values)
+
+    def is_there(self) -> bool:
+        """Whether the file stands where it was made; says so if it does not."""
+        why = self._standing.gone()
+        if why:
+            remark(f"Error: {self._name} was not there any more: {why}; the samples are not kept.")
+        return not why
 
 
 class _Shown:

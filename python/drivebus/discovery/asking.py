@@ -28,9 +28,12 @@ async def discover(
 ) -> Discovery:
     """Asks the drive, by reads alone, which parameters it has. Nothing is written to it.
 
-    A parameter is there if a read that covered it was answered, and not there if it was refused by itself. With
-    *folder*, a profile is made there that lies over that of the family, with a row for each parameter that it lacks.
-    Until then what was found is in `FOLDER.part`: after a break, the same call goes on where it was.
+    A parameter is there if a read that covered it was answered, and not there if the drive said of it by itself that
+    there is no such address. Closed ones are there, too. What was lost, or refused for another reason, is `unsettled`.
+
+    With *folder*, a profile is made there that lies over that of the family, with a row for each parameter that it
+    lacks. Until then what was found is in `FOLDER.part`: after a break, the same call goes on where it was. It stays
+    there while something is unsettled: the same call asks for that again, if nobody edited the folder.
 
     Args:
         folder: Where to put the profile; None makes none. `Discovery.save` makes one later.
@@ -43,7 +46,7 @@ async def discover(
         NotAllowed: The codes of the family do not tell addresses; or there is something in the folder; or the drive is
             another one, or answers to numbers that no parameter has.
         Refused: The drive is locked by a password.
-        NoAnswer, BadAnswer, PortError: The line failed; what was found until then is kept.
+        NoAnswer, BadAnswer, PortError: Nothing is answered any more; what was found until then is kept.
     """
     from pathlib import Path
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from drivebus import checks
 from drivebus.backup import disk
+from drivebus.backup.unread import Unread
 from drivebus.discovery import guesses
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
@@ -54,7 +55,9 @@ class Discovery:
         profile: What it was asked by.
         taken: When the search began.
         words: The word of each code that it has, as it is on the wire.
-        refused: Codes that it has and does not tell, with what it said.
+        refused: Codes that it has and keeps closed, with what it said.
+        unsettled: Codes of which nothing is known: no answer came, or it refused for a reason that says nothing of the
+            address. Each with that reason, whose `why` is `"lost"` or `"refused"`.
         doubtful: Groups that answer alike to whatever is asked, so that an answer tells nothing, such as `"P05"`.
         groups: What was searched.
         requests: How many reads it took.
@@ -65,6 +68,7 @@ class Discovery:
     taken: datetime
     words: Mapping[str, int]
     refused: Mapping[str, str]
+    unsettled: Mapping[str, Unread]
     doubtful: tuple[str, ...]
     groups: tuple[str, ...]
     requests: int
@@ -85,8 +89,13 @@ class Discovery:
             if row.code is not None
             and row.address is not None
             and f"P{row.address >> 8:02}" in searched
-            and row.code not in {*self.words, *self.refused}
+            and row.code not in {*self.words, *self.refused, *self.unsettled}
         )
+
+    @property
+    def complete(self) -> bool:
+        """Whether of each number that was asked for it is known whether the drive has it."""
+        return not self.unsettled
 
     def save(self, folder: str | os.PathLike[str], base: str | None = None) -> Path:
         """Writes a profile that lies over that of the drive, as a folder with `profile.toml` and `parameters.csv`.
@@ -100,7 +109,15 @@ class Discovery:
         """
         place = Path(checks.path("folder", folder))
         self.check(self.profile, place, base)
-        made = {"parameters.csv": self.table(), "profile.toml": self.rules(place.name, base)}
+        return self.write(place, base)
+
+    def write(self, place: Path, base: str | None) -> Path:
+        """The same, whatever is there.
+
+        Raises:
+            NotAllowed: It cannot be written there.
+        """
+        made = self.files(place.name, base)
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -108,6 +125,10 @@ class Discovery:
         for name, text in made.items():
             disk.write(place / name, text)
         return place
+
+    def files(self, name: str, base: str | None) -> dict[str, str]:
+        """The text of each file of a profile called *name*, by its name."""
+        return {"parameters.csv": self.table(), "profile.toml": self.rules(name, base)}
 
     @staticmethod
     def check(profile: Profile, folder: Path, base: str | None = None) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from drivebus.backup import disk
 from drivebus.backup.model import Origin
+from drivebus.backup.unread import WHY, Unread
 from drivebus.errors import NotAllowed
 
 __all__ = ["Group", "Kept"]
@@ -22,12 +23,14 @@ class Group:
 
     Attributes:
         words: The word of each number that is there.
-        refused: Numbers that are there and were not told, and what the drive said.
+        refused: Numbers that are there and closed, and what the drive said.
+        unsettled: Numbers of which nothing is known, and why.
         doubtful: Whether it answers to numbers that cannot be there.
     """
 
     words: dict[int, int] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
+    unsettled: dict[int, Unread] = field(default_factory=dict)
     doubtful: bool = False
 
 
@@ -65,10 +68,38 @@ class Kept:
         }
         kept = cls(path, whose, origin.taken)
         if path is not None and resume and disk.is_there(path):
-            kept._take(disk.read(path))
+            kept._take(cls.of(path))
         # Whether it can be written there at all is known before the drive is asked for minutes.
         kept.keep()
         return kept
+
+    @classmethod
+    def of(cls, path: Path) -> Kept:
+        """What an earlier call left in *path*, of whatever drive.
+
+        Raises:
+            NotAllowed: It cannot be read.
+        """
+        data = disk.read(path)
+        try:
+            whole = json.loads(data)
+            whose = dict(whole["discovery"])
+            taken, requests = datetime.fromisoformat(whole["taken"]), int(whole["requests"])
+            groups = {
+                int(group): Group(
+                    _numbered(one["words"], int),
+                    _numbered(one["refused"], str),
+                    _numbered(one.get("unsettled", {}), _why),
+                    bool(one["doubtful"]),
+                )
+                for group, one in whole["groups"].items()
+            }
+        except (ValueError, TypeError, KeyError, AttributeError):
+            raise NotAllowed(
+                f"{path} is not what an interrupted discovery left; nothing was asked. Give another name, or "
+                "resume=False (`--fresh`) replaces it"
+            ) from None
+        return cls(path, whose, taken, groups, requests)
 
     def keep(self) -> None:
         """Writes the file anew, whole."""
@@ -78,6 +109,7 @@ class Kept:
             str(group): {
                 "words": {str(index): word for index, word in one.words.items()},
                 "refused": {str(index): told for index, told in one.refused.items()},
+                "unsettled": {str(index): [why.why, str(why)] for index, why in one.unsettled.items()},
                 "doubtful": one.doubtful,
             }
             for group, one in self.groups.items()
@@ -90,27 +122,23 @@ class Kept:
         if self.path is not None:
             disk.remove(self.path)
 
-    def _take(self, data: bytes) -> None:
-        try:
-            whole = json.loads(data)
-            whose = dict(whole["discovery"])
-            taken, requests = datetime.fromisoformat(whole["taken"]), int(whole["requests"])
-            groups = {
-                int(group): Group(_numbered(one["words"], int), _numbered(one["refused"], str), bool(one["doubtful"]))
-                for group, one in whole["groups"].items()
-            }
-        except (ValueError, TypeError, KeyError, AttributeError):
-            raise NotAllowed(
-                f"{self.path} is not what an interrupted discovery left; nothing was asked. Give another name, or "
-                "resume=False (`--fresh`) replaces it"
-            ) from None
-        if whose != self.whose:
-            other = ", ".join(f"{name} {whose.get(name)}" for name in self.whose if whose.get(name) != self.whose[name])
+    def _take(self, left: Kept) -> None:
+        if left.whose != self.whose:
+            other = ", ".join(
+                f"{name} {left.whose.get(name)}" for name in self.whose if left.whose.get(name) != self.whose[name]
+            )
             raise NotAllowed(
                 f"{self.path} was begun with another drive ({other}); nothing was asked. Give another name, or "
                 "resume=False (`--fresh`) starts again"
             )
-        self.taken, self.requests, self.groups = taken, requests, groups
+        self.taken, self.requests, self.groups = left.taken, left.requests, left.groups
+
+
+def _why(given: list[str]) -> Unread:
+    why, reason = given
+    if why not in WHY:
+        raise ValueError(why)
+    return Unread(str(reason), why)
 
 
 def _numbered(given: dict[str, Any], kind: Callable[[Any], Any]) -> dict[int, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from drivebus import checks
 from drivebus.backup import disk
 from drivebus.backup.taking import origin_of
+from drivebus.backup.unread import Unread, lost, refused
 from drivebus.discovery.found import Discovery
 from drivebus.discovery.kept import Group, Kept
 from drivebus.discovery.walk import LAST, Walk
@@ -23,11 +24,11 @@ Progress = Callable[[int, int], object]
 _BEYOND = 0xFF
 """A number that no parameter has: whoever answers it answers anything."""
 
-_NO_SUCH_ADDRESS = 0x02
 _LOCKED = "password_protected"
 
 _ATTEMPTS = 6
-"""How often a read is begun whose answer was lost, beyond the repeats of the line itself."""
+"""How often a read is begun whose answer was lost, beyond the repeats of the line itself. A refusal that says that the
+drive was busy, or that the request came damaged, counts as that."""
 
 
 async def search(
@@ -41,10 +42,10 @@ async def search(
 ) -> Discovery:
     """See `Drive.discover`."""
     wanted = _groups(unit, groups)
-    if place is not None:
+    if place is not None and not (resume and _is_unchanged(unit, place, base)):
         Discovery.check(unit.profile, place, base)
-    await unit.memory.identity.check(unit.bus)
     part = None if place is None else disk.part_of(place)
+    await unit.memory.identity.check(unit.bus)
     kept = Kept.begin(part, await origin_of(unit), resume=resume)
     asking = _Search(unit, kept)
     try:
@@ -56,6 +57,9 @@ async def search(
             if group not in kept.groups:
                 kept.groups[group] = await asking.group(group)
                 kept.keep()
+            elif kept.groups[group].unsettled:
+                await asking.settle(group, kept.groups[group])
+                kept.keep()
         if progress is not None:
             progress(len(wanted), len(wanted))
     except BaseException as error:
@@ -64,9 +68,24 @@ async def search(
         raise
     found = _result(unit, kept, wanted)
     if place is not None:
-        found.save(place, base=base)
-        kept.done()
+        found.write(place, base)
+        if found.complete:
+            kept.done()
     return found
+
+
+def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
+    """Whether *place* is what an earlier call made that did not settle all, and nobody edited it."""
+    if not (place.name and place.is_dir() and disk.is_there(disk.part_of(place))):
+        return False
+    kept = Kept.of(disk.part_of(place))
+    if {*kept.groups} - {*unit.profile.parameter_groups()}:
+        return False
+    found = _result(unit, kept, [*kept.groups])
+    files = found.files(place.name, base)
+    return {each.name for each in place.iterdir()} == {*files} and all(
+        disk.read(place / name) == text.encode() for name, text in files.items()
+    )
 
 
 class _Search:
@@ -80,7 +99,13 @@ class _Search:
         """Raises `NotAllowed` if the drive answers to numbers that no parameter has: it would have everything."""
         ends = dict.fromkeys((wanted[0], wanted[len(wanted) // 2], wanted[-1]))
         answers = [await self._read(group, _BEYOND, 1) for group in ends]
-        if not any(isinstance(answer, Refused) for answer in answers):
+        refusals = [answer for answer in answers if isinstance(answer, Refused)]
+        if any(self._why(refusal).why != "lost" for refusal in refusals):
+            return
+        # That it was busy, or got a damaged request, proves nothing.
+        for refusal in refusals:
+            raise refusal
+        if all(isinstance(answer, list) for answer in answers):
             raise NotAllowed(
                 f"unit {self._unit.address} answers at {' and '.join(_address(group) for group in ends)}, where no "
                 "parameter can be: what it answers does not tell what it has. Nothing was written",
@@ -93,25 +118,44 @@ class _Search:
         while (asked := walk.ask()) is not None:
             first, count = asked
             answer = await self._read(group, first, count)
-            if isinstance(answer, Refused):
-                walk.was_refused(count, "" if answer.code == _NO_SUCH_ADDRESS else str(answer))
-            else:
+            if isinstance(answer, list):
                 walk.answered(answer)
-        told = {index: how for index, how in walk.refused.items() if how}
+            else:
+                walk.was_refused(count, self._why(answer))
+        told = {index: why for index, why in walk.refused.items() if why.why != "not there"}
         # A group that is full to its last number may be one that has no end, and one that never says that there is no
-        # such address says nothing else either.
-        full = len(walk.found) + len(told) > LAST
-        if full and (not walk.found or not isinstance(await self._read(group, _BEYOND, 1), Refused)):
+        # such address says nothing else either. What was lost says nothing of the group.
+        full = len(walk.found) + sum(why.why != "lost" for why in told.values()) > LAST
+        if full and (not walk.found or isinstance(await self._read(group, _BEYOND, 1), list)):
             return Group(doubtful=True)
-        return Group(walk.found, told)
+        found = Group(walk.found)
+        for index, why in told.items():
+            _sort_in(found, index, why)
+        return found
 
-    async def _read(self, group: int, first: int, count: int) -> list[int] | Refused:
-        """The words, or how they were refused.
+    async def settle(self, group: int, kept: Group) -> None:
+        """Asks once more for what is not settled of *group*."""
+        for index in sorted(kept.unsettled):
+            answer = await self._read(group, index, 1)
+            del kept.unsettled[index]
+            if isinstance(answer, list):
+                [kept.words[index]] = answer
+            else:
+                _sort_in(kept, index, self._why(answer))
+
+    def _why(self, answer: Refused | NoAnswer | BadAnswer) -> Unread:
+        if isinstance(answer, Refused):
+            return refused(self._unit.profile, answer)
+        return lost(answer)
+
+    async def _read(self, group: int, first: int, count: int) -> list[int] | Refused | NoAnswer | BadAnswer:
+        """The words, or how they were refused, or lost however often they were asked for while others are answered.
 
         Raises:
             Refused: The drive is locked: it would refuse each.
             NotAllowed: Another drive answers at this address since the port was opened again.
-            NoAnswer, BadAnswer, PortError: However often it was asked.
+            NoAnswer, BadAnswer: Nothing is answered any more.
+            PortError: See there.
         """
         unit = self._unit
         for attempt in range(1, _ATTEMPTS + 1):
@@ -122,14 +166,28 @@ class _Search:
             except Refused as error:
                 if error.name == _LOCKED:
                     raise
-                return error
-            except (NoAnswer, BadAnswer):
+                if attempt == _ATTEMPTS or self._why(error).why != "lost":
+                    return error
+            except (NoAnswer, BadAnswer) as error:
                 if attempt == _ATTEMPTS:
-                    raise
+                    if not await self._is_heard(group):
+                        raise
+                    return error
             else:
                 await unit.memory.identity.check(unit.bus, judged=False)
                 return came
         raise AssertionError  # the last attempt returns or raises
+
+    async def _is_heard(self, group: int) -> bool:
+        """Whether the drive answers at all: then it is one number that it is silent about."""
+        self._kept.requests += 1
+        try:
+            await words.read_words(self._unit, group << 8 | _BEYOND)
+        except (NoAnswer, BadAnswer):
+            return False
+        except Refused:
+            return True
+        return True
 
 
 def _groups(unit: Unit, groups: Sequence[str] | None) -> list[int]:
@@ -167,23 +225,35 @@ def _result(unit: Unit, kept: Kept, wanted: Sequence[int]) -> Discovery:
     second = {row.address + 1 for row in rows if row.address is not None and row.words == 2}
     words: dict[str, int] = {}
     refused: dict[str, str] = {}
+    unsettled: dict[str, Unread] = {}
     for group in wanted:
-        for index, word in kept.groups[group].words.items():
+        for index, word in sorted(kept.groups[group].words.items()):
             address = group << 8 | index
             if address not in second:
                 words[codes.get(address) or _code(group, index)] = word
         for index, how in kept.groups[group].refused.items():
             refused[codes.get(group << 8 | index) or _code(group, index)] = how
+        for index, why in kept.groups[group].unsettled.items():
+            unsettled[codes.get(group << 8 | index) or _code(group, index)] = why
     return Discovery(
         unit=unit.address,
         profile=profile,
         taken=kept.taken,
         words=words,
         refused=refused,
+        unsettled=unsettled,
         doubtful=tuple(_named(group) for group in wanted if kept.groups[group].doubtful),
         groups=tuple(map(_named, wanted)),
         requests=kept.requests,
     )
+
+
+def _sort_in(group: Group, index: int, why: Unread) -> None:
+    """Notes in *group* that the number *index* was not told, for *why*."""
+    if why.open:
+        group.unsettled[index] = why
+    elif why.why != "not there":
+        group.refused[index] = str(why)
 
 
 def _named(group: int) -> str:

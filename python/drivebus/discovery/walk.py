@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from drivebus.backup.unread import Unread
+
 __all__ = ["LAST", "Walk"]
 
 LAST = 99
@@ -30,7 +32,7 @@ class Walk:
 
     most: int
     found: dict[int, int] = field(default_factory=dict)
-    refused: dict[int, str] = field(default_factory=dict)
+    refused: dict[int, Unread] = field(default_factory=dict)
     _next: int = 0
     _count: int = 0
     _end: int | None = None
@@ -51,7 +53,7 @@ class Walk:
         # The whole of what is left before a known end was refused before: half of it may be answered.
         self._count = self.most if self._end is None else max(1, (self._end - self._next) // 2)
 
-    def was_refused(self, count: int, how: str) -> None:
+    def was_refused(self, count: int, how: Unread) -> None:
         """Takes that the drive refused the read of *count* words, and *how*."""
         if count > 1:
             # One of these is not there; the run ends before.

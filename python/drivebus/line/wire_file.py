@@ -11,6 +11,7 @@ from typing import BinaryIO, cast
 from drivebus import checks
 from drivebus._native import SerialFormat
 from drivebus.capture import Captured, Writer
+from drivebus.capture.standing import LOOK, Standing
 from drivebus.errors import DrivebusWarning, NotAllowed
 
 __all__ = ["WireFile"]
@@ -40,9 +41,11 @@ class WireFile:
         try:
             self._writer = Writer(self._stream, port, settings)
         except OSError as error:
-            self.end()
+            self._close()
             raise self._unwritten(error) from None
         self._ahead = 0.0
+        self._standing = Standing(Path(self._name), os.fstat(self._stream.fileno()))
+        self._look_at = float("-inf")
 
     def _unwritten(self, error: OSError | ValueError) -> NotAllowed:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
@@ -53,19 +56,41 @@ class WireFile:
         self._ahead = time() - now
 
     def write(self, at: float, sent: bool, frame: bytes) -> None:
-        """Writes *frame*, which went over the line at *at*; a disk that is full ends the file, and not the line."""
+        """Writes *frame*, which went over the line at *at*.
+
+        A disk that is full, or a file that is not there any more, ends the file, and not the line.
+        """
+        if not self._stream.closed and at >= self._look_at:
+            self._look_at = at + LOOK
+            self._look()
         if self._stream.closed:
             return
         try:
             self._writer.write(Captured(at + self._ahead, frame, sent))
         except OSError as error:
-            self.end()
+            self._close()
             warnings.warn(
                 f"{self._name} is not written any more: {error.strerror or error}", DrivebusWarning, stacklevel=2
             )
 
+    def _look(self) -> None:
+        """Ends the file and says so if it does not stand where it was made."""
+        why = self._standing.gone()
+        if why:
+            self._close()
+            warnings.warn(
+                f"{self._name} was not there any more: {why}; nothing more is kept",
+                DrivebusWarning,
+                stacklevel=3,
+            )
+
     def end(self) -> None:
         """Closes the file."""
+        if not self._stream.closed:
+            self._look()
+        self._close()
+
+    def _close(self) -> None:
         try:
             self._stream.close()
         except OSError:  # it was said when it was written

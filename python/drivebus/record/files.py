@@ -43,6 +43,19 @@ class Sink(Protocol):
     def size(self) -> int:
         """Bytes that it has by now."""
 
+    def gone(self) -> str:
+        """Why what it has written does not stand where it was written any more; empty while it does."""
+
+    def move(self, path: Path) -> int | None:
+        """Goes on in a new file at *path*, with what it has written.
+
+        Returns:
+            How many rows with values it had to leave behind; None: it cannot tell, and nothing was made.
+
+        Raises:
+            OSError: There is something at *path*, or it cannot be written there; nothing was made.
+        """
+
     def close(self) -> None:
         """Ends it.
 

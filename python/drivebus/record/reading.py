@@ -31,7 +31,7 @@ class Event:
     Attributes:
         time: Unix time in seconds.
         drive: Whose it is; empty of what is of no drive.
-        kind: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`, `recording` or `end`.
+        kind: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`, `moved`, `recording` or `end`.
         text: What there is to say of it.
     """
 

@@ -6,9 +6,9 @@ import os
 import threading
 import warnings
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
-from time import monotonic, time
+from time import monotonic
 from types import TracebackType
 from typing import Any
 
@@ -20,19 +20,14 @@ from drivebus.errors import DrivebusWarning, NotAllowed
 from drivebus.line.samples import Names, Sample
 from drivebus.poll import Poll
 from drivebus.record.events import Witness
-from drivebus.record.files import Sink, format_of, sink_for
-from drivebus.record.table import Recorded, Row, Table
+from drivebus.record.files import format_of
+from drivebus.record.series import Series
+from drivebus.record.table import Recorded, Table
 
 __all__ = ["Recorder"]
 
 _LOOK_UP = 0.1
 """Seconds between two looks at what has come."""
-
-_KEPT = 100_000
-"""Rows that wait while the file cannot be written; the oldest give way."""
-
-_AGAIN = 1.0
-"""Seconds after which a file that could not be written is tried again."""
 
 _LARGEST = 1 << 50
 _LONGEST = 31_536_000.0
@@ -52,7 +47,9 @@ class Recorder:
     tells the drives, lines, profiles and registers as JSON; the last is the `end`. A file without that was cut off.
 
     Nothing older than a second is lost if this program is killed. If the disk is full, a warning says so, rows are kept
-    in memory (100 000 at most), and the file goes on when there is room.
+    in memory (100 000 at most), and the file goes on when there is room. If the file is removed, renamed or replaced,
+    which is looked at once a second, a warning says so at once, and a new file goes on at its path, or at `run-2.csv`
+    where something else stands there now, with all its rows as far as they can still be read.
 
     On a line in virtual time nothing is recorded by itself: `wait` lets time move.
 
@@ -76,15 +73,12 @@ class Recorder:
         gaps: Times at which a drive began to be missing.
         missing: Samples without values.
         late: Samples that were due and were not taken, because the line was busy.
-        lost: Rows that gave way because the file could not be written.
+        lost: Rows that gave way because the file could not be written, or that went with a file that is gone.
+        told: What befell the files, as it was warned of: one that was not there any more, one that has no end.
         problem: Why the file cannot be written now; empty if it can.
     """
 
-    files: list[Path]
-    rows: int
     gaps: int
-    lost: int
-    problem: str
 
     def __init__(
         self,
@@ -98,33 +92,30 @@ class Recorder:
         rotate_seconds: float | None = None,
         replace: bool = False,
     ) -> None:
-        self._path = Path(path)
-        format_of(self._path)
-        self._most = None if rotate_bytes is None else checks.whole("rotate_bytes", rotate_bytes, 1, _LARGEST)
-        self._longest = (
+        place = Path(path)
+        format_of(place)
+        most = None if rotate_bytes is None else checks.whole("rotate_bytes", rotate_bytes, 1, _LARGEST)
+        longest = (
             None
             if rotate_seconds is None
             else checks.number("rotate_seconds", rotate_seconds, 0.0, _LONGEST, above=True)
         )
-        self._replace = replace
         recorded = _recorded(drives, labels or {}, state)
-        self._table = Table(list(recorded.values()), interval, _native.__version__)
-        self._witnesses = {drive: Witness(known, self._table) for drive, known in recorded.items()}
-        self.files = []
-        self.rows = self.gaps = self.lost = 0
-        self.problem = ""
-        self._waiting: list[Row] = []
-        self._lost_now = 0
-        self._retry_at = self._written_at = 0.0
+        table = Table(list(recorded.values()), interval, _native.__version__)
+        self._witnesses = {drive: Witness(known, table) for drive, known in recorded.items()}
+        self.gaps = 0
         self._over = threading.Event()
         self._lock = threading.Lock()
-        self._sink: Sink | None = self._open(self._path)
         by_bus: dict[Bus, dict[Drive, list[str]]] = {}
         for drive, known in recorded.items():
             assert isinstance(drive.bus, Bus)
             by_bus.setdefault(drive.bus, {})[drive] = known.asked
-        self._polls: list[Poll[Drive]] = []
         self._virtual = all(isinstance(bus.line, _native.Bus) and bus.line.virtual for bus in by_bus)
+        self._now = next(iter(by_bus)).now if self._virtual else monotonic
+        self._series = Series(
+            place, table, self._now(), replace=replace, most=most, longest=longest, counted=self._counted
+        )
+        self._polls: list[Poll[Drive]] = []
         with ExitStack() as undone:
             undone.callback(self._give_up)
             for bus, wanted in by_bus.items():
@@ -135,6 +126,31 @@ class Recorder:
         )
         if self._thread is not None:
             self._thread.start()
+
+    @property
+    def files(self) -> list[Path]:
+        """The files so far, the newest last."""
+        return self._series.files
+
+    @property
+    def rows(self) -> int:
+        """Rows with values that are in the files."""
+        return self._series.rows
+
+    @property
+    def lost(self) -> int:
+        """Rows that gave way because the file could not be written, or that went with a file that is gone."""
+        return self._series.lost
+
+    @property
+    def told(self) -> list[str]:
+        """What befell the files, as it was warned of: one that was not there any more, one that has no end."""
+        return self._series.told
+
+    @property
+    def problem(self) -> str:
+        """Why the file cannot be written now; empty if it can."""
+        return self._series.problem
 
     @property
     def missing(self) -> int:
@@ -149,9 +165,8 @@ class Recorder:
     @property
     def size(self) -> int:
         """Bytes of the newest file."""
-        with self._lock, suppress(OSError):
-            return 0 if self._sink is None else self._sink.size()
-        return 0
+        with self._lock:
+            return self._series.size
 
     @property
     def closed(self) -> bool:
@@ -167,14 +182,15 @@ class Recorder:
             poll.wait(limit)
             with self._lock:
                 self._take()
-                self._write(flush=True)
+                self._series.write(self._now(), flush=True)
         return self.closed
 
     def close(self) -> None:
         """Ends it: what has come is written, the file gets its `end`, and is closed. Closing again does nothing.
 
         Raises:
-            OSError: The last rows cannot be written. The error says how many are lost.
+            OSError: The last rows cannot be written, or the file is gone and cannot be begun anew. The error says how
+                many rows are lost.
         """
         for poll in self._polls:
             poll.close()
@@ -182,22 +198,8 @@ class Recorder:
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()
         with self._lock:
-            if self._sink is None:
-                return
             self._take()
-            self._retry_at = 0.0
-            self._write(flush=True)
-            sink, self._sink = self._sink, None
-            left = [row for row in self._waiting if not row.event]
-            try:
-                if not left:
-                    sink.write([*self._waiting, self._end_row()])
-                sink.close()
-            except OSError as error:
-                self.problem = self.problem or str(error.strerror or error)
-        if left or self.problem:
-            self.lost += len(left)
-            raise OSError(f"{sink.path} could not be ended: {self.problem}; the last {len(left)} rows are lost")
+            self._series.close(self._now())
 
     def __enter__(self) -> Recorder:
         return self
@@ -220,7 +222,7 @@ class Recorder:
         while not self._over.wait(_LOOK_UP):
             with self._lock:
                 self._take()
-                self._write()
+                self._series.write(self._now())
             if all(poll.closed for poll in self._polls):
                 self._over.set()
 
@@ -232,91 +234,16 @@ class Recorder:
         for sample in samples:
             rows = list(self._witnesses[sample.drive].rows(sample))
             self.gaps += sum(row.event == "gap" for row in rows)
-            self._waiting += rows
-        surplus = len(self._waiting) - _KEPT
-        if surplus > 0:
-            del self._waiting[:surplus]
-            self.lost += surplus
-            self._lost_now += surplus
+            self._series.add(rows)
 
-    def _write(self, flush: bool = False) -> None:
-        """Writes what waits, when it is due."""
-        now = monotonic()
-        sink = self._sink
-        if sink is None or not self._waiting or now < self._retry_at:
-            return
-        if not flush and now - self._written_at < sink.every - _LOOK_UP / 2:
-            return
-        rows = self._waiting
-        if self._lost_now:
-            reason = f"{self._lost_now} rows are not here: {self.problem or 'the file could not be written'}"
-            rows = [Row(rows[0].time, "", "lost", reason), *rows]
-        try:
-            sink.write(rows)
-        except OSError as error:
-            reason = str(error.strerror or error)
-            if not self.problem:
-                warnings.warn(
-                    f"{sink.path} cannot be written now: {reason}; rows are kept, and it is tried again",
-                    DrivebusWarning,
-                    stacklevel=2,
-                )
-            self.problem, self._retry_at = reason, now + _AGAIN
-            return
-        self.problem, self._lost_now, self._written_at = "", 0, now
-        self.rows += sum(not row.event for row in rows)
-        self._waiting = []
-        self._rotate(sink, now)
-
-    def _rotate(self, sink: Sink, now: float) -> None:
-        """Begins the next file if this one is large or old enough."""
-        is_full = self._most is not None and sink.size() >= self._most
-        is_old = self._longest is not None and now - self._began >= self._longest
-        if self._over.is_set() or not (is_full or is_old):
-            return
-        number = len(self.files) + 1
-        while (path := self._path.with_name(f"{self._path.stem}-{number}{self._path.suffix}")).exists():
-            if self._replace:
-                break
-            number += 1
-        try:
-            following = self._open(path)
-        except NotAllowed as error:
-            self.problem = str(error)
-            return
-        try:
-            sink.write([self._end_row(f"; goes on in {path.name}")])
-            sink.close()
-        except OSError as error:
-            warnings.warn(f"{sink.path} has no end: {error.strerror or error}", DrivebusWarning, stacklevel=2)
-        self._sink = following
-
-    def _open(self, path: Path) -> Sink:
-        """A new file, with its first row."""
-        sink = sink_for(path, self._table, self._replace)
-        self._began, started = monotonic(), time()
-        try:
-            sink.write([Row(started, "", "recording", self._table.about(started))])
-        except OSError as error:
-            with suppress(OSError):
-                sink.close()
-            path.unlink(missing_ok=True)
-            raise NotAllowed(f"{path} cannot be written: {error.strerror or error}; nothing was recorded") from None
-        self.files.append(path)
-        return sink
-
-    def _end_row(self, goes_on: str = "") -> Row:
-        counted = f"{self.rows} rows, {self.missing} samples missing, {self.late} too late"
-        return Row(time(), "", "end", f"{counted}{goes_on}")
+    def _counted(self) -> str:
+        return f"{self.rows} rows, {self.missing} samples missing, {self.late} too late"
 
     def _give_up(self) -> None:
         """No drive is polled: the file that was begun goes."""
         for poll in self._polls:
             poll.close()
-        if self._sink is not None:
-            with suppress(OSError):
-                self._sink.close()
-            self._sink.path.unlink(missing_ok=True)
+        self._series.give_up()
 
 
 def _recorded(drives: Any, labels: Mapping[Drive, str], state: bool) -> dict[Drive, Recorded]:

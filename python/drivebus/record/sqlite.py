@@ -6,9 +6,10 @@ import errno
 import os
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from drivebus.capture.standing import Standing
 from drivebus.record.table import FIXED, Row, Table, moment
 
 __all__ = ["open_new"]
@@ -20,15 +21,11 @@ class _Sqlite:
     def __init__(self, path: Path, table: Table) -> None:
         self.path = path
         self._width = len(table.titles)
-        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        # The recorder has a thread of its own, and who closes it another.
-        self._base = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+        self._base, self._standing = _made(path)
         in_words = {column.title for column in table.columns if column.in_words} | {*FIXED}
         columns = ", ".join(f"{_quoted(title)} {'TEXT' if title in in_words else 'REAL'}" for title in table.titles)
         with _as_os_error():
-            # Who reads meanwhile keeps nobody from writing.
-            self._base.execute("PRAGMA journal_mode = WAL")
-            self._base.execute("PRAGMA synchronous = NORMAL")
+            _prepare(self._base)
             self._base.execute(f"CREATE TABLE record ({columns})")
 
     def write(self, rows: Sequence[Row]) -> None:
@@ -44,8 +41,33 @@ class _Sqlite:
                 raise
 
     def size(self) -> int:
-        beside = self.path.with_name(f"{self.path.name}-wal")
-        return self.path.stat().st_size + (beside.stat().st_size if beside.exists() else 0)
+        size = 0
+        for path in (self.path, self.path.with_name(f"{self.path.name}-wal")):
+            with suppress(OSError):
+                size += path.stat().st_size
+        return size
+
+    def gone(self) -> str:
+        return self._standing.gone()
+
+    def move(self, path: Path) -> int | None:
+        new, standing = _made(path)
+        try:
+            # The old one is open, wherever its name has gone.
+            self._base.backup(new)
+        except sqlite3.Error as error:
+            new.close()
+            path.unlink(missing_ok=True)
+            if "full" in str(error):
+                raise OSError(errno.ENOSPC, str(error)) from None
+            return None
+        # Before the new one has a log beside it: the old one's would have the same name.
+        with suppress(sqlite3.Error):
+            self._base.close()
+        self.path, self._base, self._standing = path, new, standing
+        with _as_os_error():
+            _prepare(new)
+        return 0
 
     def close(self) -> None:
         try:
@@ -58,6 +80,21 @@ class _Sqlite:
     def _cells(self, row: Row) -> list[object]:
         told: list[object] = [moment(row.time), *(text or None for text in row[1 : len(FIXED)]), *row.values]
         return told + [None] * (self._width - len(told))
+
+
+def _made(path: Path) -> tuple[sqlite3.Connection, Standing]:
+    """A new base at *path*, which must not be there."""
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    standing = Standing(path, os.fstat(file))
+    os.close(file)
+    # The recorder has a thread of its own, and who closes it another.
+    return sqlite3.connect(path, isolation_level=None, check_same_thread=False), standing
+
+
+def _prepare(base: sqlite3.Connection) -> None:
+    # Who reads meanwhile keeps nobody from writing.
+    base.execute("PRAGMA journal_mode = WAL")
+    base.execute("PRAGMA synchronous = NORMAL")
 
 
 def _quoted(name: str) -> str:
