@@ -50,16 +50,16 @@ def test_another_drive_is_not(
 def test_a_refusal_that_passes_makes_it_no_other_drive(
     line: drivebus.Simulator, virtual_bus: drivebus.Bus, virtual_drive: Drive, exception: int
 ) -> None:
-    """A gateway that does not reach it, a password that locks it again: nothing is written, and it is asked anew."""
+    """A drive that stays busy, a gateway that does not reach it, a password: nothing is written; it is asked anew."""
     virtual_bus.echo(1)
     assert virtual_bus.reconnects == 1
-    refusal = bytes([1, 0x83, exception])
-    line.line.answer_with(refusal + drivebus.crc16(refusal).to_bytes(2, "little"))
+    line.drive(1).refuse(exception, asked="reads")
     with pytest.raises(
         drivebus.NotAllowed, match=rf"has not identified itself.*refused with exception {exception:02X}H"
     ):
         virtual_drive.write("P00.11", 2.0)
     assert line.drive(1).writes() == []
+    line.drive(1).refuse_no_more()
     virtual_drive.write("P00.11", 2.0)
     assert [address for _, address, _ in line.drive(1).writes()] == [RAM | ACCELERATION]
 
