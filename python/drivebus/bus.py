@@ -22,7 +22,9 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads, Sample
 from drivebus.line.settings import BusFace, Opening, check_trust
-from drivebus.operations.face import LivingDrives
+from drivebus.line.units import belongs
+from drivebus.operations.face import views
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.poll import Poll
@@ -78,12 +80,12 @@ class Bus(BusFace, Requests):
 
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
-        self._living = LivingDrives()
         try:
             self._native = _native.Bus(opening.target, opening.format, **opening.keywords)
         except BaseException:
             opening.close()
             raise
+        belongs(opening.known, self._native)
         opening.trace.begin(self._native)
         Requests.__init__(self, self._native, opening.known)
 
@@ -100,24 +102,25 @@ class Bus(BusFace, Requests):
         self._native.close()
         self._opening.close()
 
-    def stop_all(self, *, confirm: float = 1.0, unverified: bool = False) -> list[int]:
+    def stop_all(self, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> list[int]:
         """Stops every drive that `drive` was called for on this bus, and returns their addresses.
 
-        First each gets its own family's stop, once, before all else that waits for the line; those that answered last
-        time come first. Then each is proved as `Drive.stop` proves it, side by side. Nothing is broadcast: the code
-        that stops one family means something else to another. What other programs on a shared port know is not known
-        here.
+        First each gets its own family's stop, before all else that waits for the line; those that answered last time
+        come first. Then each is sent it until it takes it, and proved as `Drive.stop` proves it, side by side. Nothing
+        is broadcast: the code that stops one family means something else to another. What other programs on a shared
+        port know is not known here.
 
         Args:
             confirm: Seconds until each must show it, 0..3600; 0 does not look.
+            within: Seconds, 0..3600, for which each is sent its stop until it takes it.
             unverified: Also where the stop is not verified for the family, as where a drive was asked for so.
 
         Raises:
             NotStopped: One or more were not proved to stop; `failures` has the error of each. All others were.
             NotAllowed: No drive is known here; nothing was sent.
         """
-        units = self._living.views(BlockingBus(self), self._opening.known.latest())
-        return at_once(stop_all(units, confirm=confirm, unverified=unverified))
+        units = views(BlockingBus(self))
+        return at_once(stop_all(units, confirm=confirm, within=within, unverified=unverified))
 
     def __enter__(self) -> Bus:
         return self
@@ -167,11 +170,13 @@ class Bus(BusFace, Requests):
         unverified: bool = False,
         variants: Mapping[str, str] | None = None,
         trust_profile: bool = False,
+        urgent: bool = False,
     ) -> Drive:
         """The drive at *unit*.
 
         A *profile* is believed until something is to be written: first the drive is asked what it is, and where it says
-        that it is another, nothing is written to it (`NotAllowed`). A stop, a coast and the end of a jog ask nothing.
+        that it is another, nothing is written to it (`NotAllowed`). A stop, a coast and the end of a jog ask a few
+        words where they might start a drive of another family, and halt what it shows.
 
         Args:
             unit: Its address, 1..247.
@@ -180,7 +185,9 @@ class Bus(BusFace, Requests):
             unverified: Whether what no document of its family proves is done all the same, in every call. Without a
                 *profile* also: take it for what it may be, where there is one candidate only.
             variants: What a parameter of the drive decides, where it is known: `{"speed_unit": "Hz"}` of a VFD500.
-            trust_profile: The *profile* is meant, whatever the drive says of itself.
+            trust_profile: The *profile* is meant, whatever the drive says of itself. What halts it is chosen by what
+                it shows all the same.
+            urgent: Where the drive is asked what it is, ask before all who wait for the line, as for a stop.
 
         Raises:
             NotAllowed: No such profile or variant; or what the drive tells is not sure enough: give a profile.
@@ -188,11 +195,10 @@ class Bus(BusFace, Requests):
         """
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified))
+        known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified, urgent))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
-        self._opening.known.add(unit, known)
+        self._opening.known.add(unit, known, unverified=unverified)
         self._native.set_meanings(unit, native_of(known))
-        self._living.add(drive)
         return drive
 
     @overload

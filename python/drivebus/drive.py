@@ -7,9 +7,9 @@ profile stands in `drivebus.line.protocols`. Time is the line's clock, so everyt
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
-from typing import overload
+from typing import Any, overload
 
 from drivebus import checks
 from drivebus.attributes import known_only
@@ -19,6 +19,7 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
 from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.setpoints import SETPOINTS
 from drivebus.operations.unit import Unit
@@ -187,6 +188,7 @@ class Drive(DriveFace):
         unverified: bool = False,
         wait: bool = False,
         timeout: float = 60.0,
+        stop_within: float = WITHIN,
     ) -> Iterator[Drive]:
         """Runs the motor inside a `with` block and stops it whatever happens there, Ctrl-C included.
 
@@ -201,6 +203,9 @@ class Drive(DriveFace):
         main thread is inside one, SIGTERM and SIGHUP (unless the program listens to them itself), which raise
         SystemExit there. What no program sees, such as kill -9, is for `watchdog`.
 
+        The stop is sent until the drive takes it, for *stop_within* seconds, and every fourth time it is told to
+        coast instead.
+
         Raises:
             NotAllowed, Refused, NoAnswer, BadAnswer, PortError: From `run`, which was not sent or not taken: the
                 motor is left as it was. Or from stopping, when the block itself went well.
@@ -209,24 +214,25 @@ class Drive(DriveFace):
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
         standstill = timeout if checks.flag("wait", wait) else None
-        with self._moving(run, lambda: self._end(self.stop, unverified), unverified, standstill):
+        with self._moving(run, motion.end_run, unverified, standstill, stop_within):
             yield self
 
     @contextmanager
     def jogging(
-        self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+        self,
+        reverse: bool = False,
+        *,
+        confirm: float = 1.0,
+        force: bool = False,
+        unverified: bool = False,
+        stop_within: float = WITHIN,
     ) -> Iterator[Drive]:
         """Jogs the motor inside a `with` block and ends the jog whatever happens there. Otherwise as `running`.
 
         It is ended by the family's jog stop, or where it has none by a stop.
         """
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-
-        def end() -> None:
-            ends_alone = motion.has_jog_stop(unit_of(self).trusting(unverified))
-            self._end(self.jog_stop if ends_alone else self.stop, unverified)
-
-        with self._moving(jog, end, unverified):
+        with self._moving(jog, motion.end_jog, unverified, None, stop_within):
             yield self
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
@@ -261,23 +267,21 @@ class Drive(DriveFace):
         """
         return Watchdog(unit_of(self).trusting(unverified), timeout, action)
 
-    def _end(self, halt: Callable[..., None], unverified: bool) -> None:
-        """Halts it; with the trust of its start, where that had any."""
-        halt(unverified=True) if unverified else halt()
-
     @contextmanager
     def _moving(
-        self, start: Callable[[], None], end: Callable[[], None], unverified: bool, standstill: float | None = None
+        self,
+        start: Callable[[], None],
+        end: Callable[[Unit, float], Coroutine[Any, Any, None]],
+        unverified: bool,
+        standstill: float | None,
+        within: float,
     ) -> Iterator[None]:
         """Starts, and ends by all means."""
 
         async def begin() -> None:
             start()
 
-        async def finish(_: Unit) -> None:
-            end()
-
-        block = MotorBlock(unit_of(self).trusting(unverified), begin, finish, standstill)
+        block = MotorBlock(unit_of(self).trusting(unverified), begin, end, standstill, within)
         try:
             at_once(block.begin())
             yield

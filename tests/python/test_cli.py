@@ -240,15 +240,18 @@ class TestMoving:
 
     def test_a_jog_whose_end_is_lost_coasts(self, monkeypatch: pytest.MonkeyPatch, pty: drivebus.Simulator) -> None:
         run("prepare", port=pty.port)
-        end = drivebus.Drive.jog_stop
+        wait = drivebus.Bus.sleep
 
-        def deaf(drive: drivebus.Drive) -> None:
+        def deaf(bus: drivebus.Bus, seconds: float) -> None:
             pty.line.drop_answers(1000)
-            end(drive)
+            wait(bus, seconds)
 
-        monkeypatch.setattr(drivebus.Drive, "jog_stop", deaf)
+        # The jog itself is what waits first.
+        monkeypatch.setattr(drivebus.Bus, "sleep", deaf)
         assert run("jog", "--seconds", "0", "--yes", port=pty.port).exit_code == 7
-        assert [value for _, address, value in pty.drive(1).writes() if address == 0x2000] == [3, 8, 8, 8, 6]
+        codes = [value for _, address, value in pty.drive(1).writes() if address == 0x2000]
+        assert codes[:5] == [3, 8, 8, 8, 6]
+        assert codes.count(3) == 1
 
     @pytest.mark.skipif(os.name == "nt", reason="no signal but kill")
     def test_a_terminal_that_is_closed_ends_a_jog(self, pty: drivebus.Simulator) -> None:
@@ -271,7 +274,8 @@ class TestMoving:
         assert (unknown.exit_code, f"not told to {command}" in unknown.stderr) == (3, True)
         known = run("--profile", "gd350", command, port=pty.port)
         assert (known.exit_code, f"{command} was sent" in known.stderr) == (7, True)
-        assert len([value for _, address, value in pty.drive(1).writes() if address == 0x2000]) == 1
+        code = {"stop": 5, "coast": 6}[command]
+        assert {value for _, address, value in pty.drive(1).writes() if address == 0x2000} == {code}
 
     @pytest.mark.parametrize("words", [["run", "5"], ["jog", "--seconds", "0"]])
     def test_a_bad_link_starts_only_by_force(

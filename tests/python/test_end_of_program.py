@@ -114,12 +114,13 @@ def test_a_signal_between_two_bytecodes_stops_the_motor(simulator: Simulator) ->
 
 def test_signals_that_come_while_it_stops_wait_until_it_has(simulator: Simulator) -> None:
     body = """
-    stop, calls = drive.stop, []
-    def stop_late():
+    from drivebus.operations import motion
+    end, calls = motion.end_run, []
+    async def end_late(unit, within):
         for _ in range(10):
             signal.raise_signal(signal.SIGTERM)
-        calls.append(stop())
-    drive.stop = stop_late
+        calls.append(await end(unit, within))
+    motion.end_run = end_late
     with drive.running(10.0):
         running()
         try:

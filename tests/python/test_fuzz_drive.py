@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 from fuzz.drive import drive
 
 from drivebus.operations import commands, sending
+from drivebus.operations.halting import Halt
 from drivebus.operations.unit import Unit
 
 CORPUS = Path(__file__).parents[2] / "fuzz" / "corpus" / "drive"
@@ -37,10 +38,9 @@ def _sent_twice(send: Callable[..., object]) -> Callable[..., object]:
     return twice
 
 
-def _sent_by_nobody(send: Callable[..., object]) -> Callable[..., object]:
-    async def vanished(unit: object, name: str, *rest: object) -> None:
-        if name != "coast":
-            await send(unit, name, *rest)  # type: ignore[misc]
+def _sent_by_nobody(step: Callable[[Halt], Awaitable[bool]]) -> Callable[[Halt], Awaitable[bool]]:
+    async def vanished(halt: Halt) -> bool:
+        return halt.command == "coast" or await step(halt)
 
     return vanished
 
@@ -55,12 +55,12 @@ def found() -> Iterator[str]:
 
 
 def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commands, "give", _sent_twice(commands.give))
+    monkeypatch.setattr(commands, "send_whole", _sent_twice(commands.send_whole))
     assert any("a command went out twice" in said for said in found())
 
 
 def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commands, "give", _sent_by_nobody(commands.give))
+    monkeypatch.setattr(Halt, "step", _sent_by_nobody(Halt.step))
     monkeypatch.setattr(commands.Proof, "look", _proved_by_nothing)
     assert any("it was not halted" in said for said in found())
 

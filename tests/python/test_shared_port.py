@@ -197,7 +197,7 @@ class TestTwoPrograms:
 class TestWhoGoesFirst:
     def test_a_stop_of_any_program_is_the_next_request(self, line: Simulator) -> None:
         with open_bus(line, timeout=3.0, retries=0) as owner, open_bus(line) as polling, open_bus(line) as stopping:
-            drive = stopping.drive(1, "gd350")
+            drive = stopping.drive(1)  # it says what it is, so that nothing has to be asked before its stop
             stopping.read(1, 0x2100)
             polling.read(1, 0x2100)
             silent = ask_nobody(owner, line)

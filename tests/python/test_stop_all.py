@@ -106,7 +106,10 @@ class TestTheLine:
         since = len(simulator.line.trace())
         with pytest.raises(NotStopped):
             bus.stop_all()
-        assert asked(simulator, since)[:2] == [STOPS[1], encode_write(SILENT, 0x2000, 5)]
+        first, *others = asked(simulator, since)
+        assert first == STOPS[1]
+        # What it is is asked before, and silence is no evidence.
+        assert encode_write(SILENT, 0x2000, 5) in others
         assert drive.state() is State.STOPPED
 
     def test_one_that_takes_the_stop_and_does_not_obey_is_named(self, bus: Bus) -> None:
@@ -116,15 +119,15 @@ class TestTheLine:
         assert list(caught.value.failures) == [1]
         assert "the motor may still turn" in str(caught.value)
 
-    def test_a_stop_is_sent_once_and_never_to_all(self, simulator: Simulator, bus: Bus) -> None:
+    def test_a_stop_is_sent_until_it_is_taken_and_never_to_all(self, simulator: Simulator, bus: Bus) -> None:
         for unit, family in FAMILIES.items():
             bus.drive(unit, family, unverified=True)
         since = len(simulator.line.trace())
         simulator.line.drop_answers(2)
-        with pytest.raises(NotStopped):
-            bus.stop_all(unverified=True)
+        assert bus.stop_all(unverified=True) == [1, 2, 3, 4]
         frames = asked(simulator, since)
-        assert all(frames.count(stop) == 1 for stop in STOPS.values())
+        assert all(frames.count(stop) >= 1 for stop in STOPS.values())
+        assert len([frame for frame in frames if frame[1] == 6]) <= len(STOPS) + 2, "two answers were lost"
         assert all(frame[0] != 0 for frame in frames)
 
     def test_what_was_started_on_trust_is_stopped_on_trust(self, bus: Bus) -> None:
@@ -162,7 +165,7 @@ class TestTheLine:
                 return await bus.stop_all()
 
         assert asyncio.run(all_of_it()) == [1, 2, 3, 4]
-        assert asked(simulator)[:4] == [STOPS[unit] for unit in FAMILIES]
+        assert sorted(frame for frame in asked(simulator) if frame[1] == 6) == sorted(STOPS.values())
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty")
@@ -183,8 +186,8 @@ class TestTheCommand:
         since = len(simulator.line.trace())
         result = self.run("--port", simulator.port, "--unverified", "stop", "--all")
         assert result.exit_code == 0, result.output
-        frames = [frame for frame in asked(simulator, since) if frame[1] != 8]
-        assert frames[: len(known)] == [STOPS[unit] for unit in sorted(known)]
+        frames = [frame for frame in asked(simulator, since) if frame[1] == 6]
+        assert sorted(frames) == sorted(STOPS[unit] for unit in known)
 
     def test_drives_of_the_file_are_known_by_its_families(self, simulator: Simulator, tmp_path: Path) -> None:
         file = tmp_path / "drivebus.toml"
@@ -197,8 +200,8 @@ class TestTheCommand:
         result = self.run("--config", str(file), "--unverified", "--json", "stop", "--all")
         assert result.exit_code == 0, result.output
         assert [json.loads(row)["unit"] for row in result.stdout.splitlines()] == [1, 2, 3, 4]
-        frames = [frame for frame in asked(simulator, since) if frame[1] != 8]
-        assert frames[:4] == [STOPS[unit] for unit in FAMILIES]
+        frames = [frame for frame in asked(simulator, since) if frame[1] == 6]
+        assert sorted(frames) == sorted(STOPS.values())
 
     def test_a_drive_that_is_another_now_is_stopped_by_its_own_code(self, simulator: Simulator) -> None:
         remember(simulator.port, 1, "gd600")

@@ -87,7 +87,13 @@ def test_a_motor_that_cannot_be_stopped_is_told_to_stop_again_and_then_to_coast(
 ) -> None:
     with pytest.raises(drivebus.Unconfirmed, match="coast"), virtual_drive.running(hz=5.0):
         virtual.line.drop_answers(1000)
-    assert commands(virtual) == [FORWARD, STOP, STOP, STOP, COAST]
+    left = next(at for at, _, code in virtual.drive(1).writes() if code == STOP)
+    assert commands(virtual)[:9] == [FORWARD, STOP, STOP, STOP, COAST, STOP, STOP, STOP, COAST]
+    assert commands(virtual).count(FORWARD) == 1
+    # Ten seconds, one frame in 0.15 s at the most, and three attempts more of one frame each.
+    assert 10.0 / 0.15 <= len(commands(virtual)) - 1 <= 10.0 / 0.1 + 4
+    # After each it was asked for its state, by the bus's own time-out.
+    assert 10.0 <= virtual_drive.bus.now() - left <= 16.0
 
 
 def test_a_stop_that_cannot_be_sent_says_what_the_motor_may_do(virtual: Simulator, virtual_drive: Drive) -> None:

@@ -72,9 +72,14 @@ pub(crate) fn read_options(timeout: Option<f64>, retries: Option<u32>, verify: b
     Ok(CallOptions::new().timeout(timeout).retries(retries).verify(verify))
 }
 
-pub(crate) fn write_options(read_back: Option<&Bound<'_, PyAny>>, connection: Option<u64>) -> PyResult<CallOptions> {
+pub(crate) fn write_options(
+    timeout: Option<f64>,
+    read_back: Option<&Bound<'_, PyAny>>,
+    connection: Option<u64>,
+) -> PyResult<CallOptions> {
+    let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
     let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-    Ok(CallOptions::new().read_back(read_back).connection(connection))
+    Ok(CallOptions::new().timeout(timeout).read_back(read_back).connection(connection))
 }
 
 /// `options` for `request`, which may be urgent.

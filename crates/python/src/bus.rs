@@ -159,7 +159,7 @@ impl Bus {
         Ok((words, clock.at(done.sent), clock.at(done.ended)))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None,
+    #[pyo3(signature = (unit, address, value, /, *, timeout = None, urgent = false, read_back = None, connection = None,
         table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
@@ -167,12 +167,13 @@ impl Bus {
         unit: &Bound<'_, PyAny>,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
+        timeout: Option<f64>,
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
         table: &str,
     ) -> PyResult<()> {
-        let options = write_options(read_back, connection)?;
+        let options = write_options(timeout, read_back, connection)?;
         self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
     }
 

@@ -154,7 +154,7 @@ impl Requests {
         }))
     }
 
-    #[pyo3(signature = (unit, address, value, /, *, urgent = false, read_back = None, connection = None,
+    #[pyo3(signature = (unit, address, value, /, *, timeout = None, urgent = false, read_back = None, connection = None,
         table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
@@ -162,12 +162,13 @@ impl Requests {
         unit: &Bound<'_, PyAny>,
         address: &Bound<'_, PyAny>,
         value: &Bound<'_, PyAny>,
+        timeout: Option<f64>,
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
         table: &str,
     ) -> PyResult<Asked> {
-        let options = write_options(read_back, connection)?;
+        let options = write_options(timeout, read_back, connection)?;
         self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
     }
 

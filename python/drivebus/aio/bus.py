@@ -27,7 +27,9 @@ from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
-from drivebus.operations.face import LivingDrives, documented_by
+from drivebus.line.units import belongs
+from drivebus.operations.face import documented_by, views
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.profile import Profile, native_of
@@ -57,7 +59,6 @@ class Bus(BusFace):
 
     def _begin(self, opening: Opening) -> None:
         self._opening = opening
-        self._living = LivingDrives()
         self._native: _native.Bus | None = None
         self._line: Line | None = None
         self._requests: AwaitedRequests | None = None
@@ -78,6 +79,7 @@ class Bus(BusFace):
             opening.close()
             raise
         self._native = line.native
+        belongs(opening.known, line.native)
         opening.trace.begin(line.native)
         self._line = line
         self._requests = AwaitedRequests(line, opening.known)
@@ -128,9 +130,13 @@ class Bus(BusFace):
         urgent: bool = False,
         verify: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
+        retries: int | None = None,
     ) -> list[int]:
         """See `Requests.read`."""
-        return await self._asked().read(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return await self._asked().read(
+            unit, address, count, urgent=urgent, verify=verify, table=table, timeout=timeout, retries=retries
+        )
 
     @documented_by(Requests.read_stamped)
     async def read_stamped(
@@ -158,6 +164,7 @@ class Bus(BusFace):
         connection: int | None = None,
         force: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
     ) -> None:
         """See `Requests.write`."""
         await self._asked().write(
@@ -169,6 +176,7 @@ class Bus(BusFace):
             connection=connection,
             force=force,
             table=table,
+            timeout=timeout,
         )
 
     @documented_by(Requests.broadcast)
@@ -230,22 +238,22 @@ class Bus(BusFace):
         unverified: bool = False,
         variants: Mapping[str, str] | None = None,
         trust_profile: bool = False,
+        urgent: bool = False,
     ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
         unit = checks.unit(unit)
         check_trust(profile, trust_profile)
-        known, code = await profile_of(self, unit, profile, variants, unverified)
+        known, code = await profile_of(self, unit, profile, variants, unverified, urgent)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
-        self._opening.known.add(unit, known)
+        self._opening.known.add(unit, known, unverified=unverified)
         self._core().set_meanings(unit, native_of(known))
-        self._living.add(drive)
         return drive
 
     @documented_by(BlockingFace.stop_all)
-    async def stop_all(self, *, confirm: float = 1.0, unverified: bool = False) -> list[int]:
+    async def stop_all(self, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> list[int]:
         """See `drivebus.Bus.stop_all`."""
-        units = self._living.views(self, self._opening.known.latest())
-        return await stop_all(units, confirm=confirm, unverified=unverified)
+        units = views(self)
+        return await stop_all(units, confirm=confirm, within=within, unverified=unverified)
 
     @overload
     def poll(

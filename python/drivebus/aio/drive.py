@@ -15,6 +15,7 @@ from drivebus.discovery import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
 from drivebus.operations.face import DriveFace, awaited, documented_by, unit_of
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.setpoints import SETPOINTS
 from drivebus.operations.unit import Unit
@@ -178,6 +179,7 @@ class Drive(DriveFace):
         unverified: bool = False,
         wait: bool = False,
         timeout: float = 60.0,
+        stop_within: float = WITHIN,
     ) -> AsyncIterator[Drive]:
         """Runs the motor inside an `async with` block and stops it whatever happens there, cancellation included.
 
@@ -187,17 +189,23 @@ class Drive(DriveFace):
         """
         run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
         standstill = timeout if checks.flag("wait", wait) else None
-        block = MotorBlock(unit_of(self).trusting(unverified), run, motion.stop, standstill)
+        block = MotorBlock(unit_of(self).trusting(unverified), run, motion.end_run, standstill, stop_within)
         async with _block(block):
             yield self
 
     @asynccontextmanager
     async def jogging(
-        self, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+        self,
+        reverse: bool = False,
+        *,
+        confirm: float = 1.0,
+        force: bool = False,
+        unverified: bool = False,
+        stop_within: float = WITHIN,
     ) -> AsyncIterator[Drive]:
         """Jogs the motor inside an `async with` block and ends the jog by all means. Otherwise as `running`."""
         jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
-        block = MotorBlock(unit_of(self).trusting(unverified), jog, motion.end_jog)
+        block = MotorBlock(unit_of(self).trusting(unverified), jog, motion.end_jog, None, stop_within)
         async with _block(block):
             yield self
 

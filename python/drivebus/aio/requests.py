@@ -10,6 +10,7 @@ from drivebus.aio.line import Line
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.requests import (
     Requests,
+    alone_of,
     broadcast_of,
     echo_of,
     read_of,
@@ -18,7 +19,7 @@ from drivebus.line.requests import (
     write_of,
 )
 from drivebus.line.stats import Link
-from drivebus.line.write_guard import KnownUnits
+from drivebus.line.units import Units
 
 __all__ = ["AwaitedRequests"]
 
@@ -26,7 +27,7 @@ __all__ = ["AwaitedRequests"]
 class AwaitedRequests:
     """A line of the core for event loops, and what is known of the units on it. Its calls are those of `Requests`."""
 
-    def __init__(self, line: Line, known: KnownUnits) -> None:
+    def __init__(self, line: Line, known: Units) -> None:
         self._line = line
         self._known = known
 
@@ -80,10 +81,13 @@ class AwaitedRequests:
         urgent: bool = False,
         verify: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
+        retries: int | None = None,
     ) -> list[int]:
         """See `Requests`."""
         unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
-        return await self._line.read(unit, address, count, urgent=urgent, verify=verify, table=table)
+        alone = alone_of(timeout, retries)
+        return await self._line.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
 
     async def read_stamped(
         self,
@@ -110,10 +114,18 @@ class AwaitedRequests:
         connection: int | None = None,
         force: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
     ) -> None:
         """See `Requests`."""
         checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
-        await self._line.write(*checked, urgent=urgent, read_back=read_back, connection=connection, table=table)
+        await self._line.write(
+            *checked,
+            urgent=urgent,
+            read_back=read_back,
+            connection=connection,
+            table=table,
+            **alone_of(timeout),
+        )
 
     async def link(self, unit: int) -> Link:
         """See `Requests`."""

@@ -67,10 +67,10 @@ class Reader:
         address, count, inside = self._planned.pop(0)
         unit = self._unit
         # Known before the first answer, so that a port that is opened again meanwhile brings no words of another drive.
-        await unit.memory.identity.check(unit.bus, judged=False)
+        await unit.identity.check(unit.bus, judged=False)
         try:
             words = await bus_words.read_words(unit, address, count)
-            await unit.memory.identity.check(unit.bus, judged=False)
+            await unit.identity.check(unit.bus, judged=False)
         except Refused as error:
             if error.name == _LOCKED:
                 raise

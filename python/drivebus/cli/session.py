@@ -159,10 +159,10 @@ class Session:
             yield self.drive_on(bus)
 
     def halt(self, bus: drivebus.Bus, command: str, do: Callable[[drivebus.Drive], None]) -> drivebus.Drive:
-        """Halts the drive by *do*, which is *command*, without asking it anything first where its family is known.
+        """Halts the drive by *do*, which is *command*, as the family that was named, was known last, or shows itself.
 
-        The family may be known from before: what the drive is now is asked behind the command, and one of another
-        family is halted once more, by its own code. An error before anything can be sent says so.
+        What was known last is a hint where to look first: a drive of another family is halted as what it shows. An
+        error before anything can be sent says so.
         """
         port = str(self.port)
         family = None if self.profile is not None else known_family(port, self.unit)
@@ -179,27 +179,44 @@ class Session:
                 return drive
             forget(port, self.unit)
             remark(f"{self.called} was a {family} when it was asked last, and is not one now.")
+            if failure is None:
+                # What it shows was halted, and says what came of it.
+                return self._as_it_shows(bus, drive)
+            if not isinstance(failure, drivebus.NotAllowed):
+                raise failure
         try:
-            drive = self.drive_on(bus)
+            drive = self.drive_on(bus, urgent=True)
         except drivebus.DrivebusError:
             typed = replace(self, profile="FAMILY").command(command)
             remark(
                 f"{self.called} was not told to {command}: the code depends on the family, and the unit did not say "
-                f"which it is. If you know it: `{typed}`, which asks nothing first. Families: "
+                f"which it is. If you know it: `{typed}`, which asks no more than it must. Families: "
                 f"{', '.join(drivebus.profiles())}. If it must stop now, use the emergency stop."
             )
             raise
         do(drive)
         return drive
 
-    def drive_on(self, bus: drivebus.Bus) -> drivebus.Drive:
-        """The drive that the options name, on a bus that is open. Where it said surely what it is, that is kept."""
+    def _as_it_shows(self, bus: drivebus.Bus, drive: drivebus.Drive) -> drivebus.Drive:
+        """The drive as the family that it shows, for what is told of it; *drive* where that is not one alone."""
+        try:
+            family = bus.identify(self.unit).family
+        except drivebus.DrivebusError:
+            return drive
+        return bus.drive(self.unit, family, unverified=True) if family in drivebus.profiles() else drive
+
+    def drive_on(self, bus: drivebus.Bus, *, urgent: bool = False) -> drivebus.Drive:
+        """The drive that the options name, on a bus that is open. Where it said surely what it is, that is kept.
+
+        Where it is asked what it is, that goes before all who wait for the line if it is *urgent*.
+        """
         drive = bus.drive(
             self.unit,
             self.profile,
             unverified=self.unverified,
             variants=self.variants or None,
             trust_profile=self.trust_profile,
+            urgent=urgent,
         )
         if self.profile is None and not self.unverified and _is_told_by_code(drive.profile):
             remember(str(self.port), self.unit, drive.profile.name)

@@ -45,7 +45,7 @@ async def search(
     if place is not None and not (resume and _is_unchanged(unit, place, base)):
         Discovery.check(unit.profile, place, base)
     part = None if place is None else disk.part_of(place)
-    await unit.memory.identity.check(unit.bus)
+    await unit.identity.check(unit.bus)
     kept = Kept.begin(part, await origin_of(unit), resume=resume)
     asking = _Search(unit, kept)
     try:
@@ -159,7 +159,7 @@ class _Search:
         """
         unit = self._unit
         for attempt in range(1, _ATTEMPTS + 1):
-            await unit.memory.identity.check(unit.bus, judged=False)
+            await unit.identity.check(unit.bus, judged=False)
             self._kept.requests += 1
             try:
                 came = await words.read_words(unit, group << 8 | first, count)
@@ -174,7 +174,7 @@ class _Search:
                         raise
                     return error
             else:
-                await unit.memory.identity.check(unit.bus, judged=False)
+                await unit.identity.check(unit.bus, judged=False)
                 return came
         raise AssertionError  # the last attempt returns or raises
 

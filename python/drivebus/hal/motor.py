@@ -15,6 +15,7 @@ from drivebus.hal.core import Action, Coast, Look, Reset, Run, Speed
 from drivebus.line.blocking import at_once
 from drivebus.operations import motion, setpoints
 from drivebus.operations.face import unit_of
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.unit import Unit
 from drivebus.values import State
@@ -156,10 +157,10 @@ class Motor:
         else:
             at_once(block.finish())
 
-    async def _end(self, unit: Unit) -> None:
+    async def _end(self, unit: Unit, within: float = WITHIN) -> None:
         """While the program goes on, its own looks prove the stop: the pins are not to wait for that."""
         try:
-            await (motion.stop(unit) if self._leaving else motion.stop(unit, confirm=0.0))
+            await motion.end_run(unit, within, confirm=1.0 if self._leaving else 0.0)
         except DrivebusError as error:
             self.unstopped = str(error)
             raise

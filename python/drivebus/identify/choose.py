@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import warnings
 from collections.abc import Mapping
@@ -23,6 +24,7 @@ async def profile_of(
     profile: str | os.PathLike[str] | Profile | None,
     variants: Mapping[str, str] | None,
     unverified: bool,
+    urgent: bool = False,
 ) -> tuple[Profile, int | None]:
     """The profile that *profile* means, or else that of the drive at *unit*, and the code that it gave if asked."""
     if variants is not None and not isinstance(variants, Mapping):
@@ -31,7 +33,8 @@ async def profile_of(
         )
     code: int | None = None
     if profile is None:
-        found = await identify(bus.read, unit)
+        read = functools.partial(bus.read, urgent=True) if checks.flag("urgent", urgent) else bus.read
+        found = await identify(read, unit)
         known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code
     else:
         known = Profile.find(profile)

@@ -12,6 +12,7 @@ also by what they say where other families have such a code, for that is how one
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 from drivebus import places
@@ -19,8 +20,9 @@ from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortEr
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
-from drivebus.identify.signatures import shown_by, signature_of
+from drivebus.identify.signatures import shown_by, shows, signature_of
 from drivebus.line.protocols import AwaitableBus
+from drivebus.line.units import UnitRecord
 from drivebus.profile import Profile
 
 __all__ = ["SameUnit"]
@@ -31,30 +33,52 @@ class SameUnit:
 
     Args:
         bus: The line it hangs on; only for how often that was opened again.
-        unit: Its address, 1..247.
+        record: What is known of it, which its other handles see too.
         profile: What it was named as.
         code: What it said, if it was asked before.
         trusted: Whether the profile is believed, whatever the unit says.
+
+    Attributes:
+        trusted: The same.
     """
 
     def __init__(
         self,
         bus: AwaitableBus,
-        unit: int,
+        record: UnitRecord,
         profile: Profile,
         code: int | None = None,
         *,
         trusted: bool = False,
     ) -> None:
-        self._unit = unit
+        self._record = record
+        self._unit = record.address
         self._profile = profile
-        self._trusted = trusted
+        self.trusted = trusted
         self._words, self._probes = _questions(profile)
-        self._known = None if code is None else _hex(code)
-        self._contradicts = False
-        self._opened = bus.reconnects
+        self._identity = record.identity(profile, bus.reconnects)
+        if code is not None:
+            self._identity.known, self._identity.contradicts = _hex(code), False
+            self._identity.is_sure = self._is_told([Answer(address, code, None) for address in self._words])
 
-    async def check(self, bus: AwaitableBus, *, judged: bool = True) -> int:
+    def is_sure(self, bus: AwaitableBus) -> bool:
+        """Whether it said, over the connection that *bus* has now, what no family says that its halts could start."""
+        known = self._identity
+        return known.is_sure and not known.contradicts and known.connection == bus.reconnects
+
+    def is_known(self, bus: AwaitableBus) -> bool:
+        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name."""
+        known = self._identity
+        return (
+            (known.is_sure or known.known is not None) and not known.contradicts and known.connection == bus.reconnects
+        )
+
+    def settle(self, bus: AwaitableBus) -> None:
+        """Takes it for surely what it was named as, for as long as the port stays open: by what else it answered."""
+        if self._identity.connection == bus.reconnects:
+            self._identity.is_sure = True
+
+    async def check(self, bus: AwaitableBus, *, judged: bool = True, urgent: bool = False) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
         A unit that refuses to tell is known by that. One that stays silent is not known, and is asked the next time; so
@@ -70,27 +94,28 @@ class SameUnit:
                 asked again and refused for the moment.
             NoAnswer, BadAnswer, PortError: It was asked again, and did not tell. What was to follow was not sent.
         """
-        opened = bus.reconnects
+        opened, known = bus.reconnects, self._identity.known
         # What spoke against the profile may have been put right meanwhile.
-        anew = self._known is None or (judged and self._contradicts)
-        if not anew and opened == self._opened:
+        anew = known is None or (judged and self._identity.contradicts)
+        if not anew and opened == self._identity.connection:
             return opened
         answers: list[Answer] = []
         failure: NoAnswer | BadAnswer | PortError | None = None
         try:
-            await self._ask(bus, answers)
+            await self._ask(bus, answers, urgent)
         except LINE_ERRORS as error:
             failure = error
-        if anew or self._known is None:
+        if anew or known is None:
             against = other = None
-            if not self._trusted:
+            if not self.trusted:
                 against = contradiction(self._profile, self._unit, answers)
-                other = await self._other(bus, answers) if against is None and failure is None else None
+                other = await self._other(bus, answers, urgent) if against is None and failure is None else None
             # By the words of another maker even a reset may start the motor.
             self._judge(answers, failure is None, judged or other is not None, against or other)
         else:
-            self._compare(answers, failure, self._known)
-        self._opened = opened
+            self._compare(answers, failure, known)
+        if opened != self._identity.connection:
+            self._identity.connection, self._identity.is_sure = opened, self._is_told(answers)
         return opened
 
     def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool, against: str | None) -> None:
@@ -98,8 +123,10 @@ class SameUnit:
 
         What came before a failure of the line was said all the same, but is not *complete*: the unit stays unknown.
         """
-        self._contradicts = against is not None
-        self._known = self._told(answers) if complete and not self._put_off(answers) else None
+        known = self._identity
+        known.contradicts = against is not None
+        known.known = self._told(answers) if complete and not self._put_off(answers) else None
+        known.is_sure = against is None and known.known is not None and self._is_told(answers)
         if against is not None and judged:
             raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
 
@@ -122,29 +149,50 @@ class SameUnit:
                 unit=self._unit,
             )
 
-    async def contradiction(self, bus: AwaitableBus) -> str | None:
+    def _is_told(self, answers: Sequence[Answer]) -> bool:
+        """Whether *answers* have the code of the family itself, or its whole signature."""
+        code = [
+            answer.word is not None
+            and bool(set(codes.families_in(codes.listed_for(self._profile, answer.address, answer.word))) & self._names)
+            for answer in answers
+            if answer.address in self._words
+        ]
+        if code:
+            return all(code)
+        return shows(signature_of(self._profile), answers)
+
+    @property
+    def _names(self) -> set[str]:
+        return set(self._profile.reports_as())
+
+    async def contradiction(self, bus: AwaitableBus, *, urgent: bool = False) -> str | None:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
         answers: list[Answer] = []
-        await self._ask(bus, answers)
-        return contradiction(self._profile, self._unit, answers) or await self._other(bus, answers)
+        await self._ask(bus, answers, urgent)
+        against = contradiction(self._profile, self._unit, answers) or await self._other(bus, answers, urgent)
+        if against is None and self._identity.known is None:
+            self._identity.connection = bus.reconnects
+            self._judge(answers, True, False, None)
+        return against
 
-    async def _other(self, bus: AwaitableBus, answers: Sequence[Answer]) -> str | None:
+    async def _other(self, bus: AwaitableBus, answers: Sequence[Answer], urgent: bool) -> str | None:
         """What speaks against the profile where *answers* are strange: the signature of another family."""
         if any(map(passes, answers)) or not is_suspicious(self._profile, answers):
             return None
         told = [answer for answer in answers if not tells_nothing(self._profile, answer)]
         answered = {answer.address: answer.word is not None for answer in told}
-        return other_signature(self._profile, self._unit, await shown_by(bus.read, self._unit, answered))
+        read = functools.partial(bus.read, urgent=True) if urgent else bus.read
+        return other_signature(self._profile, self._unit, await shown_by(read, self._unit, answered))
 
-    async def _ask(self, bus: AwaitableBus, answers: list[Answer]) -> None:
+    async def _ask(self, bus: AwaitableBus, answers: list[Answer], urgent: bool) -> None:
         """Adds the unit's answers to *answers* as they come, so that a failure of the line leaves the earlier ones."""
         for address in (*self._words, *self._probes):
-            answers += [await self._answer(bus, address)]
+            answers += [await self._answer(bus, address, urgent)]
 
-    async def _answer(self, bus: AwaitableBus, address: int) -> Answer:
+    async def _answer(self, bus: AwaitableBus, address: int, urgent: bool) -> Answer:
         try:
             first, table = places.at(address)
-            [word] = await bus.read(self._unit, first, **table)
+            [word] = await bus.read(self._unit, first, urgent=urgent, **table)
         except Refused as error:
             return Answer(address, None, error.code)
         return Answer(address, word, None)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.identify.answers import Read, answer_at, passes
+from drivebus.identify.answers import Answer, Read, answer_at, passes
 from drivebus.profile import Profile, profiles
 
-__all__ = ["Read", "Signature", "listed", "shown_by", "signature_of"]
+__all__ = ["Read", "Signature", "listed", "shown_by", "shows", "signature_of"]
 
 Signature = dict[str, list[int]]
 """The addresses that a unit `answers`, and those that it `refuses`: see `Profile.signature`."""
@@ -24,6 +25,16 @@ def listed() -> dict[str, Signature]:
 def signature_of(profile: Profile) -> Signature | None:
     """The signature of *profile*; an overlay has that of the family below it."""
     return profile.signature() or listed().get(profile.family)
+
+
+def shows(signature: Signature | None, answers: Iterable[Answer]) -> bool:
+    """Whether *answers* have all of *signature*: each word that such a unit answers, and a refusal of each other."""
+    if signature is None:
+        return False
+    answered = {answer.address: answer.word is not None for answer in answers}
+    return all(answered.get(place) is True for place in signature["answers"]) and all(
+        answered.get(place) is False for place in signature["refuses"]
+    )
 
 
 async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:

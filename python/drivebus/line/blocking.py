@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
 from drivebus.line.protocols import BusProtocol
+from drivebus.line.requests import Requests
 from drivebus.line.stats import Link
 
 __all__ = ["BlockingBus", "at_once"]
@@ -52,9 +53,12 @@ class BlockingBus:
         urgent: bool = False,
         verify: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
+        retries: int | None = None,
     ) -> list[int]:
         """See `BusProtocol`."""
-        return self._bus.read(unit, address, count, urgent=urgent, verify=verify, **_of(table))
+        alone = self._alone(timeout=timeout, retries=retries)
+        return self._bus.read(unit, address, count, urgent=urgent, verify=verify, **_of(table), **alone)
 
     async def read_stamped(
         self,
@@ -82,11 +86,17 @@ class BlockingBus:
         connection: int | None = None,
         force: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
     ) -> None:
         """See `BusProtocol`."""
         rest: dict[str, Any] = {"force": True} if force else {}
-        rest |= _of(table)
+        rest |= _of(table) | self._alone(timeout=timeout)
         self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **rest)
+
+    def _alone(self, **wanted: float | None) -> dict[str, Any]:
+        """What one call wants otherwise; nothing of a bus of somebody's own, which has time-outs of its own."""
+        given = {name: value for name, value in wanted.items() if value is not None}
+        return given if isinstance(self._bus, Requests) else {}
 
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""

@@ -100,8 +100,10 @@ class AwaitableBus(Protocol):
         urgent: bool = False,
         verify: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
+        retries: int | None = None,
     ) -> list[int]:
-        """See `BusProtocol`."""
+        """See `BusProtocol`. *timeout* and *retries* are for this read alone."""
 
     async def read_stamped(
         self,
@@ -128,8 +130,9 @@ class AwaitableBus(Protocol):
         connection: int | None = None,
         force: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
     ) -> None:
-        """See `BusProtocol`."""
+        """See `BusProtocol`. *timeout* is for this write alone."""
 
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""

@@ -6,13 +6,14 @@ The functions check what is given, before anything is sent; `drivebus.aio.reques
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from drivebus import _native, checks, places
 from drivebus.errors import NotAllowed
 from drivebus.line.stats import Link
-from drivebus.line.write_guard import KnownUnits
+from drivebus.line.units import Units
 
-__all__ = ["Requests", "broadcast_of", "echo_of", "read_of", "seconds_of", "transact_of", "write_of"]
+__all__ = ["Requests", "alone_of", "broadcast_of", "echo_of", "read_of", "seconds_of", "transact_of", "write_of"]
 
 
 class Requests:
@@ -23,7 +24,7 @@ class Requests:
         known: The families of its units, as far as drives were asked for.
     """
 
-    def __init__(self, native: _native.Bus, known: KnownUnits) -> None:
+    def __init__(self, native: _native.Bus, known: Units) -> None:
         self._native = native
         self._known = known
 
@@ -67,6 +68,8 @@ class Requests:
         urgent: bool = False,
         verify: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
+        retries: int | None = None,
     ) -> list[int]:
         """Reads *count* words (1..125) of *unit* (1..247) from *address* (0..0xFFFF): function 03H.
 
@@ -79,6 +82,8 @@ class Requests:
         for, 16 at most, and cut off again. A call sends 8 requests at most for each time that it may ask (1 + *retries*
         of the bus), whatever they are for.
 
+        *timeout* (seconds) and *retries* are for this read alone; None is what the bus has.
+
         An *urgent* read overtakes all who wait: for confirming a stop. With *verify* it is asked until the same words
         came twice in a row: against noise that happens to match its CRC, as one damaged answer in 65 536 does.
 
@@ -88,7 +93,8 @@ class Requests:
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
         unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
-        return self._native.read(unit, address, count, urgent=urgent, verify=verify, table=table)
+        alone = alone_of(timeout, retries)
+        return self._native.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
 
     def read_stamped(
         self,
@@ -115,6 +121,7 @@ class Requests:
         connection: int | None = None,
         force: bool = False,
         table: str = "holding",
+        timeout: float | None = None,
     ) -> None:
         """Writes one word (an int: 06H) or 1..123 words (a sequence: 10H) of 0..0xFFFF. Sent once, never repeated.
 
@@ -136,6 +143,8 @@ class Requests:
         With *connection*, the `reconnects` at which you saw who answers, nothing is sent where the port was opened
         again since, for another unit may have the address now: `PortError`, whose `started` is None.
 
+        *timeout*, in seconds, is how long this write waits for its confirmation; None is what the bus has.
+
         Raises:
             NotAllowed: An argument is out of range, the bus is read-only, or it would be such a command. Nothing was
                 sent.
@@ -145,7 +154,14 @@ class Requests:
             Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
         """
         checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
-        self._native.write(*checked, urgent=urgent, read_back=read_back, connection=connection, table=table)
+        self._native.write(
+            *checked,
+            urgent=urgent,
+            read_back=read_back,
+            connection=connection,
+            table=table,
+            **alone_of(timeout),
+        )
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
@@ -192,8 +208,18 @@ def read_of(
     return unit, address, count
 
 
+def alone_of(timeout: float | None, retries: int | None = None) -> dict[str, Any]:
+    """What one call wants otherwise than its bus. Raises `NotAllowed` where that is out of range."""
+    alone: dict[str, Any] = {}
+    if timeout is not None:
+        alone["timeout"] = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
+    if retries is not None:
+        alone["retries"] = checks.whole("retries", retries, 0, 100)
+    return alone
+
+
 def write_of(
-    known: KnownUnits,
+    known: Units,
     unit: int,
     address: int,
     value: int | Sequence[int],
@@ -214,9 +240,7 @@ def write_of(
     return unit, address, words
 
 
-def broadcast_of(
-    known: KnownUnits, address: int, value: int | Sequence[int], force: bool
-) -> tuple[int, int | list[int]]:
+def broadcast_of(known: Units, address: int, value: int | Sequence[int], force: bool) -> tuple[int, int | list[int]]:
     """What a broadcast is of. Raises `NotAllowed` as `write_of` does, for all units that are known."""
     address, words = checks.address(address), checks.payload(value)
     known.check(0, address, words, checks.flag("force", force))
@@ -231,7 +255,7 @@ def echo_of(unit: int, word: int | None) -> tuple[int, int | None]:
 
 
 def transact_of(
-    known: KnownUnits, unit: int, pdu: bytes | bytearray | memoryview, reply_length: int | None, force: bool
+    known: Units, unit: int, pdu: bytes | bytearray | memoryview, reply_length: int | None, force: bool
 ) -> tuple[int, bytes, int | None]:
     """What any PDU is. Raises `NotAllowed` where something is out of range, or would be an unknown command."""
     try:

@@ -12,7 +12,7 @@ from drivebus.errors import NotAllowed
 from drivebus.line import ports
 from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
-from drivebus.line.write_guard import KnownUnits
+from drivebus.line.units import Units
 from drivebus.sim import Simulator, core_of
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Opening:
         if isinstance(target, Simulator):
             target = core_of(target) if target.transport == "process" else target.port
         self.target = target
-        self.known = KnownUnits()
+        self.known = Units()
         self.shown = str(port)
         self.trace = Trace(self.known, None if trace is None else _wire_file(trace, self.shown, self.format))
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import places, rtu
 from drivebus.errors import DrivebusError
-from drivebus.line.write_guard import KnownUnits, code_text
+from drivebus.line.units import Units
+from drivebus.line.write_guard import code_text
 from drivebus.profile import Profile
 from drivebus.values import Choice, Description
 
@@ -42,7 +43,7 @@ class Trace:
         file: Where frames are kept; None keeps none.
     """
 
-    def __init__(self, known: KnownUnits, file: WireFile | None) -> None:
+    def __init__(self, known: Units, file: WireFile | None) -> None:
         self._native: _Watched | None = None
         self._known = known
         self._file = file

@@ -1,4 +1,4 @@
-"""What is known of the units of a line, the families for which a drive was asked: what a raw write would command.
+"""What a raw write would command: words held against the command registers of the unit's family, and of the others.
 
 The same word means different things to different families: 5 stops an INVT drive and lets a VFD500 coast. So a write by
 address is held against the command register of the unit's family, and against those of the other families as well.
@@ -12,9 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from drivebus import places
 from drivebus.errors import NotAllowed
 from drivebus.profile import Profile, profiles
-from drivebus.rtu import written
 
-__all__ = ["KnownUnits", "check_words", "code_text"]
+__all__ = ["check_words", "code_text", "prepare_guard"]
 
 _HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
 
@@ -22,44 +21,6 @@ _HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
 def code_text(code: int) -> str:
     """A command's code for people: as manuals print it, small numbers in decimal and words of bits in hexadecimal."""
     return f"{code}" if code <= 0xFF else f"{code:04X}H"
-
-
-class KnownUnits:
-    """The profiles under which the units of a line were asked for."""
-
-    def __init__(self) -> None:
-        self._profiles: dict[int, dict[str, Profile]] = {}
-
-    def add(self, unit: int, profile: Profile) -> None:
-        """From now on *unit* is known as what *profile* describes."""
-        known = self._profiles.setdefault(unit, {})
-        known.pop(profile.name, None)  # what was asked for last stands last
-        known[profile.name] = profile
-        _command_registers()  # now, so that no stop has to wait for it
-
-    def latest(self) -> dict[int, Profile]:
-        """The profile under which each unit was asked for last."""
-        return {unit: list(known.values())[-1] for unit, known in tuple(self._profiles.items())}
-
-    def only(self, unit: int) -> Profile | None:
-        """The profile of *unit*, where it is known as one and no other."""
-        profiles = list(self._profiles.get(unit, {}).values())
-        return profiles[0] if len(profiles) == 1 else None
-
-    def check(self, unit: int, address: int, words: int | Sequence[int], force: bool = False) -> None:
-        """Raises `NotAllowed` if the words would command *unit* (0: any of them) what its family does not define."""
-        if force or not self._profiles:
-            return
-        for each in (unit,) if unit else tuple(self._profiles):
-            if each in self._profiles:
-                check_words(self._profiles[each].values(), each, address, words)
-
-    def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
-        """As `check`, for what a request to write carries; any other is let pass."""
-        write = written(pdu)
-        if write is not None:
-            address, words = write
-            self.check(unit, address, words, force)
 
 
 def check_words(families: Iterable[Profile], unit: int, address: int, words: int | Sequence[int]) -> None:
@@ -112,6 +73,11 @@ def _plain(family: Profile, address: int) -> int:
         return address
     memory = family.memory()
     return address & ~(1 << (15 if memory is None else memory["bit"]))
+
+
+def prepare_guard() -> None:
+    """Works out what `check_words` looks at, so that nothing urgent waits for that."""
+    _command_registers()
 
 
 @functools.cache

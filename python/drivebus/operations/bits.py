@@ -130,7 +130,7 @@ async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], forc
     if not moves:
         await words.write(unit, address, word, read_back=unit.profile.read_back(register))
         return
-    unit.memory.started_unverified |= unit.unverified
+    unit.record.started_unverified |= unit.unverified
     await commands.send_once(unit, A_WORD, address, word)
 
 

@@ -1,4 +1,4 @@
-"""One command to one drive: sent once, and proved by what the drive's own state says afterwards.
+"""One command to one drive: sent once, and proved by what the drive's own state says afterwards. A halt is `halting`.
 
 Where the family has no state that may be used, the drive's confirmation of the command is the proof, and its fault
 number is looked at.
@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 
 from drivebus import places
-from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
-from drivebus.operations import halts, setpoints, state, words
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.identify.harm import HALTS
+from drivebus.operations import setpoints, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
@@ -18,25 +19,28 @@ from drivebus.values import ControlSource
 
 __all__ = [
     "A_WORD",
-    "HALTS",
+    "MAY",
     "POLL_INTERVAL",
     "Proof",
     "confirm",
-    "explained",
     "give",
     "prepared",
     "send_once",
     "send_whole",
+    "state_afterwards",
 ]
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
 
+_LONGER_INTERVAL = 0.1
+"""The same, where it takes longer than it was given. Each look goes before all who wait, as the stop did."""
+
 _WRITE_MANY = 0x10
 
 A_WORD = "a word that can move the motor"
 
-_MAY = {
+MAY = {
     A_WORD: "the motor may turn",
     "run_forward": "the motor may turn",
     "run_reverse": "the motor may turn",
@@ -53,9 +57,6 @@ _WHATEVER_IT_IS = ("reset_fault",)
 """Commands that are given to a unit that contradicts its profile too, as those that halt are: whether a drive gets out
 of a fault shall not depend on a name. It has shown that fault in the words of the profile. One that behaves as a unit
 of another family gets none: that word may start its motor."""
-
-HALTS = ("stop", "coast", "jog_stop")
-"""Commands that go out at once, even to a drive that seems deaf: it may hear although nothing is heard of it."""
 
 
 async def give(unit: Unit, name: str) -> None:
@@ -81,9 +82,9 @@ async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequenc
     """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too."""
     first = unit.profile.command_first(name)
     if first is not None:
-        before = halts.begun(unit)
+        before = unit.record.halts_begun
         await send_once(unit, name, *first)
-        if name not in HALTS and halts.begun(unit) != before:
+        if unit.record.halts_begun != before:
             raise Unconfirmed(
                 f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
                 f"which comes before {name}; the rest of {name} was not sent",
@@ -94,42 +95,24 @@ async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequenc
 
 async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
-    urgent = name in HALTS
     try:
-        if urgent:
-            halts.begin(unit)
-            await words.send(unit, address, payload, urgent=True)
-            unit.memory.halts += 1
-        else:
-            await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
+        await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
     except LINE_ERRORS as error:
-        if error.started is None and not urgent:
+        if error.started is None:
             raise
-        unit.memory.halts += urgent and error.started is not None
-        raise await explained(unit, name, error) from error
-
-
-async def explained(unit: Unit, name: str, error: NoAnswer | BadAnswer | PortError) -> DrivebusError:
-    """What became of the command *name*, which the line failed with *error*: the error for who gave it."""
-    if error.started is None:
-        return type(error)(
-            f"{name} could not be sent to unit {unit.address} ({error}); {_MAY[name]}",
+        raise Unconfirmed(
+            f"{name} was sent to unit {unit.address} and not confirmed ({error}); {MAY[name]}. "
+            f"{await state_afterwards(unit)}. It was not repeated",
             unit=unit.address,
             request=error.request,
+            raw=error.raw,
+            started=error.started,
             ended=error.ended,
-        )
-    return Unconfirmed(
-        f"{name} was sent to unit {unit.address} and not confirmed ({error}); {_MAY[name]}. "
-        f"{await _state_afterwards(unit, name in HALTS)}. It was not repeated",
-        unit=unit.address,
-        request=error.request,
-        raw=error.raw,
-        started=error.started,
-        ended=error.ended,
-    )
+        ) from error
 
 
-async def _state_afterwards(unit: Unit, urgent: bool) -> str:
+async def state_afterwards(unit: Unit, *, urgent: bool = False) -> str:
+    """The state of *unit* after a command of which nothing is known, in words: as it is read now, or was seen last."""
     try:
         return f"State seen afterwards: {await state.glance(unit, urgent=urgent)}"
     except (*LINE_ERRORS, Refused) as error:
@@ -174,6 +157,11 @@ class Proof:
         if self._fall is not None:
             self._fall.until += seconds
 
+    @property
+    def pause(self) -> float:
+        """Seconds to the next look: what takes longer than it was given leaves others the line in between."""
+        return POLL_INTERVAL if self._unit.bus.now() <= self._deadline else _LONGER_INTERVAL
+
     async def look(self) -> bool:
         """Looks once. Whether nothing is left to be proved.
 
@@ -184,7 +172,7 @@ class Proof:
             return True
         unit, command, fall = self._unit, self._command, self._fall
         try:
-            seen = await state.glance(unit, urgent=command in HALTS and unit.bus.now() <= self._deadline)
+            seen = await state.glance(unit, urgent=command in HALTS)
             if await self._shows(seen):
                 return True
             last = f"state seen last: {seen}"
@@ -202,13 +190,18 @@ class Proof:
         except PortError as error:
             raise Unconfirmed(
                 f"{command} was sent to unit {unit.address}; the port was lost before its state showed it ({error}): "
-                f"{_MAY[command]}; {state.seen_last(unit)}. It was not repeated",
+                f"{MAY[command]}; {state.seen_last(unit)}{_once(command)}",
                 unit=unit.address,
             ) from error
         if not is_over and unit.bus.now() < (self._deadline if fall is None else fall.until):
             return False
         raise Unconfirmed(
-            f"{command} was sent to unit {unit.address}, and its state does not show it: {_MAY[command]}; {last}. "
-            "It was not repeated",
+            f"{command} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}"
+            f"{_once(command)}",
             unit=unit.address,
         )
+
+
+def _once(command: str) -> str:
+    """That *command* was sent once, where that is so: a halt is sent until it is taken."""
+    return "" if command in HALTS else ". It was not repeated"

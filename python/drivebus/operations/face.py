@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import functools
-import weakref
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
+from drivebus.line.units import units_of
 from drivebus.operations import registers
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import Description, Value
 
-__all__ = ["DriveFace", "LivingDrives", "awaited", "blocking", "documented_by", "unit_of"]
+__all__ = ["DriveFace", "awaited", "blocking", "documented_by", "unit_of", "views"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -40,6 +40,15 @@ class DriveFace:
 
     def __repr__(self) -> str:
         return f"<Drive {self.unit}: {self.profile.name}{', unverified' if self.unverified else ''}>"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether *other* is a handle of the same unit, in the words of the same family."""
+        if not isinstance(other, DriveFace):
+            return NotImplemented
+        return self._unit.record is other._unit.record and self.profile.name == other.profile.name
+
+    def __hash__(self) -> int:
+        return hash((id(self._unit.record), self.profile.name))
 
     @property
     def unverified(self) -> bool:
@@ -73,30 +82,15 @@ def unit_of(drive: DriveFace) -> Unit:
     return drive._unit
 
 
-class LivingDrives:
-    """The drives that a bus gave out: how far each is trusted, and what is remembered of those that somebody has."""
-
-    def __init__(self) -> None:
-        self._drives: weakref.WeakSet[DriveFace] = weakref.WeakSet()
-        self._trusted: set[tuple[int, str]] = set()
-
-    def add(self, drive: DriveFace) -> None:
-        """From now on *drive* is known."""
-        self._drives.add(drive)
-        if drive.unverified:
-            self._trusted.add((drive.unit, drive.profile.name))
-
-    def views(self, bus: AwaitableBus, profiles: Mapping[int, Profile]) -> list[Unit]:
-        """The units of *profiles* on *bus*: each as who started it last sees it, and trusted as far as it ever was."""
-        return [self._view(bus, address, profile) for address, profile in profiles.items()]
-
-    def _view(self, bus: AwaitableBus, address: int, profile: Profile) -> Unit:
-        held = [unit_of(drive) for drive in self._drives if drive.unit == address]
-        same = [unit for unit in held if unit.profile.name == profile.name]
-        trusted = (address, profile.name) in self._trusted or any(unit.memory.started_unverified for unit in same)
-        if not same:
-            return Unit.at(bus, address, profile, None, unverified=trusted, trust_profile=False)
-        return max(same, key=lambda unit: unit.memory.starts).trusting(trusted)
+def views(bus: AwaitableBus) -> list[Unit]:
+    """The units of *bus* that a drive was asked for: as who started each last sees it, with what trust it ever had."""
+    seen = []
+    for record in units_of(bus.line).named():
+        profile = record.profile
+        if profile is not None:
+            trusted = profile.name in record.trusted or record.started_unverified
+            seen.append(Unit.at(bus, record.address, profile, None, unverified=trusted, trust_profile=False))
+    return seen
 
 
 def blocking(

@@ -1,14 +1,17 @@
 """Commands that move a motor, and the proof that they did.
 
-Three rules hold for every command. What can be checked is checked before anything is sent. The command is sent once and
-never repeated. Success is what the drive's own state says afterwards; if that cannot be learnt, the caller is told so.
+Three rules hold for every command. What can be checked is checked before anything is sent. The command is sent once,
+and never repeated unless it halts. Success is what the drive's own state says afterwards; if that cannot be learnt, the
+caller is told so.
 """
 
 from __future__ import annotations
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import NotAllowed, Unconfirmed
 from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
+from drivebus.operations.aim import check_harmless
+from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.program_end import before_start
 from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
@@ -18,11 +21,12 @@ from drivebus.values import ControlSource, State
 __all__ = [
     "coast",
     "end_jog",
+    "end_run",
     "halting",
     "has_jog_stop",
     "jog",
     "jog_stop",
-    "proof_of_halt",
+    "prove",
     "reset_fault",
     "run",
     "stop",
@@ -101,7 +105,7 @@ async def jog(
     await _start(unit, command, None, reverse, before, confirm)
 
 
-async def stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+async def stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
     """Stops the motor as the drive is set to stop it, usually by a ramp. Sent at once, whatever the state is.
 
     Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
@@ -113,28 +117,37 @@ async def stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) ->
     the drive's ramp is known half as long again as that takes. A drive that tells none is looked at for *confirm*.
 
     It overtakes whatever else waits for the line, as do the reads that confirm it, and goes out to a drive that
-    seems deaf too. Sent once.
+    seems deaf too. It is sent again until the drive takes it, for *within* seconds: a frame that was lost, and one
+    that was refused, stops nothing.
+
+    A unit that has not said yet what it is on this line is asked before, where the word may start a drive of another
+    family: a few words, in some 0.1 s. One that shows another family is stopped as that family is.
+
+    Args:
+        confirm: Seconds for which the state is looked at; 0 does not look.
+        within: Seconds, 0..3600, for which it is sent until the drive takes it.
+        unverified: Also where the command is not verified for the family.
 
     Raises:
-        NotAllowed: The command is not verified for the family, and nothing was started as *unverified* either. It
-            was not sent.
-        Refused: The drive did not take it; it still runs if it ran.
+        NotAllowed: The command is not verified for the family, and nothing was started as *unverified* either. Or
+            the unit may be of another family, which it would start. It was not sent.
+        Refused: The drive did not take it, in all that time; it still runs if it ran.
         PortError: It could not be sent; the drive goes on as it was.
         Unconfirmed: It was sent, and the drive does not show it: the motor may still turn.
     """
-    await _halt(unit.trusting(unverified), "stop", confirm)
+    await _halt(unit.trusting(unverified), "stop", confirm, within)
 
 
-async def coast(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
-    """Switches the output off: the motor turns on until friction stops it. Errors as for `stop`.
+async def coast(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
+    """Switches the output off: the motor turns on until friction stops it. Arguments and errors as for `stop`.
 
     Returns when the drive is stopped: what coasts has no ramp.
     """
-    await _halt(unit.trusting(unverified), "coast", confirm)
+    await _halt(unit.trusting(unverified), "coast", confirm, within)
 
 
-async def jog_stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
-    """Ends a jog by the jog's own ramp. Errors as for `stop`; without such a command they say what does."""
+async def jog_stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
+    """Ends a jog by the jog's own ramp. As `stop`; where there is no such command, the error says what ends it."""
     unit = unit.trusting(unverified)
     if "jog_stop" not in unit.profile.commands():
         jogs = "jog_forward" in unit.profile.commands()
@@ -143,13 +156,17 @@ async def jog_stop(unit: Unit, *, confirm: float = 1.0, unverified: bool = False
             f"{unit.profile.title} has no command that ends a jog alone{ends}; nothing was sent to unit {unit.address}",
             unit=unit.address,
         )
-    await _halt(unit, "jog_stop", confirm)
+    await _halt(unit, "jog_stop", confirm, within)
 
 
-async def end_jog(unit: Unit, *, unverified: bool = False) -> None:
-    """Ends a jog as the family does: by its jog stop, or else by a stop. Errors as for `stop`."""
-    unit = unit.trusting(unverified)
-    await (jog_stop(unit) if has_jog_stop(unit) else stop(unit))
+async def end_run(unit: Unit, within: float = WITHIN, *, confirm: float = 1.0) -> None:
+    """Stops a motor by all means: by a stop, and where that is not taken now and then by a coast. As `stop`."""
+    await _halt(unit, "stop", confirm, within, coasts=True)
+
+
+async def end_jog(unit: Unit, within: float = WITHIN) -> None:
+    """Ends a jog by all means, by its jog stop or else by a stop. Errors as for `stop`."""
+    await _halt(unit, "jog_stop" if has_jog_stop(unit) else "stop", 1.0, within, coasts=True)
 
 
 def has_jog_stop(unit: Unit) -> bool:
@@ -179,6 +196,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     async def shows(seen: Seen) -> bool:
         return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
 
+    await check_harmless(unit, "reset_fault")
     await commands.give(unit, "reset_fault")
     await commands.confirm(unit, "reset_fault", shows, confirm)
 
@@ -188,11 +206,12 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     turning_round = before.state.running and before.state is not wanted
     frequency = await speed.output_frequency(unit) if turning_round else None
     # Who started it so must not be kept from stopping it.
-    unit.memory.started_unverified |= unit.unverified
+    unit.record.started_unverified |= unit.unverified
     before_start()
     # Before it is sent: whoever is interrupted from here on has to end it.
-    unit.memory.starts += 1
-    unit.memory.started_as = State.UNKNOWN if command.startswith("jog") else wanted
+    unit.record.starts += 1
+    unit.record.started_under = unit.profile
+    unit.record.started_as = State.UNKNOWN if command.startswith("jog") else wanted
     address, payload = await commands.prepared(unit, command, setpoint)
     if not before.state.running:
         await start_sequence.lead_up(unit, command, confirm)
@@ -210,18 +229,41 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     await commands.confirm(unit, command, shows, confirm)
 
 
-async def _halt(unit: Unit, command: str, confirm: float) -> None:
+async def _halt(unit: Unit, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    within = checks.number("within", within, 0.0, 3600.0)
     unit = halting(unit, command)
     unit.evidence.commands(command)
-    sent = unit.bus.now()
-    await commands.give(unit, command)
-    proof = proof_of_halt(unit, command, sent, unit.bus.now(), confirm)
-    while not await proof.look():
-        await unit.bus.sleep(commands.POLL_INTERVAL)
+    can_coast = coasts and unit.evidence.unusable("coast") is None
+    halt = Halt(unit, (command, command, command, "coast") if can_coast else (command,), within)
+    while True:
+        await halt.until_taken()
+        try:
+            proof = await prove(halt, confirm)
+            while not await proof.look():
+                await unit.bus.sleep(proof.pause)
+        except Unconfirmed:
+            # What was only acknowledged may not have been carried out.
+            if halt.is_confirmed or halt.is_over:
+                raise
+        else:
+            return
 
 
-def proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
+async def prove(halt: Halt, within: float) -> commands.Proof:
+    """The looks that prove a *halt* that was taken, once the unit has said that it is what was halted.
+
+    One that says it is something else is halted as that first.
+
+    Raises:
+        NotAllowed, Refused, NoAnswer, BadAnswer, PortError, Unconfirmed: It is not halted as what it is, or does not
+            say what that is.
+    """
+    await halt.vouch()
+    return _proof_of_halt(halt.unit, halt.command, halt.sent, halt.confirmed, within)
+
+
+def _proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
     """The looks that prove a *command* that halts, *sent* and *confirmed* at these times of the line's clock.
 
     Where the family has no state that may be used, the confirmation is all there is: nothing is left to be proved.
@@ -235,20 +277,19 @@ def proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, withi
     async def shows(seen: Seen) -> bool:
         nonlocal by_ramp, ramp
         asked = unit.bus.now()
-        urgent = not fall.is_overdue(asked)
-        turns = await speed.turns_in_spite_of(unit, seen.state, urgent=urgent)
+        turns = await speed.turns_in_spite_of(unit, seen.state, urgent=True)
         if seen.state.at_rest and not turns:
             return fall.rests(asked)
         fall.goes_on()
         if not (seen.state.running or turns):
             return False
-        frequency, setpoint = await speed.frequencies(unit, urgent=urgent)
+        frequency, setpoint = await speed.frequencies(unit, urgent=True)
         if frequency is None:
             return False
         fall.see(frequency, setpoint, asked, unit.bus.now())
         by_ramp &= seen.source in (ControlSource.COMMUNICATION, None) and _turns_as_started(unit, seen.state)
         if ramp is None and fall.is_worth_asking():
-            ramp = await speed.ramp(unit, urgent=urgent)
+            ramp = await speed.ramp(unit, urgent=True)
             # One that is slow to say nothing of it has still been falling meanwhile.
             fall.until += unit.bus.now() - fall.seen_at
         if ramp is None or ramp.slope is None:
@@ -261,9 +302,9 @@ def proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, withi
 
 def _turns_as_started(unit: Unit, seen: State) -> bool:
     """Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog."""
-    return unit.memory.started_as in (None, seen)
+    return unit.record.started_as in (None, seen)
 
 
 def halting(unit: Unit, command: str) -> Unit:
     """The same unit; where a start was forced on what is not verified, as *command* is, with the same trust."""
-    return unit.trusting(unit.memory.started_unverified and unit.evidence.unusable(command) is not None)
+    return unit.trusting(unit.record.started_unverified and unit.evidence.unusable(command) is not None)

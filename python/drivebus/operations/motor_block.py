@@ -10,13 +10,14 @@ from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import motion, waiting
+from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import Guard
 from drivebus.operations.unit import Unit
 
 __all__ = ["MotorBlock"]
 
 _END_ATTEMPTS = 3
-"""How often a stop is sent that is not confirmed, before the drive is told to coast."""
+"""How often a motor is stopped whose drive took it and does not show it, before it is told to coast."""
 
 _INTERRUPTED_AT_MOST = 64
 """How often an attempt that was interrupted before anything was sent counts as none."""
@@ -33,19 +34,23 @@ class MotorBlock:
     Args:
         unit: What turns.
         start: Starts it.
-        end: Ends it, over the view of the unit that it is given: it may be that of another thread.
+        end: Ends it, over the view of the unit that it is given, which may be that of another thread, and within the
+            seconds that it is given.
         standstill: For how many seconds it is waited for, once it was ended; None does not wait. What ends the program
             is not kept waiting.
+        within: For how many seconds it is told to end until it takes that.
     """
 
     def __init__(
         self,
         unit: Unit,
         start: Callable[[], Awaitable[None]],
-        end: Callable[[Unit], Awaitable[None]],
+        end: Callable[[Unit, float], Awaitable[None]],
         standstill: float | None = None,
+        within: float = WITHIN,
     ) -> None:
         self._unit = unit
+        self._within = within
         self._standstill = standstill
         self._start = start
         self._end = end
@@ -53,7 +58,7 @@ class MotorBlock:
         self._elsewhere = unit.over(unit.bus.blocking())
         self._guard = Guard(self._end_at_once, unit.bus.line)
         self._started = False
-        self._starts_before = unit.memory.starts
+        self._starts_before = unit.record.starts
 
     async def begin(self) -> None:
         """Starts the motor.
@@ -82,7 +87,7 @@ class MotorBlock:
                 # before that, a Ctrl-C for one, leaves a motor alone that somebody else may run.
                 may_turn = isinstance(reason, Unconfirmed) or not isinstance(reason, DrivebusError)
                 failure = interrupted = None
-                if self._started or (may_turn and self._unit.memory.starts > self._starts_before):
+                if self._started or (may_turn and self._unit.record.starts > self._starts_before):
                     failure, interrupted = await self._stop(bus)
                     ended = failure is None
                     if failure is not None:
@@ -126,8 +131,8 @@ class MotorBlock:
         return f"unit {self._unit.address} was told to stop, but was not seen at rest"
 
     def _keeping_interruptions(self) -> AbstractContextManager[object]:
-        before = self._unit.memory.halts
-        return self._guard.keeping_interruptions(lambda: self._unit.memory.halts > before)
+        before = self._unit.record.halts
+        return self._guard.keeping_interruptions(lambda: self._unit.record.halts > before)
 
     async def _stop(self, bus: AwaitableBus) -> _Outcome:
         if not self._guard.begin_to_end():
@@ -155,10 +160,13 @@ class MotorBlock:
         interrupted: BaseException | None = None
         failure: DrivebusError | None = None
         attempts = interruptions = 0
+        until = unit.bus.now() + self._within
         while attempts <= _END_ATTEMPTS:
-            sent_before = unit.memory.halts
+            sent_before = unit.record.halts
+            # What was not taken by then is not waited for so long again.
+            left = max(until - unit.bus.now(), 0.0)
             try:
-                await (self._end(unit) if attempts < _END_ATTEMPTS else motion.coast(unit))
+                await (self._end(unit, left) if attempts < _END_ATTEMPTS else motion.coast(unit, within=left))
             except DrivebusError as error:
                 failure = error
                 attempts += 1
@@ -169,7 +177,7 @@ class MotorBlock:
                 interrupted = interrupted or error
                 interruptions += 1
                 # What was interrupted before it was sent was no attempt.
-                attempts += unit.memory.halts > sent_before or interruptions > _INTERRUPTED_AT_MOST
+                attempts += unit.record.halts > sent_before or interruptions > _INTERRUPTED_AT_MOST
             else:
                 return None, interrupted
         return failure, interrupted

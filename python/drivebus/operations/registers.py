@@ -106,7 +106,7 @@ async def contradiction(unit: Unit) -> str | None:
     Raises:
         NoAnswer, BadAnswer, PortError: It did not tell.
     """
-    return await unit.memory.identity.contradiction(unit.bus)
+    return await unit.identity.contradiction(unit.bus)
 
 
 def _monitored(evidence: Evidence) -> Sequence[str]:

@@ -93,20 +93,20 @@ async def _shown(unit: Unit, run: Sequence[Planned]) -> str:
 
 def is_in_ram(unit: Unit, name: str) -> bool:
     """Whether this program wrote *name* to RAM, and not to EEPROM since: what it reads as is then not stored."""
-    return key(unit.profile.describe(name)) in unit.memory.in_ram
+    return key(unit.profile.describe(name)) in unit.record.in_ram
 
 
 def put_in_ram(unit: Unit, known: Description) -> None:
     """Says that a parameter is about to be written to RAM: the drive may take it although its answer is lost."""
-    unit.memory.in_ram.add(key(known))
+    unit.record.in_ram.add(key(known))
 
 
 def stored(unit: Unit, known: Description) -> None:
     """Says that a parameter was written to EEPROM, and warns of a program that does that in a loop."""
     name = key(known)
-    unit.memory.in_ram.discard(name)
-    unit.memory.stores[name] += 1
-    times = unit.memory.stores[name]
+    unit.record.in_ram.discard(name)
+    unit.record.stores[name] += 1
+    times = unit.record.stores[name]
     if times >= _STORES_BEFORE_WARNING:
         warnings.warn(
             f"{name} of unit {unit.address} was stored in EEPROM {times} times by this program; "

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
-from drivebus.operations import commands, halts, state, words
+from drivebus.operations import commands, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -41,7 +41,7 @@ async def lead_up(unit: Unit, command: str, within: float) -> None:
             sent.
     """
     steps = unit.profile.start_sequence()
-    before = halts.begun(unit)
+    before = unit.record.halts_begun
     for number, step in enumerate(steps):
         await _Step(unit, command, step, before, is_first=number == 0).take(within)
 
@@ -77,7 +77,7 @@ class _Step:
         while True:
             try:
                 seen = await state.glance(unit)
-                if halts.begun(unit) != self._halts_before:
+                if unit.record.halts_begun != self._halts_before:
                     raise self._failed(f"it was told to stop when {self._called} had been sent")
                 if seen.tripped:
                     trip = f"it is in fault {seen.fault or '(not named)'} since {self._called} was sent"

@@ -285,14 +285,14 @@ def state_of(unit: Unit, word: int) -> State:
 
 def remember(unit: Unit, seen: str) -> None:
     """Keeps the last state that was seen, for errors after which none can be read."""
-    unit.memory.last_state = (seen, unit.bus.now())
+    unit.record.last_state = (seen, unit.bus.now())
 
 
 def seen_last(unit: Unit) -> str:
     """The last state that was seen, and how long ago on the line's clock."""
-    if unit.memory.last_state is None:
+    if unit.record.last_state is None:
         return "no state was ever seen"
-    seen, at = unit.memory.last_state
+    seen, at = unit.record.last_state
     # A line that is lost may have no clock.
     age = max(unit.bus.now() - at, 0.0)
     return f"state seen last, {age:.1f} s ago: {seen}"

@@ -1,4 +1,4 @@
-"""The stop of all drives of a line: first every stop goes out, then each is proved.
+"""The stop of all drives of a line: first every stop goes out, then each is sent until it is taken, and proved.
 
 Nothing is sent to all units at once: the code that stops one family means something else to another. So each drive gets
 its own. Those that answered last time come first, so that a silent one keeps none of them waiting.
@@ -7,11 +7,12 @@ its own. Those that answered last time come first, so that a silent one keeps no
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from drivebus import checks
-from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, NotStopped
-from drivebus.operations import commands, halts, motion, words
+from drivebus.errors import DrivebusError, NotAllowed, NotStopped
+from drivebus.operations import commands, motion
+from drivebus.operations.aim import goes_out_at_once
+from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.unit import Unit
 
 __all__ = ["stop_all"]
@@ -19,76 +20,84 @@ __all__ = ["stop_all"]
 _STOP = "stop"
 
 
-@dataclass(slots=True)
-class _Told:
-    """One drive, and what became of its stop."""
+class _Stop:
+    """One drive on its way to its proved stop."""
 
-    unit: Unit
-    sent: float = 0.0
-    confirmed: float = 0.0
-    failure: DrivebusError | None = None
+    def __init__(self, unit: Unit, confirm: float, within: float) -> None:
+        self.address = unit.address
+        self.failure: DrivebusError | None = None
+        self._unit, self._confirm = motion.halting(unit, _STOP), confirm
+        self._halt = Halt(self._unit, (_STOP,), within)
+        self._proof: commands.Proof | None = None
+        self._is_taken = False
+
+    async def advance(self) -> bool:
+        """Does the next thing: sends, asks what it is, or looks. Whether nothing is left to be done."""
+        try:
+            return await self._next()
+        except DrivebusError as error:
+            self.failure = error
+            return True
+
+    async def _next(self) -> bool:
+        if self._proof is not None:
+            return await self._proof.look()
+        if self._is_taken:
+            self._proof = await motion.prove(self._halt, self._confirm)
+            return False
+        self._unit.evidence.commands(_STOP)
+        self._is_taken = await self._halt.step()
+        if not self._is_taken and self._halt.is_over:
+            raise await self._halt.failure()
+        return False
+
+    @property
+    def pause(self) -> float:
+        """Seconds until there is something to do again."""
+        return commands.POLL_INTERVAL if self._proof is None else self._proof.pause
+
+    def wait(self, seconds: float) -> None:
+        """For *seconds* others were seen to: its proof does not count them."""
+        if self._proof is not None:
+            self._proof.wait(seconds)
 
 
-async def stop_all(units: Iterable[Unit], *, confirm: float = 1.0, unverified: bool = False) -> list[int]:
+async def stop_all(
+    units: Iterable[Unit], *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False
+) -> list[int]:
     """Stops *units*, which hang on one line, and returns their addresses. See `drivebus.Bus.stop_all`."""
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-    all_told = [_Told(motion.halting(unit.trusting(unverified), _STOP)) for unit in units]
-    if not all_told:
+    within = checks.number("within", within, 0.0, 3600.0)
+    trusted = [unit.trusting(unverified) for unit in units]
+    if not trusted:
         raise NotAllowed(
             "no drive is known on this bus, so nobody was told to stop: ask for each with drive(unit) first. "
             "If a motor must stop now, use the emergency stop"
         )
-    links = [await one.unit.bus.link(one.unit.address) for one in all_told]
-    is_deaf = [link.asked > 0 and link.good == 0 for link in links]
-    for one, _ in sorted(zip(all_told, is_deaf, strict=True), key=lambda each: each[1]):
-        await _tell(one)
-    await _prove([one for one in all_told if one.failure is None], confirm)
-    failures: dict[int, DrivebusError] = {}
-    for one in all_told:
-        failure = one.failure
-        if isinstance(failure, LINE_ERRORS):
-            # Only now: this asks a unit that gave no answer for its state.
-            failure = await commands.explained(one.unit, _STOP, failure)
-        if failure is not None:
-            failures[one.unit.address] = failure
-    if failures:
-        raise _not_stopped(len(all_told), failures)
-    return [one.unit.address for one in all_told]
-
-
-async def _tell(one: _Told) -> None:
-    """Sends one drive its stop, once; what comes of it is looked at later."""
-    unit = one.unit
-    one.sent = unit.bus.now()
-    try:
-        unit.evidence.commands(_STOP)
-        halts.begin(unit)
-        await words.send(unit, *unit.profile.command(_STOP), urgent=True)
-        unit.memory.halts += 1
-    except DrivebusError as error:
-        unit.memory.halts += error.started is not None
-        one.failure = error
-    one.confirmed = unit.bus.now()
-
-
-async def _prove(told: Iterable[_Told], within: float) -> None:
-    """Looks at each in turn until all have shown that they stop, or are not worth another look."""
-    pending = [(one, motion.proof_of_halt(one.unit, _STOP, one.sent, one.confirmed, within)) for one in told]
+    bus = trusted[0].bus
+    links = [await bus.link(unit.address) for unit in trusted]
+    # Who is silent, or has to be asked first what it is, keeps nobody waiting.
+    later = [
+        (link.asked > 0 and link.good == 0, not goes_out_at_once(unit, _STOP))
+        for link, unit in zip(links, trusted, strict=True)
+    ]
+    stops = [_Stop(unit, confirm, within) for unit in trusted]
+    pending = [stop for stop, _ in sorted(zip(stops, later, strict=True), key=lambda each: each[1])]
     while pending:
-        for one, proof in list(pending):
-            began = one.unit.bus.now()
-            try:
-                proved = await proof.look()
-            except DrivebusError as error:
-                one.failure, proved = error, True
-            if proved:
-                pending.remove((one, proof))
-            took = one.unit.bus.now() - began
-            for _, other in pending:
-                if other is not proof:
+        for stop in list(pending):
+            began = bus.now()
+            if await stop.advance():
+                pending.remove(stop)
+            took = bus.now() - began
+            for other in pending:
+                if other is not stop:
                     other.wait(took)
         if pending:
-            await pending[0][0].unit.bus.sleep(commands.POLL_INTERVAL)
+            await bus.sleep(min(stop.pause for stop in pending))
+    failures = {stop.address: stop.failure for stop in stops if stop.failure is not None}
+    if failures:
+        raise _not_stopped(len(stops), failures)
+    return [stop.address for stop in stops]
 
 
 def _not_stopped(count: int, failures: dict[int, DrivebusError]) -> NotStopped:

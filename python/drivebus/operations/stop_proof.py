@@ -70,10 +70,6 @@ class Fall:
         self._looks: list[_Look] = []
         self._off = False
 
-    def is_overdue(self, now: float) -> bool:
-        """Whether it is looked at beyond its time: others who wait for the line then have their turn."""
-        return now > self._due
-
     def goes_on(self) -> None:
         """It is not at rest."""
         self._went_on, self._rests_since = True, None

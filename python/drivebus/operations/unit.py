@@ -1,60 +1,36 @@
-"""One unit as one call sees it, and what is remembered of it between calls."""
+"""One unit as one call sees it: a view of what its line knows of it, in the words of one profile."""
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from drivebus import checks
 from drivebus.identify.same_unit import SameUnit
 from drivebus.line.protocols import AwaitableBus
+from drivebus.line.units import UnitRecord, units_of
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.values import State
 
-__all__ = ["Memory", "Unit"]
-
-
-@dataclass(slots=True)
-class Memory:
-    """What a drive's handle keeps between calls. Every view of its unit shares it.
-
-    Attributes:
-        identity: What it said it is, and since when that is known.
-        last_state: The state that was seen last, in words, and when on the line's clock.
-        in_ram: Parameters that were written to RAM and not to EEPROM since: what they read as is then not stored.
-        stores: How often each parameter was written to EEPROM.
-        starts: How many starts were sent, or were about to be.
-        halts: How many stops have gone out, of whatever kind.
-        started_as: How it was started here last; unknown after a jog or a raw write. None: it was not.
-        started_unverified: Whether it was started by what is not verified, and so may be stopped by that.
-    """
-
-    identity: SameUnit
-    last_state: tuple[str, float] | None = None
-    in_ram: set[str] = field(default_factory=set)
-    stores: Counter[str] = field(default_factory=Counter)
-    starts: int = 0
-    halts: int = 0
-    started_as: State | None = None
-    started_unverified: bool = False
+__all__ = ["Unit"]
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """One unit as one call sees it. Another bus or more trust make another view of the same memory.
+    """One unit as one call sees it. Another bus or more trust make another view of the same record.
 
     Attributes:
         bus: The line it hangs on.
         address: 1..247.
         evidence: Its profile, under one trust.
-        memory: What is kept of it between calls.
+        record: What the line knows of it.
+        identity: Whether it is what its profile says, and still the one it was.
     """
 
     bus: AwaitableBus
     address: int
     evidence: Evidence
-    memory: Memory
+    record: UnitRecord
+    identity: SameUnit
 
     @classmethod
     def at(
@@ -67,11 +43,11 @@ class Unit:
         unverified: bool,
         trust_profile: bool,
     ) -> Unit:
-        """The unit at *address*, of which nothing is remembered but its *identification*, if it was asked for that."""
-        trusted = checks.flag("trust_profile", trust_profile)
-        identity = SameUnit(bus, address, profile, identification, trusted=trusted)
-        evidence = Evidence(profile, address, checks.flag("unverified", unverified))
-        return cls(bus, address, evidence, Memory(identity))
+        """The unit at *address*, which gave the code *identification*, if it was asked for that."""
+        # A line of somebody's own may not say what stands for it.
+        record = units_of(getattr(bus, "line", bus)).record(address)
+        identity = SameUnit(bus, record, profile, identification, trusted=checks.flag("trust_profile", trust_profile))
+        return cls(bus, address, Evidence(profile, address, checks.flag("unverified", unverified)), record, identity)
 
     @property
     def profile(self) -> Profile:
@@ -92,6 +68,11 @@ class Unit:
         if not checks.flag("unverified", unverified) or self.unverified:
             return self
         return replace(self, evidence=self.evidence.trusting(True))
+
+    def taken_for(self, profile: Profile) -> Unit:
+        """The same unit, which shows that it is of *profile* and not what it was named as; trusted as that."""
+        identity = SameUnit(self.bus, self.record, profile)
+        return replace(self, evidence=Evidence(profile, self.address, True), identity=identity)
 
     def under(self, profile: Profile) -> Unit:
         """The same unit, whose words are known better: by *profile*."""

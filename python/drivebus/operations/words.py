@@ -59,7 +59,7 @@ async def write_words(unit: Unit, address: int, value: int | Sequence[int], forc
     if not checks.flag("force", force):
         check_words([unit.profile], unit.address, address, words)
     if unit.profile.is_command(address):
-        unit.memory.started_as = State.UNKNOWN
+        unit.record.started_as = State.UNKNOWN
     await write(unit, address, words, force=force)
 
 
@@ -79,7 +79,7 @@ async def write(
     not take it, it is sent again. With *read_back* the bus does that, and looks first.
     """
     again = 0 if absolute and read_back is None else _AGAIN
-    connection = await unit.memory.identity.check(unit.bus, judged=judged)
+    connection = await unit.identity.check(unit.bus, judged=judged)
     while True:
         try:
             await send(unit, address, value, read_back=read_back, connection=connection, force=force)
@@ -87,7 +87,7 @@ async def write(
             if error.started is not None or unit.bus.reconnects == connection:
                 raise
             # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
-            connection = await unit.memory.identity.check(unit.bus, judged=judged)
+            connection = await unit.identity.check(unit.bus, judged=judged)
             await send(unit, address, value, read_back=read_back, connection=connection, force=force)
         except Refused as error:
             if again >= _AGAIN or error.means != "ask_again":
@@ -103,31 +103,38 @@ async def send(
     value: int | Sequence[int],
     *,
     urgent: bool = False,
+    timeout: float | None = None,
     read_back: int | None = None,
     connection: int | None = None,
     force: bool = False,
-) -> None:
+) -> bool:
     """Writes to whatever unit answers at the address: for a stop, which asks nothing before.
 
     A drive that knows no 06H gets a single word by 10H.
+
+    Returns:
+        Whether the drive confirmed it; False where it only said that it took it and is still at it.
     """
     functions = unit.profile.functions
     if isinstance(value, int) and _WRITE_ONE not in functions and _WRITE_MANY in functions:
         value = [value]
-    # What a bus of somebody's own must know is the rest: only a raw write is ever forced.
-    forced: dict[str, Any] = {"force": True} if force else {}
+    # What a bus of somebody's own need not know: only a raw write is ever forced, and only a halt is in a hurry.
+    rest: dict[str, Any] = {"force": True} if force else {}
+    rest |= {} if timeout is None else {"timeout": timeout}
     first, table = places.at(address)
     if read_back is not None:
         read_back, _ = places.at(read_back)
     try:
         with explained(unit):
             await unit.bus.write(
-                unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **forced, **table
+                unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **rest, **table
             )
     except Refused as error:
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":
             raise
+        return False
+    return True
 
 
 @contextmanager

@@ -1,0 +1,150 @@
+"""What is known of the units of a line: one record for each address, owned by the line and seen by every handle.
+
+A record says what the unit was named as and said of itself, what was sent to it, and what it showed last. Whoever asks,
+a drive, a guard or a stop, asks here: two handles of one unit have one memory.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
+
+from drivebus.line.write_guard import check_words, prepare_guard
+from drivebus.profile import Profile
+from drivebus.rtu import written
+from drivebus.values import State
+
+__all__ = ["Identity", "UnitRecord", "Units", "belongs", "units_of"]
+
+
+@dataclass(slots=True)
+class Identity:
+    """What a unit said of itself, asked in the words of one profile.
+
+    Attributes:
+        connection: The `reconnects` of the line when that was heard.
+        known: Its answers, as they are compared with later ones; None while it has not told all of them.
+        contradicts: Whether they speak against the profile.
+        is_sure: Whether they leave no other family that one of its halts could start.
+    """
+
+    connection: int
+    known: str | None = None
+    contradicts: bool = False
+    is_sure: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class UnitRecord:
+    """What is known of one unit.
+
+    Attributes:
+        address: Its address, 1..247.
+        profiles: What it was asked for as, by name; the latest stands last.
+        identities: What it said of itself, by the name of the profile in whose words it was asked.
+        trusted: The names of profiles under which it was asked for as `unverified`.
+        last_state: The state that was seen last, in words, and when on the line's clock.
+        in_ram: Parameters that were written to RAM and not to EEPROM since: what they read as is then not stored.
+        stores: How often each parameter was written to EEPROM.
+        starts: How many starts were sent, or were about to be.
+        halts_begun: How many stops, of whatever kind, were about to go out.
+        halts: How many stops have gone out.
+        started_as: How it was started last; unknown after a jog or a raw write. None: it was not.
+        started_under: The profile by which it was started last.
+        started_unverified: Whether it was started by what is not verified, and so may be stopped by that.
+    """
+
+    address: int
+    profiles: dict[str, Profile] = field(default_factory=dict)
+    identities: dict[str, Identity] = field(default_factory=dict)
+    trusted: set[str] = field(default_factory=set)
+    last_state: tuple[str, float] | None = None
+    in_ram: set[str] = field(default_factory=set)
+    stores: Counter[str] = field(default_factory=Counter)
+    starts: int = 0
+    halts_begun: int = 0
+    halts: int = 0
+    started_as: State | None = None
+    started_under: Profile | None = None
+    started_unverified: bool = False
+
+    @property
+    def profile(self) -> Profile | None:
+        """The profile under which it is seen: that of its last start, where it was asked for as that, or the latest."""
+        latest = next(reversed(self.profiles.values()), None)
+        started = self.started_under
+        return started if latest is not None and started is not None and started.name == latest.name else latest
+
+    def identity(self, profile: Profile, connection: int) -> Identity:
+        """What it said of itself in the words of *profile*; nothing yet, where nobody asked since *connection* began.
+
+        Whoever asks for a drive anew takes whatever answers there now.
+        """
+        known = self.identities.get(profile.name)
+        if known is None or known.connection != connection:
+            known = self.identities[profile.name] = Identity(connection)
+        return known
+
+
+class Units:
+    """The units of one line, by address."""
+
+    def __init__(self) -> None:
+        self._records: dict[int, UnitRecord] = {}
+
+    def record(self, unit: int) -> UnitRecord:
+        """The record of *unit*, begun where there is none yet."""
+        return self._records.setdefault(unit, UnitRecord(unit))
+
+    def add(self, unit: int, profile: Profile, *, unverified: bool = False) -> None:
+        """From now on *unit* is known as what *profile* describes."""
+        record = self.record(unit)
+        record.profiles.pop(profile.name, None)  # what was asked for last stands last
+        record.profiles[profile.name] = profile
+        if unverified:
+            record.trusted.add(profile.name)
+        prepare_guard()  # now, so that no stop has to wait for it
+
+    def named(self) -> list[UnitRecord]:
+        """The records of the units that a drive was asked for."""
+        return [record for record in tuple(self._records.values()) if record.profiles]
+
+    def only(self, unit: int) -> Profile | None:
+        """The profile of *unit*, where it is known as one and no other."""
+        record = self._records.get(unit)
+        profiles = [] if record is None else list(record.profiles.values())
+        return profiles[0] if len(profiles) == 1 else None
+
+    def check(self, unit: int, address: int, words: int | Sequence[int], force: bool = False) -> None:
+        """Raises `NotAllowed` if the words would command *unit* (0: any of them) what its family does not define."""
+        if force or not self._records:
+            return
+        for record in self.named():
+            if unit in (0, record.address):
+                check_words(record.profiles.values(), record.address, address, words)
+
+    def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
+        """As `check`, for what a request to write carries; any other is let pass."""
+        write = written(pdu)
+        if write is not None:
+            address, words = write
+            self.check(unit, address, words, force)
+
+
+_BY_LINE: WeakKeyDictionary[object, Units] = WeakKeyDictionary()
+
+
+def belongs(units: Units, line: object) -> None:
+    """Says that *units* are those of *line*."""
+    _BY_LINE[line] = units
+
+
+def units_of(line: object) -> Units:
+    """The units of *line*, begun where there are none yet."""
+    # A bus of somebody's own may be nothing that a weak reference takes: then each handle has a memory of its own.
+    with suppress(TypeError):
+        return _BY_LINE.setdefault(line, Units())
+    return Units()

@@ -1,0 +1,170 @@
+"""As what a unit is halted: by the command of its name, or where it may be another drive by that of what it shows.
+
+The code that stops one family starts another. A unit that this line has identified is taken for what it is. Of any
+other a few words are asked first, before everything that waits for the line, and none of them again: `identify.apart`
+says which, and what they tell. A unit that says nothing at all is taken for what it was named as, since silence is no
+evidence; what it is is then asked behind the halt.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from drivebus import places
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.identify.answers import Answer, answer_at
+from drivebus.identify.apart import Apart
+from drivebus.identify.families import one_of
+from drivebus.identify.harm import halt_of, harmed, harms
+from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
+
+__all__ = ["ANSWER_WITHIN", "Aim", "Target", "check_harmless", "goes_out_at_once"]
+
+ANSWER_WITHIN = 0.1
+"""Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
+
+_QUESTIONS = 24
+"""Most questions about one unit; the longest way through the shipped families takes 15."""
+
+
+class Target(NamedTuple):
+    """What is sent to halt a unit.
+
+    Attributes:
+        unit: The unit, as the family that it is taken for.
+        command: The command of that family.
+    """
+
+    unit: Unit
+    command: str
+
+
+class Aim:
+    """The look at one unit that comes before a halt. What was answered is kept between two tries.
+
+    Args:
+        unit: The unit, as it was named.
+    """
+
+    def __init__(self, unit: Unit) -> None:
+        self._unit = unit
+        self._apart = Apart(unit.profile, trusted=unit.identity.trusted)
+        self._doubted = False
+
+    def doubt(self) -> None:
+        """Whether it is what it was halted as is in doubt: what it says now decides, and silence says nothing."""
+        if not self._doubted:
+            self._apart, self._doubted = Apart(self._unit.profile, trusted=self._unit.identity.trusted), True
+
+    async def take(self, command: str) -> Target | None:
+        """As what to halt the unit by *command*, or None where it did not say yet.
+
+        Raises:
+            NotAllowed: It may be one of several families that want different words, or fits none. Nothing was sent.
+            PortError: The port is lost.
+        """
+        unit = self._unit
+        if not self._doubted and goes_out_at_once(unit, command):
+            return Target(unit, command)
+        for _ in range(_QUESTIONS):
+            verdict = self._apart.verdict(command)
+            if verdict.take is not None:
+                return self._as(verdict.take, command)
+            if verdict.ask is None:
+                raise _undecided(unit, command, verdict.others)
+            try:
+                answer = await _ask(unit, verdict.ask)
+            except NoAnswer:
+                # Silence is no evidence. Where it spoke before, the line lost this one.
+                return None if self._apart.is_asked or self._doubted else Target(unit, command)
+            except BadAnswer:
+                return None
+            if not self._apart.heard(answer):
+                return None
+        raise _undecided(unit, command, ())
+
+    def _as(self, profile: Profile, command: str) -> Target:
+        """The unit as one of *profile*."""
+        unit = self._unit
+        if profile is unit.profile:
+            if self._apart.shows_named:
+                unit.identity.settle(unit.bus)
+            return Target(unit, command)
+        halt = halt_of(profile, command)
+        if halt is None:
+            raise _undecided(unit, command, (profile,))
+        # That its own papers are thin is no reason to let it run: nothing else halts what shows this family.
+        return Target(unit.taken_for(profile), halt)
+
+
+def goes_out_at_once(unit: Unit, command: str) -> bool:
+    """Whether nothing is asked before *command*: the line has identified the unit, or the word harms no family.
+
+    Where a name is said to be meant, only what the unit itself shows counts.
+    """
+    identity, bus = unit.identity, unit.bus
+    is_identified = identity.is_sure(bus) or (identity.is_known(bus) and not identity.trusted)
+    return is_identified or not harmed(unit.profile, command)
+
+
+async def check_harmless(unit: Unit, command: str) -> None:
+    """Makes sure that *command*, which does not halt, is not sent to a unit of a family that it would do harm to.
+
+    Sends reads, and only where the line has not identified the unit.
+
+    Raises:
+        NotAllowed: It shows such a family, or may be one. Nothing was written.
+        NoAnswer, BadAnswer, PortError: The line failed; nothing was written.
+    """
+    if goes_out_at_once(unit, command):
+        return
+    apart = Apart(unit.profile, trusted=unit.identity.trusted)
+    for _ in range(_QUESTIONS):
+        verdict = apart.verdict(command)
+        if verdict.ask is None:
+            taken = verdict.take
+            if taken is not None and (taken is unit.profile or not harms(taken, unit.profile, command)):
+                return
+            raise _another(unit, verdict.others if taken is None else (taken,))
+        if not apart.heard(await answer_at(unit.bus.read, unit.address, verdict.ask)):
+            break
+    raise _another(unit, ())
+
+
+async def _ask(unit: Unit, place: int) -> Answer:
+    first, table = places.at(place)
+    try:
+        [word] = await unit.bus.read(unit.address, first, urgent=True, timeout=ANSWER_WITHIN, retries=0, **table)
+    except Refused as error:
+        return Answer(place, None, error.code)
+    return Answer(place, word, None)
+
+
+def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllowed:
+    named = f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title})"
+    if not others:
+        return NotAllowed(
+            f"{named}, and what it answers fits neither that nor another family that can be halted over the bus: "
+            f"{command} was not sent, for it may start a drive of another family. If it is meant, say "
+            "trust_profile=True (`--trust-profile`). If a motor must stop now, use the emergency stop",
+            unit=unit.address,
+        )
+    titles = one_of(f"{profile.title} ({profile.name})" for profile in others)
+    then = one_of(f'profile="{profile.name}" (`--profile {profile.name}`)' for profile in others)
+    return NotAllowed(
+        f"{named}, and by what it answers it may be {titles}, which want different words: {command} was not sent, for "
+        f"it may start the motor. If you know which it is, say {then}. If it must stop now, use the emergency stop",
+        unit=unit.address,
+    )
+
+
+def _another(unit: Unit, others: tuple[Profile, ...]) -> NotAllowed:
+    titles = one_of(f"{profile.title} ({profile.name})" for profile in others) or "a drive of another family"
+    then = one_of(f'bus.drive({unit.address}, profile="{each.name}") (`--profile {each.name}`)' for each in others)
+    return NotAllowed(
+        f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title}), and by what it answers and refuses "
+        f"it may be {titles}{f': ask for it as that: {then}' if then else ''}; or say trust_profile=True "
+        "(`--trust-profile`) if it is meant; nothing was written to it",
+        unit=unit.address,
+    )

@@ -1,0 +1,215 @@
+"""A halt on its way: sent until the unit takes it, one frame after another, for as long as was said.
+
+A halt that was lost, refused because a frame arrived damaged, or put off by a drive that is busy, halts nothing. So it
+is sent again: every halt is an absolute word, and a motor that was told twice to stop stops once. What ends it is a
+confirmation, or the time. Nothing else that moves a motor is ever repeated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
+from drivebus.operations import commands, state, words
+from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
+from drivebus.operations.unit import Unit
+
+__all__ = ["WITHIN", "Halt"]
+
+WITHIN = 10.0
+"""Seconds for which a halt is sent that is not taken."""
+
+_PAUSE = 0.04
+"""Seconds of the line's clock between a frame that came to nothing at once, and the next."""
+
+
+class Halt:
+    """One unit that is to be halted.
+
+    Args:
+        unit: The unit, as it was named.
+        rota: The commands to send, one after another, from the first again behind the last.
+        within: Seconds for which they are sent.
+
+    Attributes:
+        unit: The unit, as the family that it is taken for.
+        command: What was sent last.
+        sent: The line's clock before the frame that was taken.
+        confirmed: The line's clock when it was.
+        is_taken: Whether one was.
+        is_confirmed: Whether it confirmed that; a unit may also say that it is still at it, and show nothing.
+    """
+
+    def __init__(self, unit: Unit, rota: Sequence[str], within: float) -> None:
+        self.unit = unit
+        self.command = rota[0]
+        self.sent = self.confirmed = unit.bus.now()
+        self.is_taken = self.is_confirmed = False
+        self._named = unit
+        self._aim = Aim(unit)
+        self._rota = rota
+        self._within = within
+        self._began = self.sent
+        self._until = self.sent + within
+        self._frames = 0
+        self._heard: float | None = None
+        self._failure: DrivebusError | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its time has passed."""
+        return self.unit.bus.now() >= self._until
+
+    async def until_taken(self) -> None:
+        """Sends until the unit takes it.
+
+        Raises:
+            NotAllowed: What the unit is cannot be told, and the command might start it. It was not sent.
+            Refused, NoAnswer, BadAnswer, PortError, Unconfirmed: Nothing was taken within the time.
+        """
+        while not await self.step():
+            if self.is_over:
+                raise await self.failure() from self._failure
+            await self.unit.bus.sleep(_PAUSE)
+
+    async def step(self) -> bool:
+        """Sends once. Whether the unit took it.
+
+        Raises:
+            NotAllowed: As for `until_taken`.
+        """
+        wanted = self._rota[self._frames % len(self._rota)]
+        try:
+            target = await self._aim.take(wanted)
+            if target is None:
+                self._heard = self.unit.bus.now()
+                return False
+            self.unit, self.command = target
+            await self._send(target)
+        except Refused as error:
+            self._heard, self._failure = self.unit.bus.now(), error
+            self._doubt_named()
+        except LINE_ERRORS as error:
+            if isinstance(error, BadAnswer):
+                self._heard = self.unit.bus.now()
+            # That one went out tells more than that a later one could not.
+            if error.started is not None or self._failure is None or self._failure.started is None:
+                self._failure = error
+            if isinstance(error, PortError) and self.unit.bus.closed:
+                self._until = self.unit.bus.now()
+        else:
+            self.is_taken = True
+        return self.is_taken
+
+    def _doubt_named(self) -> None:
+        """A halt was refused. A unit that did not say yet what it is may refuse it because it is of another family."""
+        if self.unit.profile is self._named.profile and not self.unit.identity.is_known(self.unit.bus):
+            self._aim.doubt()
+
+    async def vouch(self) -> None:
+        """Makes sure that what was halted is what the unit says it is. Where it is not, it is halted as that.
+
+        Asks nothing of a unit that this line has identified, or that was halted as what it showed.
+
+        Raises:
+            Unconfirmed: The unit does not say what it is, or only what it is not: the motor may still turn.
+            NotAllowed, Refused, NoAnswer, BadAnswer, PortError: As for `until_taken`.
+        """
+        unit, named = self.unit, self._named
+        if unit.profile is not named.profile or unit.identity.is_known(unit.bus):
+            return
+        against = await self._contradiction()
+        if against is None:
+            return
+        self._aim.doubt()
+        self.is_taken, self._until = False, unit.bus.now() + self._within
+        try:
+            await self.until_taken()
+        except NotAllowed as error:
+            raise Unconfirmed(
+                f"{self.command} was sent to unit {unit.address} and taken; but {against}, and {error}. "
+                f"{commands.MAY[self.command]}",
+                unit=unit.address,
+            ) from error
+
+    async def _contradiction(self) -> str | None:
+        """What the unit says against its name; asked for until it is answered, for as long as a halt is sent."""
+        unit, until = self.unit, self.unit.bus.now() + self._within
+        while True:
+            try:
+                return await unit.identity.contradiction(unit.bus, urgent=True)
+            except LINE_ERRORS as error:
+                if unit.bus.now() >= until or unit.bus.closed:
+                    raise Unconfirmed(
+                        f"{self.command} was sent to unit {unit.address} and taken, and what the unit is could not be "
+                        f"asked ({error}): by another family it may mean something else; {commands.MAY[self.command]}; "
+                        f"{state.seen_last(unit)}",
+                        unit=unit.address,
+                    ) from error
+                await unit.bus.sleep(_PAUSE)
+
+    async def _send(self, target: Target) -> None:
+        unit, command = target
+        profile, record = unit.profile, unit.record
+        unit.evidence.commands(command)
+        record.halts_begun += 1
+        self._frames += 1
+        self.sent = unit.bus.now()
+        first = profile.command_first(command)
+        # The line knows the unit by its name, and would hold the words of another family back.
+        is_another = profile is not self._named.profile
+        self.is_confirmed = True
+        for address, code in (*(() if first is None else (first,)), profile.command(command)):
+            try:
+                self.is_confirmed &= await words.send(
+                    unit, address, code, urgent=True, timeout=ANSWER_WITHIN, force=is_another
+                )
+            except DrivebusError as error:
+                record.halts += error.started is not None
+                raise
+        record.halts += 1
+        self.confirmed = unit.bus.now()
+
+    async def failure(self) -> DrivebusError:
+        """Why nothing was taken, in words."""
+        unit, error, took = self.unit, self._failure, self.unit.bus.now() - self._began
+        may = commands.MAY[self.command]
+        times = f"{self._frames} times within {took:.1f} s" if self._frames != 1 else "once"
+        if isinstance(error, Refused):
+            return Refused(
+                f"{self.command} was sent to unit {unit.address} {times} and not taken, at last: {error}; {may}. "
+                f"{await commands.state_afterwards(unit, urgent=True)}",
+                code=error.code,
+                name=error.name,
+                meaning=error.meaning,
+                unit=unit.address,
+                request=error.request,
+                raw=error.raw,
+                started=error.started,
+                ended=error.ended,
+            )
+        if isinstance(error, (NoAnswer, BadAnswer, PortError)):
+            if error.started is None:
+                return type(error)(
+                    f"{self.command} could not be sent to unit {unit.address} ({error}); {may}",
+                    unit=unit.address,
+                    request=error.request,
+                    ended=error.ended,
+                )
+            silent = "nothing came from it at all"
+            if self._heard is not None:
+                silent = f"the last that came from it came {unit.bus.now() - self._heard:.1f} s ago"
+            return Unconfirmed(
+                f"{self.command} was sent to unit {unit.address} {times} and not confirmed ({error}): {silent}; {may}. "
+                f"{await commands.state_afterwards(unit, urgent=True)}",
+                unit=unit.address,
+                request=error.request,
+                raw=error.raw,
+                started=error.started,
+                ended=error.ended,
+            )
+        return Unconfirmed(
+            f"unit {unit.address} is busy, and does not say what it is: {self.command} was not sent, for it may start "
+            f"a drive of another family; {may}, {state.seen_last(unit)}. If it must stop now, use the emergency stop",
+            unit=unit.address,
+        )
