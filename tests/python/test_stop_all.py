@@ -203,13 +203,16 @@ class TestTheCommand:
         frames = [frame for frame in asked(simulator, since) if frame[1] == 6]
         assert sorted(frames) == sorted(STOPS.values())
 
-    def test_a_drive_that_is_another_now_is_stopped_by_its_own_code(self, simulator: Simulator) -> None:
-        remember(simulator.port, 1, "gd600")
-        since = len(simulator.line.trace())
-        result = self.run("--port", simulator.port, "--unverified", "stop", "--all")
-        assert result.exit_code == 0, result.output
-        assert [frame for frame in asked(simulator, since) if frame[1] == 6] == [STOPS[1], STOPS[1]]
-        assert known_family(simulator.port, 1) == "gd350" or known_family(simulator.port, 1) is None
+    @pytest.mark.parametrize(("family", "stop"), [("gd350", STOPS[1]), ("eds300", encode_write(1, 0x2000, 6))])
+    def test_a_drive_that_is_another_now_is_stopped_by_its_own_code(self, family: str, stop: bytes) -> None:
+        """6 stops an EDS300 (its manual, p. 46), which 5 would run."""
+        with Simulator({1: family}, transport="pty") as simulator:
+            remember(simulator.port, 1, "gd600")
+            result = self.run("--port", simulator.port, "--unverified", "stop", "--all")
+            assert result.exit_code == 0, result.output
+            assert {frame for frame in asked(simulator) if frame[1] == 6} == {stop}
+            assert known_family(simulator.port, 1) in ("gd350", None)
+            assert simulator.drive(1).state == "stopped"
 
     def test_who_is_silent_is_named_and_the_exit_code_says_it(self, simulator: Simulator) -> None:
         remember(simulator.port, 1, "gd350")

@@ -181,7 +181,7 @@ class Session:
             remark(f"{self.called} was a {family} when it was asked last, and is not one now.")
             if failure is None:
                 # What it shows was halted, and says what came of it.
-                return self._as_it_shows(bus, drive)
+                return self.as_it_shows(bus, drive)
             if not isinstance(failure, drivebus.NotAllowed):
                 raise failure
         try:
@@ -197,7 +197,7 @@ class Session:
         do(drive)
         return drive
 
-    def _as_it_shows(self, bus: drivebus.Bus, drive: drivebus.Drive) -> drivebus.Drive:
+    def as_it_shows(self, bus: drivebus.Bus, drive: drivebus.Drive) -> drivebus.Drive:
         """The drive as the family that it shows, for what is told of it; *drive* where that is not one alone."""
         try:
             family = bus.identify(self.unit).family

@@ -103,9 +103,12 @@ def _stop_line(line: Session, drives: dict[int, Session], done: _Done) -> None:
         for unit, one in allowed.items():
             drive = known.get(unit)
             try:
-                if drive is None or (one.profile is None and is_another(drive)):
+                if drive is not None and one.profile is None and is_another(drive):
                     forget(str(one.port), unit)
-                    drive = one.drive_on(bus)
+                    # What it shows was halted, if it was; else it is asked what it is.
+                    drive = one.as_it_shows(bus, drive) if unit not in failures else None
+                if drive is None:
+                    drive = one.drive_on(bus, urgent=True)
                     drive.stop()
                     failures.pop(unit, None)
                 if unit not in failures:
