@@ -231,3 +231,11 @@ class TestOneThatChanges:
                 bus.drive(1, "gd350").stop()
             assert simulator.drive(1).writes() == []
             assert simulator.drive(1).state == "stopped"
+
+    def test_a_halt_that_was_refused_says_what_the_refusal_means(self, line: tuple[Simulator, Bus]) -> None:
+        """06H of a GD350: it got a damaged frame (GD350 manual, section 9.4.7), which is no decision."""
+        simulator, bus = line
+        simulator.drive(1).refuse(0x06, asked="writes")
+        with pytest.raises(drivebus.Refused, match="not taken") as refused:
+            bus.drive(1, "gd350").stop()
+        assert (refused.value.code, refused.value.means, refused.value.is_decision) == (0x06, "ask_again", False)

@@ -182,6 +182,7 @@ class Halt:
                 code=error.code,
                 name=error.name,
                 meaning=error.meaning,
+                means=error.means,
                 unit=unit.address,
                 request=error.request,
                 raw=error.raw,
