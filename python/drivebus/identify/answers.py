@@ -16,6 +16,7 @@ __all__ = [
     "Answer",
     "Read",
     "answer_at",
+    "answer_once",
     "no_such_address",
     "passes",
     "tells_nothing",
@@ -67,6 +68,16 @@ def tells_nothing(profile: Profile, answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, and so tells nothing of a unit of *profile*."""
     code = answer.exception
     return code is not None and (passes(answer) or profile.exception_means(code) == _ASK_AGAIN)
+
+
+async def answer_once(read: Read, unit: int, place: int) -> Answer:
+    """How *unit* answers one question for the word at *place*, whatever a refusal of it means."""
+    address, table = places.at(place)
+    try:
+        [word] = await read(unit, address, **table)
+    except Refused as error:
+        return Answer(place, None, error.code)
+    return Answer(place, word, None)
 
 
 async def answer_at(read: Read, unit: int, place: int) -> Answer:

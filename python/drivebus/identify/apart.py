@@ -16,7 +16,7 @@ from typing import NamedTuple
 from drivebus.identify import codes
 from drivebus.identify.answers import LOCKED, NO_FUNCTION, Answer, no_such_address, passes
 from drivebus.identify.harm import HALTS, families, halt_of, harms
-from drivebus.identify.signatures import signature_of
+from drivebus.identify.signatures import shows, signature_of
 from drivebus.profile import Profile
 
 __all__ = ["Apart", "Verdict"]
@@ -77,7 +77,7 @@ class Apart:
         live = [profile for profile in self._families if self._is_live(profile)]
         if self.shows_named:
             return self._between(named, self._rivals(named, live, command))
-        if named in live and not self._is_shown(named) and (place := self._next_of(named)) is not None:
+        if named in live and (place := self._next_of(named)) is not None:
             return Verdict(ask=place)
         shown = [profile for profile in live if profile is not named and self._is_shown(profile)]
         if shown:
@@ -92,16 +92,14 @@ class Apart:
             return Verdict(take=named)
         return Verdict(others=tuple(profile for profile in live if profile.commands()))
 
-    def _between(self, named: Profile, rivals: list[Profile]) -> Verdict:
-        """The verdict on a unit that shows *named*, where *rivals* could say the same and would take harm."""
-        if not rivals:
-            return Verdict(take=named)
+    def _between(self, taken: Profile, rivals: list[Profile]) -> Verdict:
+        """The verdict on a unit that shows *taken*, where *rivals* could say the same and would take harm."""
         for rival in rivals:
-            place = self._telling(named, rival)
+            place = self._telling(taken, rival)
             if place is not None:
                 return Verdict(ask=place)
         rivals = [rival for rival in rivals if self._is_shown(rival)]
-        return Verdict(others=(named, *rivals)) if rivals else Verdict(take=named)
+        return Verdict(others=(taken, *rivals)) if rivals else Verdict(take=taken)
 
     def _one_of(self, shown: list[Profile], live: list[Profile], command: str) -> Verdict:
         """The verdict on a unit that does not show what it was named as, and shows the families *shown*."""
@@ -111,12 +109,9 @@ class Apart:
             halt = halt_of(taken, command)
             if halt is None:
                 continue
-            rivals = self._rivals(taken, live, halt)
-            for rival in rivals:
-                if (place := self._telling(taken, rival)) is not None:
-                    return Verdict(ask=place)
-            if not any(map(self._is_shown, rivals)):
-                return Verdict(take=taken)
+            verdict = self._between(taken, self._rivals(taken, live, halt))
+            if not verdict.others:
+                return verdict
         return Verdict(others=tuple(shown))
 
     def _rivals(self, taken: Profile, live: list[Profile], command: str) -> list[Profile]:
@@ -149,7 +144,7 @@ class Apart:
         if place == _state_place(profile) and profile.state(word) == "unknown":
             return profile.state_reason() is None or not self._reports(profile)
         rows = codes.listed_for(profile, place, word)
-        if not rows or _names(profile) & set(codes.families_in(rows)):
+        if not rows or codes.are_own(profile, rows):
             return False
         return place == codes.address_of(profile) or profile.name_at(place) is None
 
@@ -167,13 +162,7 @@ class Apart:
         """Whether its code came, or its whole signature."""
         if codes.address_of(profile) is not None and codes.is_listed(profile):
             return self._reports(profile)
-        signature = signature_of(profile)
-        if signature is not None:
-            answered = {place: answer.word is not None for place, answer in self._answers.items()}
-            return all(answered.get(place) is True for place in signature["answers"]) and all(
-                answered.get(place) is False for place in signature["refuses"]
-            )
-        return False
+        return shows(signature_of(profile), self._answers.values())
 
     def _reports(self, profile: Profile) -> bool:
         """Whether the unit gave a code that is listed for *profile*."""
@@ -181,7 +170,7 @@ class Apart:
         answer = None if place is None else self._answers.get(place)
         if place is None or answer is None or answer.word is None:
             return False
-        return bool(_names(profile) & set(codes.families_in(codes.listed_for(profile, place, answer.word))))
+        return codes.are_own(profile, codes.listed_for(profile, place, answer.word))
 
     def _explains(self, profile: Profile, *, by_rule: bool = False) -> bool:
         """Whether a unit of *profile* would have answered what was answered: it has something at each such place.
@@ -223,10 +212,6 @@ def _halts_alike(one: Profile, other: Profile) -> bool:
 @functools.lru_cache(maxsize=256)
 def _halts(profile: Profile) -> frozenset[tuple[int, int]]:
     return frozenset(profile.command(name) for name in HALTS if name in profile.commands())
-
-
-def _names(profile: Profile) -> set[str]:
-    return set(profile.reports_as())
 
 
 @functools.lru_cache(maxsize=256)

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivebus.profile import Profile, profiles
 
-__all__ = ["Row", "address_of", "families_in", "is_listed", "listed", "listed_at", "listed_for", "registers"]
+__all__ = ["Row", "address_of", "are_own", "families_in", "is_listed", "listed", "listed_at", "listed_for", "registers"]
 
 Row = dict[str, Any]
 """What a profile says of a code: see `Profile.identifications`."""
@@ -52,6 +52,11 @@ def listed_for(profile: Profile, address: int, word: int) -> list[Row]:
     """The rows of the code *word* at *address* in *profile* itself, then those in the shipped ones."""
     own = profile.identifications() if address == address_of(profile) else []
     return [*(row for row in own if row["code"] == word), *listed_at(address, word)]
+
+
+def are_own(profile: Profile, rows: Iterable[Row]) -> bool:
+    """Whether *rows* of one code name a family that units of *profile* report as."""
+    return not set(families_in(rows)).isdisjoint(profile.reports_as())
 
 
 def is_listed(profile: Profile) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from drivebus import places
 from drivebus.identify import codes
 from drivebus.identify.answers import NO_FUNCTION, Answer, no_such_address
-from drivebus.identify.families import one_of, shipped
+from drivebus.identify.families import asked_as, one_of, shipped
 from drivebus.identify.signatures import signature_of
 from drivebus.profile import Profile, profiles
 
@@ -51,7 +51,7 @@ def other_signature(profile: Profile, unit: int, shown: Iterable[str]) -> str | 
     if not names or set(names) & set(profile.reports_as()):
         return None
     titles = [f"{Profile.builtin(name).title} ({name})" for name in names]
-    then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in names)
+    then = asked_as(unit, names)
     return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: {then}")
 
 
@@ -80,7 +80,7 @@ def _surprises(profile: Profile, answer: Answer, refused: tuple[int, ...]) -> bo
     if answer.address in codes.registers():
         # A word that no list has for it: another maker keeps his speed there.
         rows = codes.listed_for(profile, answer.address, answer.word)
-        return not set(codes.families_in(rows)) & set(profile.reports_as())
+        return not codes.are_own(profile, rows)
     state = profile.role("state")
     is_state = state is not None and profile.describe(state).place == answer.address
     return is_state and profile.state(answer.word) == "unknown"
@@ -90,16 +90,12 @@ def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
     """What speaks against *profile* if the word that came is the code of another family."""
     rows = [] if answer.word is None else codes.listed_for(profile, answer.address, answer.word)
     families = codes.families_in(rows)
-    if not families or set(families) & set(profile.reports_as()):
+    if not families or codes.are_own(profile, rows):
         return None
     titles = [f"{row['title']} ({row['family']})" for row in rows]
     also = [name for name in families if name not in [row["family"] for row in rows]]
     known = shipped(families)
-    if known:
-        then = one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in known)
-        then = f"ask for it as that: {then}"
-    else:
-        then = "there is no profile of it yet"
+    then = f"ask for it as that: {asked_as(unit, known)}" if known else "there is no profile of it yet"
     if profile.name not in profiles():
         then += f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
     return f"it reports {answer.word:04X}H, the code of {one_of([*titles, *also])}: {then}"

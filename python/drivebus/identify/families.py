@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from drivebus.profile import profiles
 
-__all__ = ["all_of", "one_of", "shipped"]
+__all__ = ["all_of", "asked_as", "one_of", "shipped"]
 
 
 def shipped(families: Iterable[str]) -> list[str]:
@@ -17,6 +17,11 @@ def shipped(families: Iterable[str]) -> list[str]:
 def one_of(names: Iterable[str]) -> str:
     """What may be one or the other, for people: "A, B or C"."""
     return _joined(names, "or")
+
+
+def asked_as(unit: int, names: Iterable[str]) -> str:
+    """How *unit* is asked for as each of *names*, for people who type it."""
+    return one_of(f'bus.drive({unit}, profile="{name}") (`--profile {name}`)' for name in names)
 
 
 def all_of(names: Iterable[str]) -> str:

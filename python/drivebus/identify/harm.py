@@ -12,16 +12,14 @@ from collections.abc import Iterable
 from drivebus import places
 from drivebus.profile import Profile, profiles
 
-__all__ = ["HALTS", "does_harm", "families", "halt_of", "harmed", "harms"]
+__all__ = ["HALTS", "families", "halt_of", "harmed", "harms"]
 
 HALTS = ("stop", "coast", "jog_stop")
 """The commands that end a motion, in the order of who else may stand in for one that a family lacks."""
 
 
-def families(own: Profile | None = None) -> tuple[Profile, ...]:
+def families(own: Profile) -> tuple[Profile, ...]:
     """The shipped families, with *own* before them: of a name that it shares with one, it is the one that is meant."""
-    if own is None:
-        return _shipped()
     return (own, *(profile for profile in _shipped() if profile.name != own.name))
 
 
@@ -34,21 +32,9 @@ def halt_of(profile: Profile, command: str) -> str | None:
     return next((name for name in (command, "stop", "coast") if name in known), None)
 
 
-def does_harm(profile: Profile, place: int, word: int, command: str) -> bool:
-    """Whether *word* at *place*, meant as *command*, starts, reverses or sets anything in a unit of *profile*.
-
-    At a command register whatever is no halt of the family counts: nobody prints what each other code does.
-    """
-    return _does_harm(profile, place, word, command)
-
-
+@functools.lru_cache(maxsize=512)
 def harmed(named: Profile, command: str) -> tuple[Profile, ...]:
     """The families that *command* of *named* would do harm to; none where it has no such command."""
-    return _harmed(named, command)
-
-
-@functools.lru_cache(maxsize=512)
-def _harmed(named: Profile, command: str) -> tuple[Profile, ...]:
     if command not in named.commands():
         return ()
     return tuple(profile for profile in families(named) if profile is not named and harms(profile, named, command))
@@ -57,11 +43,15 @@ def _harmed(named: Profile, command: str) -> tuple[Profile, ...]:
 def harms(profile: Profile, named: Profile, command: str) -> bool:
     """Whether one of the words that *command* of *named* is made of does harm to a unit of *profile*."""
     words: Iterable[tuple[int, int] | None] = (named.command_first(command), named.command(command))
-    return any(does_harm(profile, *each, command) for each in words if each is not None)
+    return any(_does_harm(profile, *each, command) for each in words if each is not None)
 
 
 @functools.lru_cache(maxsize=8192)
 def _does_harm(profile: Profile, place: int, word: int, command: str) -> bool:
+    """Whether *word* at *place*, meant as *command*, starts, reverses or sets anything in a unit of *profile*.
+
+    At a command register whatever is no halt of the family counts: nobody prints what each other code does.
+    """
     table, address = places.split(place)
     plain = profile.plain_address(address) if table == "holding" else place
     for each in {place, plain}:

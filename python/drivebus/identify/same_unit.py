@@ -16,9 +16,9 @@ import functools
 from collections.abc import Sequence
 
 from drivebus import places
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError, Refused
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError
 from drivebus.identify import codes
-from drivebus.identify.answers import Answer, passes, tells_nothing
+from drivebus.identify.answers import Answer, answer_once, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
 from drivebus.identify.signatures import shown_by, shows, signature_of
 from drivebus.line.protocols import AwaitableBus
@@ -153,17 +153,13 @@ class SameUnit:
         """Whether *answers* have the code of the family itself, or its whole signature."""
         code = [
             answer.word is not None
-            and bool(set(codes.families_in(codes.listed_for(self._profile, answer.address, answer.word))) & self._names)
+            and codes.are_own(self._profile, codes.listed_for(self._profile, answer.address, answer.word))
             for answer in answers
             if answer.address in self._words
         ]
         if code:
             return all(code)
         return shows(signature_of(self._profile), answers)
-
-    @property
-    def _names(self) -> set[str]:
-        return set(self._profile.reports_as())
 
     async def contradiction(self, bus: AwaitableBus, *, urgent: bool = False) -> str | None:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
@@ -190,12 +186,7 @@ class SameUnit:
             answers += [await self._answer(bus, address, urgent)]
 
     async def _answer(self, bus: AwaitableBus, address: int, urgent: bool) -> Answer:
-        try:
-            first, table = places.at(address)
-            [word] = await bus.read(self._unit, first, urgent=urgent, **table)
-        except Refused as error:
-            return Answer(address, None, error.code)
-        return Answer(address, word, None)
+        return await answer_once(functools.partial(bus.read, urgent=urgent), self._unit, address)
 
     def _put_off(self, answers: Sequence[Answer]) -> bool:
         """Whether one of *answers* is a refusal that passes, so that it is not known yet what the unit is."""

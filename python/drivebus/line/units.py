@@ -122,8 +122,9 @@ class Units:
         """Raises `NotAllowed` if the words would command *unit* (0: any of them) what its family does not define."""
         if force or not self._records:
             return
-        for record in self.named():
-            if unit in (0, record.address):
+        one = self._records.get(unit)
+        for record in ([] if one is None else [one]) if unit else self.named():
+            if record.profiles:
                 check_words(record.profiles.values(), record.address, address, words)
 
     def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:

@@ -8,13 +8,13 @@ evidence; what it is is then asked behind the halt.
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
-from drivebus import places
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
-from drivebus.identify.answers import Answer, answer_at
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
+from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
-from drivebus.identify.families import one_of
+from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.harm import halt_of, harmed, harms
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
@@ -67,6 +67,7 @@ class Aim:
         unit = self._unit
         if not self._doubted and goes_out_at_once(unit, command):
             return Target(unit, command)
+        read = functools.partial(unit.bus.read, urgent=True, timeout=ANSWER_WITHIN, retries=0)
         for _ in range(_QUESTIONS):
             verdict = self._apart.verdict(command)
             if verdict.take is not None:
@@ -74,7 +75,7 @@ class Aim:
             if verdict.ask is None:
                 raise _undecided(unit, command, verdict.others)
             try:
-                answer = await _ask(unit, verdict.ask)
+                answer = await answer_once(read, unit.address, verdict.ask)
             except NoAnswer:
                 # Silence is no evidence. Where it spoke before, the line lost this one.
                 return None if self._apart.is_asked or self._doubted else Target(unit, command)
@@ -132,15 +133,6 @@ async def check_harmless(unit: Unit, command: str) -> None:
     raise _another(unit, ())
 
 
-async def _ask(unit: Unit, place: int) -> Answer:
-    first, table = places.at(place)
-    try:
-        [word] = await unit.bus.read(unit.address, first, urgent=True, timeout=ANSWER_WITHIN, retries=0, **table)
-    except Refused as error:
-        return Answer(place, None, error.code)
-    return Answer(place, word, None)
-
-
 def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllowed:
     named = f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title})"
     if not others:
@@ -150,21 +142,24 @@ def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllo
             "trust_profile=True (`--trust-profile`). If a motor must stop now, use the emergency stop",
             unit=unit.address,
         )
-    titles = one_of(f"{profile.title} ({profile.name})" for profile in others)
     then = one_of(f'profile="{profile.name}" (`--profile {profile.name}`)' for profile in others)
     return NotAllowed(
-        f"{named}, and by what it answers it may be {titles}, which want different words: {command} was not sent, for "
-        f"it may start the motor. If you know which it is, say {then}. If it must stop now, use the emergency stop",
+        f"{named}, and by what it answers it may be {_titles(others)}, which want different words: {command} was not "
+        f"sent, for it may start the motor. If you know which it is, say {then}. If it must stop now, use the "
+        "emergency stop",
         unit=unit.address,
     )
 
 
 def _another(unit: Unit, others: tuple[Profile, ...]) -> NotAllowed:
-    titles = one_of(f"{profile.title} ({profile.name})" for profile in others) or "a drive of another family"
-    then = one_of(f'bus.drive({unit.address}, profile="{each.name}") (`--profile {each.name}`)' for each in others)
+    then = asked_as(unit.address, (profile.name for profile in others)) if others else ""
     return NotAllowed(
         f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title}), and by what it answers and refuses "
-        f"it may be {titles}{f': ask for it as that: {then}' if then else ''}; or say trust_profile=True "
+        f"it may be {_titles(others)}{f': ask for it as that: {then}' if then else ''}; or say trust_profile=True "
         "(`--trust-profile`) if it is meant; nothing was written to it",
         unit=unit.address,
     )
+
+
+def _titles(families: tuple[Profile, ...]) -> str:
+    return one_of(f"{each.title} ({each.name})" for each in families) if families else "a drive of another family"

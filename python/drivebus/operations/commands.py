@@ -7,9 +7,10 @@ number is looked at.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
 
 from drivebus import places
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.identify.harm import HALTS
 from drivebus.operations import setpoints, state, words
 from drivebus.operations.state import Seen
@@ -23,6 +24,7 @@ __all__ = [
     "POLL_INTERVAL",
     "Proof",
     "confirm",
+    "frames_of",
     "give",
     "prepared",
     "send_once",
@@ -104,11 +106,13 @@ async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence
             f"{name} was sent to unit {unit.address} and not confirmed ({error}); {MAY[name]}. "
             f"{await state_afterwards(unit)}. It was not repeated",
             unit=unit.address,
-            request=error.request,
-            raw=error.raw,
-            started=error.started,
-            ended=error.ended,
+            **frames_of(error),
         ) from error
+
+
+def frames_of(error: DrivebusError) -> dict[str, Any]:
+    """What an error that is raised because of *error* tells of its frames and their moments."""
+    return {"request": error.request, "raw": error.raw, "started": error.started, "ended": error.ended}
 
 
 async def state_afterwards(unit: Unit, *, urgent: bool = False) -> str:

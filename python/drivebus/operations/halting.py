@@ -184,10 +184,7 @@ class Halt:
                 meaning=error.meaning,
                 means=error.means,
                 unit=unit.address,
-                request=error.request,
-                raw=error.raw,
-                started=error.started,
-                ended=error.ended,
+                **commands.frames_of(error),
             )
         if isinstance(error, (NoAnswer, BadAnswer, PortError)):
             if error.started is None:
@@ -204,10 +201,7 @@ class Halt:
                 f"{self.command} was sent to unit {unit.address} {times} and not confirmed ({error}): {silent}; {may}. "
                 f"{await commands.state_afterwards(unit, urgent=True)}",
                 unit=unit.address,
-                request=error.request,
-                raw=error.raw,
-                started=error.started,
-                ended=error.ended,
+                **commands.frames_of(error),
             )
         return Unconfirmed(
             f"unit {unit.address} is busy, and does not say what it is: {self.command} was not sent, for it may start "

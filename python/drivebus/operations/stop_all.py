@@ -29,7 +29,6 @@ class _Stop:
         self._unit, self._confirm = motion.halting(unit, _STOP), confirm
         self._halt = Halt(self._unit, (_STOP,), within)
         self._proof: commands.Proof | None = None
-        self._is_taken = False
 
     async def advance(self) -> bool:
         """Does the next thing: sends, asks what it is, or looks. Whether nothing is left to be done."""
@@ -42,12 +41,11 @@ class _Stop:
     async def _next(self) -> bool:
         if self._proof is not None:
             return await self._proof.look()
-        if self._is_taken:
+        if self._halt.is_taken:
             self._proof = await motion.prove(self._halt, self._confirm)
             return False
         self._unit.evidence.commands(_STOP)
-        self._is_taken = await self._halt.step()
-        if not self._is_taken and self._halt.is_over:
+        if not await self._halt.step() and self._halt.is_over:
             raise await self._halt.failure()
         return False
 
