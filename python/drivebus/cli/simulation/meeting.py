@@ -45,6 +45,21 @@ class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
         super().__init__(str(path), _Visit)
         path.chmod(0o600)
 
+    def verify_request(self, request: Any, client_address: Any) -> bool:  # noqa: ARG002 - the base class names it
+        """Whether there is room for one more, in the order in which they came; who is sent away is told why."""
+        if self.room.acquire(blocking=False):
+            return True
+        with suppress(OSError):
+            request.sendall(_line({"error": f"{_AT_ONCE} others talk to this simulation; try again"}))
+        return False
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serves one visitor, and makes room for the next."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.room.release()
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Nothing: a visitor that went amid its order is no news for the window of the simulation."""
 
@@ -55,13 +70,9 @@ class _Visit(socketserver.StreamRequestHandler):
 
     def handle(self) -> None:
         """Takes one order and says what came of it."""
-        if not self.server.room.acquire(blocking=False):
-            self._say({"error": f"{_AT_ONCE} others talk to this simulation; try again"})
-            return
-        try:
-            self._say(self._answer())
-        finally:
-            self.server.room.release()
+        # Who does not wait for the answer has gone.
+        with suppress(OSError):
+            self.wfile.write(_line(self._answer()))
 
     def _answer(self) -> Order:
         if not _is_own(self.connection):
@@ -83,10 +94,9 @@ class _Visit(socketserver.StreamRequestHandler):
         except drivebus.DrivebusError as error:
             return {"error": str(error)}
 
-    def _say(self, answer: Order) -> None:
-        # Who does not wait for it has gone.
-        with suppress(OSError):
-            self.wfile.write(json.dumps(answer).encode() + b"\n")
+
+def _line(answer: Order) -> bytes:
+    return json.dumps(answer).encode() + b"\n"
 
 
 def _is_own(connection: socket.socket) -> bool:
