@@ -2,7 +2,7 @@
 # All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
-TEST_JOBS ?= 2
+TEST_JOBS ?= 4
 VENV   := .venv
 BIN    := $(VENV)/bin
 CARGO  := cargo
@@ -120,7 +120,7 @@ schema: $(VENV)/.created ## changes a file
 interop-parts:
 	@sh tools/debian_parts.sh
 
-# Most of these tests wait for a line and not for a core, so two files at a time take half as long. A file stays together:
+# Most of these tests wait for a line and not for a core, so four files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
 python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
 	$(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile -p no:benchmark

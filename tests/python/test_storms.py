@@ -29,5 +29,5 @@ def test_a_storm_of_ctrl_c_stops_the_motor_once(kind: str, presses: int, timeout
             pause.wait(0.02)
         code, _, said = program.ends()
         assert there.commands()[:2] == [FORWARD, STOP], said
-        assert code == -signal.SIGINT
-        assert said.endswith("KeyboardInterrupt\n")
+        assert code == -signal.SIGINT, said
+        assert said.endswith("KeyboardInterrupt\n"), said
