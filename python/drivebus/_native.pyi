@@ -255,6 +255,22 @@ class Bus:
         """What *unit* needs otherwise than the bus, in seconds; None keeps what the bus has."""
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
+    def leave_will(
+        self,
+        unit: int,
+        ways: Sequence[Sequence[bytes]],
+        /,
+        *,
+        look: tuple[bytes, Sequence[bytes]] | None = None,
+        silence: float = 0.0,
+    ) -> int | None:
+        """Leaves what halts *unit* when this program is gone without a word: the number of that will, or None.
+
+        None where nobody would find it. *ways* are PDUs that follow each other, each a way to halt; *look* a read and
+        the answers by which the unit says that it is another one; *silence* the drive's own time-out in seconds.
+        """
+    def withdraw_will(self, number: int, /) -> None:
+        """Takes that will back."""
     @property
     def reconnects(self) -> int:
         """How often the port was opened again after it was lost."""

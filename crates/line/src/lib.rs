@@ -75,7 +75,7 @@ pub use health::hint::Hint;
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Program, Stats};
 pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};
-pub use options::{AdapterEcho, BusOptions, CallOptions, Share, UnitOptions};
+pub use options::{AdapterEcho, BusOptions, CallOptions, LastWill, Share, UnitOptions};
 pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
 pub use poll::samples::PollCounts;

@@ -54,6 +54,11 @@ class SameUnit:
         self._contradicts = False
         self._opened = bus.reconnects
 
+    @property
+    def trusted(self) -> bool:
+        """Whether the profile is believed, whatever the unit says."""
+        return self._trusted
+
     async def check(self, bus: AwaitableBus, *, judged: bool = True) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 

@@ -27,6 +27,9 @@ use crate::owner::dead_units::Verdict;
 use crate::turns::order::{Claim, Priority, Program};
 use crate::turns::queue::{NoTurn, Turn};
 
+/// How often somebody who waits for a unit to be halted looks whether it was.
+const HALTED: Duration = Duration::from_millis(10);
+
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
     pub(crate) bus: &'b Shared,
@@ -203,6 +206,25 @@ impl<'b, 'r> Call<'b, 'r> {
             return Duration::ZERO;
         }
         self.ask.timeout.saturating_mul(self.retries.saturating_add(1))
+    }
+
+    /// Its unit is being halted for a program that is gone: waits off the line for that, as long as for one that is silent.
+    /// `failure` says so.
+    pub(crate) fn wait_for_the_halt(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        failure: Failure,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        let end = self.bus.now() + self.patience();
+        while self.bus.wills.keeps_from(self.unit).is_some() {
+            let now = self.bus.now();
+            if now >= end {
+                return Err(self.failed(failure));
+            }
+            self.stand_by(turn, end.min(now + HALTED), give_up)?;
+        }
+        Ok(())
     }
 
     /// Leaves the line to others until `until`.

@@ -196,6 +196,10 @@ fn serve(stream: UnixStream, guests: &Arc<Guests>, shared: &Weak<Shared>) {
             let channel = RefCell::new(channel);
             // It ends when either side does, or where what comes is no wish.
             while next(&channel, &visit, shared).is_some() {}
+            drop(visit);
+            if let Some(shared) = shared.upgrade() {
+                shared.wills.look_soon();
+            }
         }
         Ok(None) => {}
         Err(why) => {
@@ -282,6 +286,10 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
         }
         Wish::FreshWord => Told::Word(shared.words.next()),
         Wish::Reconnects => Told::Reconnects(shared.reconnects_here()),
+        Wish::Wills => {
+            shared.wills.look_soon();
+            Told::Wills
+        }
         // It came when what it is about had ended.
         Wish::Cancel => return Some(()),
     };

@@ -337,6 +337,17 @@ impl Shared {
         self.told_at_once(&Wish::Reconnects, count).unwrap_or_else(|| self.reconnects_here())
     }
 
+    /// Whether the port is another program's.
+    pub(super) fn is_guest(&self) -> bool {
+        self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
+    }
+
+    /// Tells the program that has the port of a will that was left. False where that is not known to have reached it: then
+    /// it is found all the same when the connection ends, or the port is opened.
+    pub(super) fn tell_of_wills(&self) -> bool {
+        self.told_at_once(&Wish::Wills, |_, told| matches!(told, Told::Wills).then_some(())).is_some()
+    }
+
     pub(super) fn characters(&self) -> crate::share::message::Characters {
         crate::share::message::Characters::of(&self.options.format)
     }

@@ -20,7 +20,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 2;
+pub(crate) const VERSION: u8 = 3;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -83,6 +83,8 @@ pub(crate) enum Wish {
     Link(u8),
     FreshWord,
     Reconnects,
+    /// A last will was left: it is to be watched from now on.
+    Wills,
     /// The call or the listening under way is not wanted any more.
     Cancel,
 }
@@ -121,6 +123,7 @@ pub(crate) enum Told {
     },
     Word(u16),
     Reconnects(u64),
+    Wills,
 }
 
 /// The statistics of a line.

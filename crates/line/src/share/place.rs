@@ -65,7 +65,13 @@ impl Place {
         Ok(Some(Self { folder: run_time_folder()?, name }))
     }
 
-    fn path(&self, ending: &str) -> PathBuf {
+    #[cfg(test)]
+    pub(crate) fn in_folder(folder: PathBuf, name: &str) -> Self {
+        Self { folder, name: name.to_owned() }
+    }
+
+    /// The file of this port with such an ending.
+    pub(crate) fn path(&self, ending: &str) -> PathBuf {
         self.folder.join(format!("{}.{ending}", self.name))
     }
 
