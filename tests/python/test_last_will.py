@@ -334,7 +334,7 @@ def test_what_is_left_halts_each_family(family: str) -> None:
                 assert number == 1
 
         class Face(BlockingBus):
-            line = Line()  # type: ignore[assignment]  # what stands for the line
+            line = Line()
 
         profile = drivebus.Profile.find(family)
         unit = Unit.at(Face(bus), 1, profile, None, unverified=True, trust_profile=True)
