@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the windows of one test meet."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("DRIVEBUS_RUNTIME_DIR", str(tmp_path))
 
 
 def test_a_simulator_has_no_ear_unless_it_is_asked_for() -> None:

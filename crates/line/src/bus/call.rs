@@ -124,6 +124,12 @@ impl<'b, 'r> Call<'b, 'r> {
             self.spare_the_others(&mut turn, unit, give_up)?;
         }
         let mut course = Course::new(self.ask.timeout, self.retries);
+        // Asked every 50 ms of who has the line, by whoever has it.
+        let give_up = &mut || {
+            let ends = give_up();
+            self.bus.queue.goes_on();
+            ends
+        };
         let result = match (self.ask.request, self.read_back) {
             (Request::Read { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
             (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),

@@ -283,7 +283,7 @@ impl Shared {
             *notes = line.notes();
         }
         let late = (!self.is_virtual()).then(punctual::note).flatten();
-        let shared = self.sharing.as_ref().and_then(|sharing| sharing.note());
+        let shared = self.sharing.iter().flat_map(|sharing| sharing.notes());
         notes.iter().cloned().chain(shared).chain(late).chain(self.priority_refused.get().cloned()).collect()
     }
 

@@ -266,6 +266,10 @@ impl Shared {
                     ended = why.map(Failure::from);
                     true
                 }
+                Told::LeftOut(count) => {
+                    sharing.left_out(count);
+                    false
+                }
                 Told::Heard { .. } | Told::Overheard { .. } => hear(&mut || false, Whose::Theirs(told)).is_err(),
                 _ => true,
             });
