@@ -154,6 +154,7 @@ OPERATIONS = [
     "stop_all",
     "bits",
     "waiting",
+    "last_will",
     "bus_timeout",
     "motor_block",
     "face",

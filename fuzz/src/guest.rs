@@ -28,7 +28,7 @@ const SOON: Duration = Duration::from_millis(200);
 /// More messages than this in one input show nothing new.
 const MESSAGES: usize = 16;
 /// How every greeting begins, and the version.
-const GREETING: &[u8] = b"drivebus share \x02";
+const GREETING: &[u8] = b"drivebus share \x03";
 /// The first byte of a wish that takes back what is under way, and of what is told of a line that is heard.
 const CANCEL: u8 = 6;
 const HEARD: u8 = 2;
@@ -133,7 +133,7 @@ fn greeting() -> Vec<u8> {
     let baud_rate = FORMAT.baud_rate();
     let varint = [(baud_rate & 0x7F | 0x80).to_le_bytes()[0], (baud_rate >> 7 & 0x7F | 0x80).to_le_bytes()[0]];
     let last = (baud_rate >> 14).to_le_bytes()[0];
-    [GREETING, b"\x01f", &varint, &[last, 8, b'E', 1]].concat()
+    [GREETING, b"\x01f", &varint, &[last, 8, b'E', 1, 0]].concat()
 }
 
 /// The bus that all inputs come in to, and its line.
@@ -163,7 +163,8 @@ fn name() -> String {
 /// Where programs come in: docs/sharing.md.
 fn socket() -> PathBuf {
     let file = format!("server-{}.sock", name().replace(':', "-"));
-    let run_time = std::env::var_os("XDG_RUNTIME_DIR").map(|folder| PathBuf::from(folder).join("drivebus").join(&file));
+    let run_time =
+        std::env::var_os("DRIVEBUS_RUNTIME_DIR").map(|folder| PathBuf::from(folder).join("drivebus").join(&file));
     let others = std::fs::read_dir("/tmp").into_iter().flatten().flatten().map(|entry| entry.path().join(&file));
     run_time
         .into_iter()

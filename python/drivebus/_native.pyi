@@ -40,6 +40,7 @@ __all__ = [
     "end_of_program",
     "exception_means",
     "fault_kinds",
+    "inherited",
     "open_bus",
     "port_facts",
     "port_url",
@@ -101,6 +102,9 @@ def port_url(
     *schemes* are those that the caller opens itself, *families* and *faults* what a simulated line can have. NotAllowed
     names the part that is wrong and what is allowed there.
     """
+
+def inherited() -> tuple[int, list[int]]:
+    """What a forked child has of its parent's ports: an open `/dev/null`, and the descriptors that it replaces."""
 
 def run_time_folder() -> str:
     """The folder for the sockets of this user's programs. OSError where there is none."""
@@ -259,6 +263,22 @@ class Bus:
         """The exceptions of *unit* mean what *profile* says; until then what the specification does."""
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
+    def leave_will(
+        self,
+        unit: int,
+        ways: Sequence[Sequence[bytes]],
+        /,
+        *,
+        look: tuple[bytes, Sequence[bytes]] | None = None,
+        silence: float = 0.0,
+    ) -> int | None:
+        """Leaves what halts *unit* when this program is gone without a word: the number of that will, or None.
+
+        None where nobody would find it. *ways* are PDUs that follow each other, each a way to halt; *look* a read and
+        the answers by which the unit says that it is another one; *silence* the drive's own time-out in seconds.
+        """
+    def withdraw_will(self, number: int, /) -> None:
+        """Takes that will back."""
     @property
     def reconnects(self) -> int:
         """How often the port was opened again after it was lost."""

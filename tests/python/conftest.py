@@ -11,8 +11,10 @@ import functools
 import importlib.util
 import itertools
 import os
+import tempfile
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -42,6 +44,28 @@ RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real ti
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
     """No test knows what another one, or whoever runs the tests, has found out about a line of the same name."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.getbasetemp() / f"state-{next(_NUMBERS)}"))
+
+
+@contextmanager
+def meeting_in_a_folder_of_its_own() -> Iterator[Path]:
+    """Programs meet where no others do, and where the name of a socket is not too long (107 bytes)."""
+    with tempfile.TemporaryDirectory(prefix="drivebus-") as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DRIVEBUS_RUNTIME_DIR", folder)
+        yield Path(folder) / "drivebus"
+
+
+@pytest.fixture(autouse=True, scope="session")
+def apart() -> Iterator[None]:
+    """No test meets the programs of whoever runs it, nor those of tests that run beside it."""
+    with meeting_in_a_folder_of_its_own():
+        yield
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """Where the programs of one test meet."""
+    with meeting_in_a_folder_of_its_own() as folder:
+        yield folder
 
 
 @pytest.fixture(params=LINES)

@@ -140,7 +140,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     (place / "requests.csv").touch()
     (place / "wrong.txt").write_text("01 03 2100 0001\nread output_curent\n")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
+        patch.setenv("DRIVEBUS_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         seen = on_a_terminal(["--port", ONE, "backup", "older.toml"], SIZES[0], cwd=place)
         assert seen.code == 0, seen.text

@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Where the windows of one test, or of one class of tests, meet."""
     place = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", str(place))
+        patch.setenv("DRIVEBUS_RUNTIME_DIR", str(place))
         yield place / "drivebus"
 
 

@@ -15,12 +15,6 @@ from drivebus.cli import cli
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the windows of one test meet."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-
-
 def test_a_simulator_has_no_ear_unless_it_is_asked_for() -> None:
     with drivebus.Simulator({1: "gd350"}, transport="pty") as simulator:
         assert simulator.ear is None

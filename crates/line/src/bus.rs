@@ -11,6 +11,7 @@
 //! | `sharing` | whether the port is this program's, or another's through which it is used |
 //! | `host` | serving other programs |
 //! | `through` | being served by one |
+//! | `wills` | halting what a program ran that is gone |
 
 pub(crate) mod call;
 mod clock;
@@ -24,6 +25,8 @@ mod shared;
 mod sharing;
 #[cfg(all(unix, feature = "share"))]
 mod through;
+#[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_wills.rs")]
+mod wills;
 pub(crate) mod workers;
 
 use std::sync::Arc;
@@ -109,8 +112,12 @@ impl Bus {
 
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
     ///
-    /// From inside a `give_up`, the call that asks it closes the line when it ends.
+    /// A unit that is being halted for a program that is gone is waited for, a second at most. From inside a `give_up`, the
+    /// call that asks it closes the line when it ends.
     pub fn close(&self) {
+        if !self.is_closed() && !self.shared.queue.has_this_thread() {
+            self.shared.wills.let_out();
+        }
         self.shared.close();
     }
 

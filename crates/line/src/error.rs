@@ -143,6 +143,19 @@ pub enum Failure {
         /// How many may wait.
         room: usize,
     },
+    /// A program that ran the unit is gone, and the unit is being stopped for it. Nothing was sent: each request to the unit
+    /// would keep it from acting by itself.
+    #[error(
+        "unit {unit} is being stopped for {program} (process {process}), which is gone without a word; nothing was sent"
+    )]
+    BeingStopped {
+        /// The unit that is being stopped; a broadcast would reach it too.
+        unit: u8,
+        /// The program that is gone.
+        program: String,
+        /// The number that it had.
+        process: u32,
+    },
     /// The request cannot be sent like this. Nothing was sent.
     #[error("{0}")]
     NotBegun(BeginError),

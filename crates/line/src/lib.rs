@@ -75,7 +75,7 @@ pub use health::hint::Hint;
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Program, Stats};
 pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};
-pub use options::{AdapterEcho, BusOptions, CallOptions, Share, UnitOptions};
+pub use options::{AdapterEcho, BusOptions, CallOptions, LastWill, Share, UnitOptions};
 pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
 pub use poll::samples::PollCounts;
@@ -94,5 +94,7 @@ pub use ports::{rs485, tty};
 #[cfg(all(unix, feature = "share"))]
 pub use share::place::run_time_folder;
 pub use system::clock;
+#[cfg(unix)]
+pub use system::inherited::{Inherited, inherited};
 pub use trace::{Direction, Overheard, Traced, Watch};
 pub use turns::order::Priority;

@@ -3,6 +3,7 @@
 //! Serial ports, TCP connections and the simulated line implement it; the bus owner uses nothing else of them.
 
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -86,6 +87,11 @@ pub trait Line: Send + fmt::Debug {
     /// A time-out shorter than the unit's own time and this hears no answer. A silence is seen this much late, never early.
     fn latency(&self) -> Duration {
         Duration::ZERO
+    }
+
+    /// Where the connection ends that the line goes through, if it goes through one: a serial server has many names.
+    fn connected_to(&self) -> Option<SocketAddr> {
+        None
     }
 
     /// What the user should know about this line, such as a setting that did not reach the wire.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{SerialFormat, TURNAROUND};
+use drivebus_rtu::{SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::turns::order::Priority;
 use crate::turns::queue::DEFAULT_QUEUE;
@@ -232,5 +232,39 @@ impl CallOptions {
     #[must_use]
     pub fn connection(self, connection: impl Into<Option<u64>>) -> Self {
         Self { connection: connection.into(), ..self }
+    }
+}
+
+/// What halts a unit when the program that runs it is gone without a word.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct LastWill {
+    /// The unit.
+    pub unit: UnitAddress,
+    /// Each of these halts it, and the first is tried first: PDUs that follow each other.
+    pub ways: Vec<Vec<Vec<u8>>>,
+    /// What the unit is asked before, by one read, and the PDUs of the answers by which it says that it is another one: then
+    /// it is not halted. Silence and refusals are no evidence, nor is any other answer.
+    pub look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
+    /// After how long a silence the unit acts by itself; zero where it does not.
+    pub silence: Duration,
+}
+
+impl LastWill {
+    /// What halts `unit`: in one of these `ways`.
+    pub fn new(unit: UnitAddress, ways: Vec<Vec<Vec<u8>>>) -> Self {
+        Self { unit, ways, look: None, silence: Duration::ZERO }
+    }
+
+    /// Sets [`look`](Self#structfield.look).
+    #[must_use]
+    pub fn look(self, question: Vec<u8>, others: Vec<Vec<u8>>) -> Self {
+        Self { look: Some((question, others)), ..self }
+    }
+
+    /// Sets [`silence`](Self#structfield.silence).
+    #[must_use]
+    pub fn silence(self, silence: Duration) -> Self {
+        Self { silence, ..self }
     }
 }

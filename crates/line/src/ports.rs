@@ -3,6 +3,8 @@
 #[cfg(feature = "serial")]
 pub(crate) mod adapters;
 pub(crate) mod key;
+#[cfg(all(unix, feature = "share"))]
+mod listening;
 #[cfg(feature = "tcp")]
 pub mod mbap;
 #[cfg(feature = "serial")]

@@ -7,6 +7,7 @@
 //! | `message`, `failure` | what is said |
 //! | `channel` | one connection: messages in and out, with limits |
 //! | `guest` | the side of a program that uses a port through another |
+//! | `will` | what is left to be done for a program that is gone |
 //!
 //! The side of the program that has the port is `bus::host`.
 
@@ -15,3 +16,4 @@ pub(crate) mod failure;
 pub(crate) mod guest;
 pub(crate) mod message;
 pub(crate) mod place;
+pub(crate) mod will;

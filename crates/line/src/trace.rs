@@ -6,6 +6,7 @@
 mod ear;
 
 use std::fmt;
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
@@ -224,6 +225,10 @@ impl Line for Watched {
 
     fn latency(&self) -> Duration {
         self.line.latency()
+    }
+
+    fn connected_to(&self) -> Option<SocketAddr> {
+        self.line.connected_to()
     }
 
     fn notes(&self) -> Vec<String> {

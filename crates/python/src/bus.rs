@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use drivebus_line::{
-    Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, PortError, PortErrorKind, UnitOptions,
+    Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, LastWill, PortError, PortErrorKind, UnitOptions,
 };
 use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ_BITS, Request, Table};
 use pyo3::prelude::*;
@@ -240,6 +240,28 @@ impl Bus {
         let unit = unit_address(unit)?;
         let link = py.detach(|| self.core.link(unit));
         Ok((link.good, link.asked))
+    }
+
+    /// Leaves what halts a unit when this program is gone without a word; `None` where nobody would find it.
+    #[pyo3(signature = (unit, ways, /, *, look = None, silence = 0.0))]
+    fn leave_will(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        ways: Vec<Vec<Vec<u8>>>,
+        look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
+        silence: f64,
+    ) -> PyResult<Option<u64>> {
+        let will = LastWill::new(unit_address(unit)?, ways).silence(duration("silence", silence)?);
+        let will = match look {
+            Some((question, others)) => will.look(question, others),
+            None => will,
+        };
+        Ok(unit.py().detach(|| self.core.leave_will(will)))
+    }
+
+    #[pyo3(signature = (number, /))]
+    fn withdraw_will(&self, py: Python<'_>, number: u64) {
+        py.detach(|| self.core.withdraw_will(number));
     }
 
     #[getter]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from drivebus.line.stats import Link
 
-__all__ = ["AwaitableBus", "BusProtocol"]
+__all__ = ["AwaitableBus", "BusProtocol", "KeepsWills"]
 
 
 class BusProtocol(Protocol):
@@ -154,3 +154,33 @@ class AwaitableBus(Protocol):
 
     def blocking(self) -> AwaitableBus:
         """The same line for who has no event loop: it blocks."""
+
+
+@runtime_checkable
+class KeepsWills(Protocol):
+    """A line with whose owner a program can leave what halts a unit, should it be gone without a word.
+
+    A bus need not be one: then nobody is left to halt what a program ran that was killed.
+    """
+
+    @property
+    def port(self) -> str:
+        """The name of the port."""
+
+    def leave_will(
+        self,
+        unit: int,
+        ways: Sequence[Sequence[bytes]],
+        /,
+        *,
+        look: tuple[bytes, Sequence[bytes]] | None = None,
+        silence: float = 0.0,
+    ) -> int | None:
+        """Leaves it: the number of the will, or None where nobody would find it.
+
+        *ways* are requests, as PDUs, each a way to halt; *look* is a read that goes before, and the answers to it by
+        which another unit gives itself away; *silence* is the drive's own time-out, in seconds.
+        """
+
+    def withdraw_will(self, number: int, /) -> None:
+        """Takes the will with this number back."""

@@ -12,6 +12,7 @@ from drivebus import checks
 from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.last_will import LastWill
 from drivebus.operations.stop_proof import PATIENCE
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
@@ -33,12 +34,17 @@ class BusTimeout:
         armed: Whether the drive acts by itself when it hears nothing. True after `close` where the motor still turned
             or could not be asked.
         error: What the last failure of keeping the line busy was, or of closing; None if there was none.
+        unsure: What cannot be promised, in words; empty where nothing is known that speaks against it. Each request of
+            anybody keeps the drive from acting by itself. On a serial port, whoever has it when this program is gone
+            halts the drive before anything else goes there. Through a gateway (`tcp://`) nobody does. Behind a serial
+            server (`socket://`) another computer may ask the drive, of which nothing is known here.
     """
 
     timeout: float
     action: str
     verified: bool
     armed: bool
+    unsure: str
     error: DrivebusError | None
 
     def __init__(self, drive: Unit, timeout: float, action: str) -> None:
@@ -63,7 +69,9 @@ class BusTimeout:
         self.action = checks.one_of("action", action, settings.choices)
         self.verified = settings.verified
         self.armed = False
+        self.unsure = ""
         self.error = None
+        self._will = LastWill(drive, self.timeout, "coast" if self.action == "coast" else "stop")
         self._unit = drive
         # The action comes first: a time-out must not run out on another one.
         self._wanted: dict[str, Value] = {}
@@ -102,6 +110,8 @@ class BusTimeout:
                 unit=self._unit.address,
             )
         self.armed = True
+        self._will.leave()
+        self.unsure = self._will.unsure()
 
     async def give_back(self) -> None:
         """Waits for a motor that slows down, and gives the drive the settings it had. A failure is kept in `error`."""
@@ -124,6 +134,7 @@ class BusTimeout:
         with self._unit.bus.undisturbed() as bus:
             await parameters.write(self._unit.over(bus), self._former)
             self.armed = False
+            self._will.withdraw()
 
     async def _comes_to_rest(self) -> bool:
         """Whether the motor is stopped, once it no longer slows down."""
@@ -146,4 +157,5 @@ class BusTimeout:
         unverified = "" if self.verified else ", its parameters unverified"
         failed = f", failed last with: {self.error}" if self.error else ""
         what = f"{self.action} after {self.timeout:g} s"
-        return f"<Watchdog of unit {self._unit.address}: {what}, {now}{unverified}{failed}>"
+        unsure = f"; {self.unsure}" if self.unsure else ""
+        return f"<Watchdog of unit {self._unit.address}: {what}, {now}{unverified}{failed}{unsure}>"

@@ -11,6 +11,7 @@ from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import motion, waiting
 from drivebus.operations.halting import WITHIN
+from drivebus.operations.last_will import LastWill
 from drivebus.operations.program_end import Guard
 from drivebus.operations.unit import Unit
 
@@ -57,6 +58,7 @@ class MotorBlock:
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
         self._elsewhere = unit.over(unit.bus.blocking())
         self._guard = Guard(self._end_at_once, unit.bus.line)
+        self._will = LastWill(unit)
         self._started = False
         self._starts_before = unit.record.starts
 
@@ -70,6 +72,7 @@ class MotorBlock:
         if self._standstill is not None:
             waiting.check_standstill(self._unit, self._standstill)
         self._guard.arm()
+        self._will.leave()
         with self._guard.beginning():
             await self._start()
         self._started = True
@@ -92,6 +95,8 @@ class MotorBlock:
                     ended = failure is None
                     if failure is not None:
                         _note(reason, f"and unit {self._unit.address} could not be stopped: {failure}")
+                else:
+                    self._will.withdraw()
                 self._guard.disarm()
                 if interrupted is not None:
                     raise interrupted
@@ -179,6 +184,8 @@ class MotorBlock:
                 # What was interrupted before it was sent was no attempt.
                 attempts += unit.record.halts > sent_before or interruptions > _INTERRUPTED_AT_MOST
             else:
+                # Not where that failed: somebody else may yet halt it.
+                self._will.withdraw()
                 return None, interrupted
         return failure, interrupted
 

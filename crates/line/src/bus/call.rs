@@ -28,6 +28,9 @@ use crate::owner::dead_units::Verdict;
 use crate::turns::order::{Claim, Priority, Program};
 use crate::turns::queue::{NoTurn, Turn};
 
+/// How often somebody who waits for a unit to be halted looks whether it was.
+const HALTED: Duration = Duration::from_millis(10);
+
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
     pub(crate) bus: &'b Shared,
@@ -125,6 +128,12 @@ impl<'b, 'r> Call<'b, 'r> {
             self.spare_the_others(&mut turn, unit, give_up)?;
         }
         let mut course = Course::new(self.ask.timeout, self.retries);
+        // Asked every 50 ms of who has the line, by whoever has it.
+        let give_up = &mut || {
+            let ends = give_up();
+            self.bus.queue.goes_on();
+            ends
+        };
         let result = match (self.ask.request, self.read_back) {
             (Request::Read { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
             (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
@@ -204,6 +213,25 @@ impl<'b, 'r> Call<'b, 'r> {
             return Duration::ZERO;
         }
         self.ask.timeout.saturating_mul(self.retries.saturating_add(1))
+    }
+
+    /// Its unit is being halted for a program that is gone: waits off the line for that, as long as for one that is silent.
+    /// `failure` says so.
+    pub(crate) fn wait_for_the_halt(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        failure: Failure,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Box<CallError>> {
+        let end = self.bus.now() + self.patience();
+        while self.bus.wills.keeps_from(self.unit).is_some() {
+            let now = self.bus.now();
+            if now >= end {
+                return Err(self.failed(failure));
+            }
+            self.stand_by(turn, end.min(now + HALTED), give_up)?;
+        }
+        Ok(())
     }
 
     /// Leaves the line to others until `until`.

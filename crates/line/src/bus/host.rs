@@ -16,20 +16,23 @@ use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
 use rustix::event::{PollFd, PollFlags, poll};
+use rustix::process::{Resource, getrlimit};
 
 use crate::bus::call::{Call, Wanted};
 use crate::bus::shared::Shared;
 use crate::bus::workers::pdu_of;
 use crate::error::Failure;
 use crate::health::stats::Program as Counted;
+use crate::line::{PortError, PortErrorKind};
 use crate::options::UnitOptions;
 use crate::share::channel::Channel;
 use crate::share::failure::Said;
 use crate::share::guest::readable;
 use crate::share::message::{Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish};
-use crate::share::place::{Door, Place};
+use crate::share::place::{Door, Entrance, Place};
 use crate::system::clock::monotonic;
-use crate::system::process::{self, Process};
+use crate::system::inherited::Kept;
+use crate::system::process::{self, Life, Process};
 use crate::trace::{Direction, Overheard};
 use crate::turns::order::Program;
 
@@ -37,9 +40,18 @@ use crate::turns::order::Program;
 const MOST: usize = 1_024;
 /// How long a guest may take to say hello, or a message that it has begun.
 const HURRY: Duration = Duration::from_secs(1);
-/// Connections at a time: of all guests, and of one.
+/// Connections at a time: of all guests, and of one; and those that are kept for the first of a program and for stops. Fewer
+/// where this program may not have so many files open.
 const CONNECTIONS: usize = 512;
 const CONNECTIONS_OF_ONE: usize = 128;
+const IN_RESERVE: usize = 128;
+/// How often a guest is told that its call is still to come.
+const WORD: Duration = Duration::from_millis(200);
+/// How long a thread of this program may have the line without a sign that it goes on, until a guest is told so.
+const HOLDS_ON: Duration = Duration::from_secs(2);
+const HOLDS_ON_TO_A_STOP: Duration = Duration::from_secs(1);
+/// How long nobody is let in where the system has no more files or threads for that.
+const BREATHER: Duration = Duration::from_millis(10);
 /// Programs that are remembered when they are gone.
 const REMEMBERED: usize = 64;
 
@@ -48,7 +60,7 @@ const REMEMBERED: usize = 64;
 pub(super) struct Host {
     door: Door,
     /// Its end wakes the thread at the door.
-    _waker: UnixStream,
+    waker: Kept<UnixStream>,
     opened_by: Process,
 }
 
@@ -62,7 +74,7 @@ pub(super) struct Guests {
 struct Inside {
     connections: u64,
     /// To end them.
-    streams: BTreeMap<u64, UnixStream>,
+    streams: BTreeMap<u64, Arc<Kept<UnixStream>>>,
     programs: Vec<Arc<Entry>>,
 }
 
@@ -71,6 +83,7 @@ struct Inside {
 struct Entry {
     name: String,
     process: u32,
+    life: Arc<Life>,
     program: Program,
     connections: AtomicUsize,
     calls: AtomicU64,
@@ -81,30 +94,48 @@ impl Host {
     /// Lets programs in through `door` to the line that `shared` is.
     pub(super) fn open(door: Door, guests: Arc<Guests>, shared: Weak<Shared>) -> io::Result<Self> {
         let (waker, woken) = UnixStream::pair()?;
-        let listener = door.listener.try_clone()?;
+        let (waker, woken) = (Kept::new(waker), Kept::new(woken));
+        let entrances = Arc::clone(&door.entrances);
         thread::Builder::new().name("drivebus-door".to_owned()).spawn(move || {
             loop {
-                let mut descriptors = [PollFd::new(&listener, PollFlags::IN), PollFd::new(&woken, PollFlags::IN)];
+                let doors = entrances.iter().map(|entrance| PollFd::new(&*entrance.listener, PollFlags::IN));
+                let mut descriptors: Vec<_> =
+                    doors.chain(std::iter::once(PollFd::new(&*woken, PollFlags::IN))).collect();
                 let ready = poll(&mut descriptors, None);
-                let is_over = !descriptors[1].revents().is_empty();
+                let is_over = descriptors.last().is_none_or(|woken| !woken.revents().is_empty());
                 if is_over || matches!(ready, Err(error) if error != rustix::io::Errno::INTR) {
                     return;
                 }
-                if let Ok((stream, _)) = listener.accept() {
-                    let (guests, shared) = (Arc::clone(&guests), Weak::clone(&shared));
-                    // Where the system gives no thread, the guest finds its connection ended.
-                    let _ = thread::Builder::new()
-                        .name("drivebus-guest".to_owned())
-                        .spawn(move || serve(stream, &guests, &shared));
+                for Entrance { listener, is_private } in &*entrances {
+                    match listener.accept() {
+                        Ok((stream, _)) => {
+                            let (guests, shared, is_private) = (Arc::clone(&guests), Weak::clone(&shared), *is_private);
+                            // Where the system gives no thread, the guest finds its connection ended.
+                            let _ = thread::Builder::new()
+                                .name("drivebus-guest".to_owned())
+                                .spawn(move || serve(stream, is_private, &guests, &shared));
+                        }
+                        Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                        Err(_) => thread::sleep(BREATHER),
+                    }
                 }
             }
         })?;
-        Ok(Self { door, _waker: waker, opened_by: Process::current() })
+        Ok(Self { door, waker, opened_by: Process::current() })
     }
 
     /// Whether others find it at `place`.
     pub(super) fn is_at(&self, place: &Place) -> bool {
         self.opened_by.is_current() && place.has(&self.door)
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // A child that was forked may have the other end too, and is not who ends this.
+        if self.opened_by.is_current() {
+            let _ = self.waker.shutdown(Shutdown::Both);
+        }
     }
 }
 
@@ -135,19 +166,43 @@ impl Guests {
     }
 
     /// Lets a program in; `Err` says why not.
-    fn enter(self: &Arc<Self>, name: String, process: u32, stream: UnixStream) -> Result<Visit, String> {
+    fn enter(self: &Arc<Self>, hello: &Hello, process: u32, stream: Arc<Kept<UnixStream>>) -> Result<Visit, String> {
         let mut inside = self.lock();
-        if inside.streams.len() >= CONNECTIONS {
-            return Err(format!("{CONNECTIONS} connections to this port are open already, and no more may be"));
+        let name = readable(&hello.program);
+        // A process that this one cannot see is told from others by its name alone.
+        let is_it = |entry: &&Arc<Entry>| {
+            entry.connections.load(Ordering::Relaxed) > 0
+                && entry.process == process
+                && if process == 0 { entry.name == name } else { !entry.life.is_gone() }
+        };
+        let known = inside.programs.iter().find(is_it).cloned();
+        let files = getrlimit(Resource::Nofile).current.and_then(|files| usize::try_from(files).ok());
+        let files = files.unwrap_or(usize::MAX);
+        let most = CONNECTIONS.min(files / 2);
+        if inside.streams.len() >= (most + IN_RESERVE).min(files / 4 * 3) {
+            return Err(format!(
+                "{} connections to this port are open already, and no more may be",
+                inside.streams.len()
+            ));
         }
-        let is_here = |entry: &&Arc<Entry>| entry.connections.load(Ordering::Relaxed) > 0;
-        let known = inside.programs.iter().filter(is_here).find(|entry| entry.process == process).cloned();
+        if let Some(entry) = known.as_ref().filter(|_| !hello.is_for_a_stop) {
+            if inside.streams.len() >= most {
+                return Err(format!("{most} connections to this port are open already, and no more may be"));
+            }
+            if entry.connections.load(Ordering::Relaxed) >= CONNECTIONS_OF_ONE {
+                return Err(format!(
+                    "this program has {CONNECTIONS_OF_ONE} connections to this port, and no more may be"
+                ));
+            }
+        }
         let entry = known.unwrap_or_else(|| {
+            let is_here = |entry: &&Arc<Entry>| entry.connections.load(Ordering::Relaxed) > 0;
             let taken: Vec<u16> = inside.programs.iter().filter(is_here).map(|entry| entry.program.0).collect();
             let number = (1..u16::MAX).find(|number| !taken.contains(number)).unwrap_or(u16::MAX);
             let entry = Arc::new(Entry {
                 name,
                 process,
+                life: Arc::new(Life::of(process)),
                 program: Program(number),
                 connections: AtomicUsize::new(0),
                 calls: AtomicU64::new(0),
@@ -162,14 +217,11 @@ impl Guests {
             inside.programs.push(Arc::clone(&entry));
             entry
         });
-        if entry.connections.load(Ordering::Relaxed) >= CONNECTIONS_OF_ONE {
-            return Err(format!("this program has {CONNECTIONS_OF_ONE} connections to this port, and no more may be"));
-        }
         entry.connections.fetch_add(1, Ordering::Relaxed);
         inside.connections += 1;
         let number = inside.connections;
         inside.streams.insert(number, stream);
-        Ok(Visit { guests: Arc::clone(self), entry, number })
+        Ok(Visit { guests: Arc::clone(self), entry, number, is_for_a_stop: hello.is_for_a_stop })
     }
 }
 
@@ -178,6 +230,7 @@ struct Visit {
     guests: Arc<Guests>,
     entry: Arc<Entry>,
     number: u64,
+    is_for_a_stop: bool,
 }
 
 impl Drop for Visit {
@@ -188,14 +241,24 @@ impl Drop for Visit {
 }
 
 /// Serves one connection to its end.
-fn serve(stream: UnixStream, guests: &Arc<Guests>, shared: &Weak<Shared>) {
+fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, shared: &Weak<Shared>) {
     let peer = process::peer(&stream);
-    let Ok(mut channel) = Channel::new(stream, MOST) else { return };
-    match let_in(&mut channel, peer, guests, shared) {
+    let is_this_user = peer.is_this_user.unwrap_or(is_private);
+    let Ok(mut channel) = Channel::new(stream, MOST, Arc::new(Life::Unknown)) else { return };
+    let let_in = if is_this_user {
+        let_in(&mut channel, peer.process, guests, shared)
+    } else {
+        Err("this port is open in a program of another user".to_owned())
+    };
+    match let_in {
         Ok(Some(visit)) => {
             let channel = RefCell::new(channel);
             // It ends when either side does, or where what comes is no wish.
             while next(&channel, &visit, shared).is_some() {}
+            drop(visit);
+            if let Some(shared) = shared.upgrade() {
+                shared.wills.look_soon();
+            }
         }
         Ok(None) => {}
         Err(why) => {
@@ -208,13 +271,10 @@ fn serve(stream: UnixStream, guests: &Arc<Guests>, shared: &Weak<Shared>) {
 /// Hears who comes; `Err` says why it cannot come in, `None` that it said nothing.
 fn let_in(
     channel: &mut Channel,
-    peer: process::Peer,
+    process: u32,
     guests: &Arc<Guests>,
     shared: &Weak<Shared>,
 ) -> Result<Option<Visit>, String> {
-    if !peer.is_this_user {
-        return Err("this port is open in a program of another user".to_owned());
-    }
     let no_greeting = || "this is a port of drivebus, and what came is not its greeting".to_owned();
     let Some(greeting) = channel.hear_bytes(monotonic() + HURRY).map_err(|_| no_greeting())? else { return Ok(None) };
     let own = format!("{} (process {})", process::own_name(), std::process::id());
@@ -234,8 +294,8 @@ fn let_in(
             hello.characters
         ));
     }
-    let end = channel.end().map_err(|error| error.to_string())?;
-    let visit = guests.enter(readable(&hello.program), peer.process, end)?;
+    let visit = guests.enter(&hello, process, channel.end())?;
+    channel.depends_on(Arc::clone(&visit.entry.life));
     let welcome =
         Welcome { program: process::own_name(), process: std::process::id(), reconnects: shared.reconnects_here() };
     let welcome = postcard::to_extend(&welcome, vec![LET_IN]).map_err(|error| error.to_string())?;
@@ -248,6 +308,7 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
     // A bus that is gone ends its connections; one that is about to be is as good as gone.
     let shared = shared.upgrade()?;
     let told = match wish {
+        Wish::Call(order) if visit.is_for_a_stop && !order.is_stop() => return None,
         Wish::Call(order) => {
             visit.entry.calls.fetch_add(1, Ordering::Relaxed);
             let told = call(channel, &shared, &order, visit.entry.program)?;
@@ -256,23 +317,28 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
             }
             told
         }
+        // It came when what it is about had ended.
+        Wish::Cancel => return Some(()),
+        _ if visit.is_for_a_stop => return None,
         Wish::Listen(time) => {
+            let mut passing = Passing::to(channel);
             let mut hear = |moment: Instant, bytes: &[u8]| {
-                // Where nobody listens any more, that is seen below.
-                let _ = channel.borrow_mut().say(&Told::Heard { at: moment.as_nanos(), bytes: bytes.to_vec() });
+                passing.say(&Told::Heard { at: moment.as_nanos(), bytes: bytes.to_vec() });
             };
             let ended =
                 shared.listen_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            passing.end();
             Told::Over(ended.err().as_ref().map(Said::from))
         }
         Wish::Overhear(time) => {
+            let mut passing = Passing::to(channel);
             let mut hear = |piece: Overheard| {
                 let Overheard { at, direction, bytes } = piece;
-                let sent = direction == Direction::Sent;
-                let _ = channel.borrow_mut().say(&Told::Overheard { at: at.as_nanos(), sent, bytes });
+                passing.say(&Told::Overheard { at: at.as_nanos(), sent: direction == Direction::Sent, bytes });
             };
             let ended =
                 shared.overhear_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            passing.end();
             Told::Over(ended.err().as_ref().map(Said::from))
         }
         Wish::Stats => Told::Stats(Box::new(Figures::from(shared.stats()))),
@@ -282,8 +348,10 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
         }
         Wish::FreshWord => Told::Word(shared.words.next()),
         Wish::Reconnects => Told::Reconnects(shared.reconnects_here()),
-        // It came when what it is about had ended.
-        Wish::Cancel => return Some(()),
+        Wish::Wills => {
+            shared.wills.look_soon();
+            Told::Wills
+        }
     };
     if shared.is_shut() {
         shared.close();
@@ -309,6 +377,54 @@ fn is_unwanted(channel: &RefCell<Channel>, shared: &Shared) -> bool {
     shared.is_shut() || !matches!(channel.borrow_mut().hear::<Wish>(Instant::ZERO), Ok(None))
 }
 
+/// What is said to a guest that may read it or not: nobody waits for one that does not, least of all who uses the line.
+struct Passing<'a> {
+    channel: &'a RefCell<Channel>,
+    left_out: u64,
+}
+
+impl<'a> Passing<'a> {
+    fn to(channel: &'a RefCell<Channel>) -> Self {
+        Self { channel, left_out: 0 }
+    }
+
+    /// Says `told`, and before it how much was left out since something could be said. A connection that has ended is seen
+    /// elsewhere.
+    fn say(&mut self, told: &Told) {
+        let mut channel = self.channel.borrow_mut();
+        if self.left_out > 0 && channel.say_in_passing(&Told::LeftOut(self.left_out)).unwrap_or(true) {
+            self.left_out = 0;
+        }
+        if self.left_out > 0 || !channel.say_in_passing(told).unwrap_or(true) {
+            self.left_out += 1;
+        }
+    }
+
+    /// Nothing more is said: what is left out by now is told, to one that reads.
+    fn end(&mut self) {
+        if self.left_out > 0 {
+            let _ = self.channel.borrow_mut().say(&Told::LeftOut(self.left_out));
+        }
+    }
+}
+
+/// The words to a guest whose call is still to come.
+struct Words<'a> {
+    channel: &'a RefCell<Channel>,
+    said: Instant,
+}
+
+impl Words<'_> {
+    fn say(&mut self) {
+        let now = monotonic();
+        if now >= self.said + WORD {
+            self.said = now;
+            // One that does not read is not there, or does not need it.
+            let _ = self.channel.borrow_mut().say_in_passing(&Told::Waiting);
+        }
+    }
+}
+
 /// A guest that has to be there for as long as nothing of its call is on the wire.
 struct Here<'a>(&'a RefCell<Channel>);
 
@@ -324,7 +440,15 @@ fn call(channel: &RefCell<Channel>, shared: &Shared, order: &Order, program: Pro
     let ask = order.times(shared.ask_as(UnitOptions::default(), destination, &request, &options));
     let here = Here(channel);
     let mut pdu = Vec::new();
-    let mut give_up = || is_unwanted(channel, shared);
+    let mut words = Words { channel, said: monotonic() };
+    let mut watch = shared.queue.watch();
+    let mut holds_on = false;
+    let patience = if order.is_stop() { HOLDS_ON_TO_A_STOP } else { HOLDS_ON };
+    let mut give_up = || {
+        words.say();
+        holds_on = watch.sees_nothing_move_for(patience);
+        holds_on || is_unwanted(channel, shared)
+    };
     let result = Call::new(shared, ask, options)
         .of_program(program)
         .while_wanted(&here)
@@ -333,6 +457,11 @@ fn call(channel: &RefCell<Channel>, shared: &Shared, order: &Order, program: Pro
     Some(match result {
         Ok(done) => Told::Answer { pdu, sent: done.sent.as_nanos(), ended: done.ended.as_nanos(), reconnects },
         Err(mut error) => {
+            if error.failure == Failure::Interrupted && holds_on {
+                let own = format!("{} (process {})", process::own_name(), std::process::id());
+                let why = format!("a thread of {own} holds the port and does not go on: it hangs; end that program");
+                error.failure = Failure::Port(PortError::new(PortErrorKind::Busy, &shared.name, why));
+            }
             // What ends here because this program does is not what the guest gave up.
             if error.failure == Failure::Interrupted && shared.is_shut() {
                 error.failure = Failure::Closed;

@@ -79,15 +79,22 @@ impl Shared {
     ) -> Result<(), Failure> {
         let end = self.now() + time;
         loop {
-            let _turn = self.queue.turn((Priority::Poll, None), give_up).map_err(|why| self.no_turn(why))?;
+            let turn = self.queue.turn((Priority::Poll, None), give_up).map_err(|why| self.no_turn(why))?;
             let mut owner = self.lock();
             owner.prepare(give_up)?;
             let now = self.now_of(&owner);
             if now >= end {
                 return Ok(());
             }
-            owner.hear(end.min(now + LOOK_UP), hear)?;
+            let mut pieces = Vec::new();
+            let heard = owner.hear(end.min(now + LOOK_UP), &mut |at, bytes| pieces.push((at, bytes.to_vec())));
             drop(owner);
+            drop(turn);
+            // However long that takes, others use the line meanwhile.
+            for (at, bytes) in &pieces {
+                hear(*at, bytes);
+            }
+            heard?;
             if self.is_shut() || give_up() {
                 return Err(self.given_up());
             }

@@ -13,6 +13,7 @@ use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
 use crate::bus::openings::Openings;
 use crate::bus::sharing::Sharing;
+use crate::bus::wills::Wills;
 use crate::error::{CallError, Failure};
 use crate::health::link::{Link, Links};
 use crate::health::stats::Stats;
@@ -54,6 +55,8 @@ pub(crate) struct Shared {
     pub(super) trace: Trace,
     /// Where the port is of a kind that programs share, and this one does.
     pub(super) sharing: Option<Arc<Sharing>>,
+    /// What is left to be done for programs that are gone.
+    pub(super) wills: Arc<Wills>,
 }
 
 impl Shared {
@@ -67,7 +70,9 @@ impl Shared {
         let (words, stats) = (Arc::new(FreshWords::new()), Arc::default());
         let given = key.as_ref().map(ToString::to_string).unwrap_or_default();
         let openings = Openings::new(&stats);
+        let wills = Arc::new(Wills::new(key.clone(), &options));
         let (sharing, opener) = Sharing::around(key, &options, &stats, &openings, openings.counting(opener));
+        let opener = wills.finding(opener);
         let mut owner = Owner::new(opener, options.format, options.echo, Arc::clone(&words), Arc::clone(&stats));
         match owner.open(give_up) {
             Err(failure) if !sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) => return Err(failure),
@@ -94,7 +99,9 @@ impl Shared {
             clock,
             trace: Trace::default(),
             sharing,
+            wills,
         });
+        shared.wills.serves(&shared);
         if let Some(sharing) = &shared.sharing {
             sharing.serves(&shared);
         }
@@ -135,6 +142,7 @@ impl Shared {
         let turn = self.queue.turn((Priority::Stop, None), &mut || false);
         self.lock().close();
         drop(turn);
+        self.wills.let_go();
         if let Some(sharing) = &self.sharing {
             sharing.end();
         }
@@ -287,8 +295,15 @@ impl Shared {
             *notes = line.notes();
         }
         let late = (!self.is_virtual()).then(punctual::note).flatten();
-        let shared = self.sharing.as_ref().and_then(|sharing| sharing.note());
-        notes.iter().cloned().chain(shared).chain(late).chain(self.priority_refused.get().cloned()).collect()
+        let shared = self.sharing.iter().flat_map(|sharing| sharing.notes());
+        notes
+            .iter()
+            .cloned()
+            .chain(shared)
+            .chain(self.wills.notes())
+            .chain(late)
+            .chain(self.priority_refused.get().cloned())
+            .collect()
     }
 
     /// A thread that works for this line alone comes: it goes before others where it may.

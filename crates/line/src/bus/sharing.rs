@@ -3,7 +3,8 @@
 //! The port decides: who opens it has it, and serves the others; who finds it taken looks for the one who serves it. When
 //! that one ends, all others do the same again, and one of them has the port.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
@@ -46,6 +47,8 @@ pub(super) struct Sharing {
     guest: Mutex<Option<Arc<Guest>>>,
     host: Mutex<Serving>,
     guests: Arc<Guests>,
+    /// Pieces of what went over the line that the program which has the port could not tell this one.
+    left_out: AtomicU64,
 }
 
 #[derive(Debug, Default)]
@@ -76,7 +79,7 @@ impl Sharing {
         Self {
             key,
             share: options.share,
-            hello: Hello { program: own_name(), characters: Characters::of(&options.format) },
+            hello: Hello { program: own_name(), characters: Characters::of(&options.format), is_for_a_stop: false },
             bus: OnceLock::new(),
             stats: Arc::clone(stats),
             openings: Arc::clone(openings),
@@ -85,6 +88,7 @@ impl Sharing {
             guest: Mutex::default(),
             host: Mutex::default(),
             guests: Arc::default(),
+            left_out: AtomicU64::new(0),
         }
     }
 
@@ -95,50 +99,65 @@ impl Sharing {
     }
 
     /// The line; or an error, and a [`guest`](Self::guest) where another program serves the port.
+    ///
+    /// Who serves it is asked for before the port is opened: what keeps others out is not known everywhere. A container has a
+    /// node of its own for a device, whose lock is another one; and a serial server may serve one client only, the last.
     fn open(&self, open: &mut Opener) -> Result<Box<dyn Line>, PortError> {
-        let place = match Place::of(&self.key) {
-            Ok(Some(place)) => place,
-            Ok(None) => return open(), // it says what is wrong with the port
+        let places = match Place::all(self.key.names()) {
+            Ok(places) if places.is_empty() => return open(), // it says what is wrong with the port
+            Ok(places) => places,
             Err(error) => return self.open_alone(open, &error),
         };
-        let _turn = match place.turn() {
-            Ok(turn) => turn,
+        let turns: std::io::Result<Vec<_>> = places.iter().map(Place::turn).collect();
+        let _turns = match turns {
+            Ok(turns) => turns,
             Err(error) => return self.open_alone(open, &error),
         };
         let end = monotonic() + LETS_GO;
-        // What does not keep others out by itself is asked for first.
-        let mut taken = (!self.key.locks()).then(|| PortError::new(PortErrorKind::Busy, "port", "it is taken"));
         loop {
-            let error = match taken.take() {
-                Some(error) => error,
-                None => match open() {
-                    Ok(line) => {
-                        self.has_opened(place);
-                        return Ok(line);
+            let before = self.openings.with_one_now();
+            // Behind a door of this bus's own stands this bus, which has lost the port.
+            let others = places.iter().filter(|place| !self.serves_at(place));
+            let knocked = others.map(|place| Guest::knock(place, &self.hello, before));
+            let mut is_going = false;
+            let mut silent = None;
+            for knocked in knocked {
+                match knocked {
+                    Knocked::Open(guest) => {
+                        self.comes_in(*guest);
+                        return Err(self.busy("it is taken".to_owned()));
                     }
-                    Err(error) if error.kind == PortErrorKind::Busy => error,
-                    Err(error) => return Err(error),
-                },
-            };
-            match Guest::knock(&place, &self.hello, self.openings.with_one_now()) {
-                Knocked::Open(guest) => {
-                    self.comes_in(guest);
-                    return Err(error);
+                    Knocked::SentAway(why) => return Err(self.busy(why)),
+                    Knocked::Silent(why) => silent = Some(why),
+                    Knocked::Gone => is_going = true,
+                    Knocked::Absent => {}
                 }
-                Knocked::SentAway(why) => return Err(PortError { message: why, ..error }),
-                Knocked::Gone if monotonic() < end => thread::sleep(STEP),
-                Knocked::Absent | Knocked::Gone if self.key.locks() => return Err(error),
-                Knocked::Absent | Knocked::Gone => {
-                    // Nobody serves it.
-                    let line = open()?;
-                    self.has_opened(place);
+            }
+            // Without a lock nobody else would say that the port is taken.
+            if let Some(why) = silent.take_if(|_| !self.key.locks()) {
+                return Err(self.busy(why));
+            }
+            match open() {
+                Ok(line) => {
+                    self.has_opened(line.connected_to());
                     return Ok(line);
                 }
-            }
-            if !self.key.locks() {
-                taken = Some(error);
+                Err(error) if error.kind == PortErrorKind::Busy => match silent {
+                    Some(message) => return Err(PortError { message, ..error }),
+                    None if is_going && monotonic() < end => thread::sleep(STEP),
+                    None => return Err(error),
+                },
+                Err(error) => return Err(error),
             }
         }
+    }
+
+    fn serves_at(&self, place: &Place) -> bool {
+        self.serving().host.as_ref().is_some_and(|host| host.is_at(place))
+    }
+
+    fn busy(&self, why: String) -> PortError {
+        PortError::new(PortErrorKind::Busy, self.key.to_string(), why)
     }
 
     /// Opens the port where nobody could be met over it.
@@ -155,8 +174,12 @@ impl Sharing {
         self.is_guest.store(true, Ordering::Release);
     }
 
-    fn has_opened(&self, place: Place) {
-        self.open_door(place);
+    /// The port is open, and a connection to it ends at `peer` if it has such an end: that says which of its names it has.
+    fn has_opened(&self, peer: Option<SocketAddr>) {
+        let places = Place::all(self.key.name_of(peer).into_iter().collect()).unwrap_or_default();
+        for place in places {
+            self.open_door(place);
+        }
         if self.takes_over.swap(false, Ordering::AcqRel) {
             thread::sleep(QUIET);
         }
@@ -238,12 +261,24 @@ impl Sharing {
         self.guests.counted()
     }
 
+    /// So many pieces of what went over the line more were left out, since this program did not take them.
+    pub(super) fn left_out(&self, count: u64) {
+        self.left_out.fetch_add(count, Ordering::Relaxed);
+    }
+
     /// What the user should know about it.
-    pub(super) fn note(&self) -> Option<String> {
-        match self.guest() {
+    pub(super) fn notes(&self) -> Vec<String> {
+        let whose = match self.guest() {
             Some(guest) => Some(format!("{} has the port; requests go through it", guest.host())),
             None => self.serving().refused.clone(),
-        }
+        };
+        let left_out = self.left_out.load(Ordering::Relaxed);
+        let gaps = (left_out > 0).then(|| {
+            format!(
+                "{left_out} pieces of what went over the line were not heard: this program did not take them in time"
+            )
+        });
+        whose.into_iter().chain(gaps).collect()
     }
 
     fn serving(&self) -> MutexGuard<'_, Serving> {

@@ -266,6 +266,10 @@ impl Shared {
                     ended = why.map(Failure::from);
                     true
                 }
+                Told::LeftOut(count) => {
+                    sharing.left_out(count);
+                    false
+                }
                 Told::Heard { .. } | Told::Overheard { .. } => hear(&mut || false, Whose::Theirs(told)).is_err(),
                 _ => true,
             });
@@ -335,6 +339,17 @@ impl Shared {
             _ => None,
         };
         self.told_at_once(&Wish::Reconnects, count).unwrap_or_else(|| self.reconnects_here())
+    }
+
+    /// Whether the port is another program's.
+    pub(super) fn is_guest(&self) -> bool {
+        self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
+    }
+
+    /// Tells the program that has the port of a will that was left. False where that is not known to have reached it: then
+    /// it is found all the same when the connection ends, or the port is opened.
+    pub(super) fn tell_of_wills(&self) -> bool {
+        self.told_at_once(&Wish::Wills, |_, told| matches!(told, Told::Wills).then_some(())).is_some()
     }
 
     pub(super) fn characters(&self) -> crate::share::message::Characters {

@@ -48,7 +48,7 @@ impl Sharing {
         match self.0 {}
     }
 
-    pub(super) fn note(&self) -> Option<String> {
+    pub(super) fn notes(&self) -> Vec<String> {
         match self.0 {}
     }
 }

@@ -21,7 +21,7 @@ pub enum ErrorKind {
     Refused,
     /// What was asked was sent, and its effect is not known.
     Unconfirmed,
-    /// Nothing was sent: out of range, read-only, an unknown name, no room in the queue.
+    /// Nothing was sent: out of range, read-only, an unknown name, no room in the queue, a unit that is being stopped.
     NotAllowed,
 }
 
@@ -34,7 +34,9 @@ impl Failure {
     fn kind_of(&self, came: bool) -> ErrorKind {
         match self {
             Self::Port(_) | Self::Reopened | Self::Forked | Self::Closed => ErrorKind::Port,
-            Self::NotBegun(_) | Self::ReadOnly { .. } | Self::QueueFull { .. } => ErrorKind::NotAllowed,
+            Self::NotBegun(_) | Self::ReadOnly { .. } | Self::QueueFull { .. } | Self::BeingStopped { .. } => {
+                ErrorKind::NotAllowed
+            }
             Self::Doubtful | Self::NotAsked { .. } | Self::Unreached => ErrorKind::NoAnswer,
             Self::NotTaken { .. } | Self::Limited { .. } | Self::Acknowledged { .. } => ErrorKind::Unconfirmed,
             Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,

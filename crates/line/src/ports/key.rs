@@ -1,4 +1,8 @@
 //! Which port it is, whatever people call it.
+//!
+//! A serial port is told by the number of its device. A serial server is told by where a connection to it ends: a name, its
+//! address and another name of the same machine lead there. On this machine that is the socket which listens, since
+//! `127.0.0.1`, `::1` and the address of a network card may lead to one and the same.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -41,28 +45,133 @@ impl fmt::Display for PortKey {
 }
 
 #[cfg(all(unix, feature = "share"))]
-impl PortKey {
-    /// The port as a file name, the same for every name of the port; `None` while there is no such port.
-    pub(crate) fn name(&self) -> Option<String> {
-        use std::os::unix::fs::{FileTypeExt, MetadataExt};
+mod names {
+    use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+    use std::os::unix::fs::MetadataExt;
+    use std::time::UNIX_EPOCH;
 
-        match &self.0 {
-            Kind::Path(path) => {
-                let status = std::fs::metadata(path).ok().filter(|status| status.file_type().is_char_device())?;
-                // Pseudo-terminals of containers have the same numbers, on a file system of their own.
-                Some(format!("port-{:x}-{:x}", status.dev(), status.rdev()))
+    use super::{Kind, PortKey, Server};
+    use crate::ports::listening::listening;
+
+    impl PortKey {
+        /// The ports that may be meant, as file names, the same for every name of a port: one, or of a serial server one for
+        /// each address that its name has. None while there is no such port.
+        pub(crate) fn names(&self) -> Vec<String> {
+            use std::os::unix::fs::FileTypeExt;
+
+            match &self.0 {
+                Kind::Path(path) => {
+                    let status = std::fs::metadata(path).ok().filter(|status| status.file_type().is_char_device());
+                    status.iter().map(|status| device(status.dev(), status.rdev())).collect()
+                }
+                Kind::Server(Server { host, port }) => match (host.as_str(), *port).to_socket_addrs() {
+                    Ok(addresses) => addresses.map(server).collect(),
+                    // Whoever opens it says what is wrong with the name; who meets others over it needs no address.
+                    Err(_) => vec![unknown(host, *port)],
+                },
             }
-            Kind::Server(Server { host, port }) => {
-                let host = host.to_lowercase();
-                let is_plain = |letter: char| letter.is_ascii_alphanumeric() || ".-".contains(letter);
-                let host: String = host.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
-                Some(format!("server-{}-{port}", host.chars().take(64).collect::<String>()))
+        }
+
+        /// The name of the one that was opened, whose connection ends at `peer` if it has such an end.
+        pub(crate) fn name_of(&self, peer: Option<SocketAddr>) -> Option<String> {
+            peer.map(server).or_else(|| self.names().into_iter().next())
+        }
+
+        /// When it was made, where another one may have its name next: a pseudo-terminal, an adapter that is plugged in
+        /// again. 0 where that is not known.
+        pub(crate) fn made(&self) -> u64 {
+            let Kind::Path(path) = &self.0 else { return 0 };
+            let Ok(status) = std::fs::metadata(path) else { return 0 };
+            let made = status.created().ok().and_then(|made| made.duration_since(UNIX_EPOCH).ok());
+            match made {
+                Some(made) => u64::try_from(made.as_nanos()).unwrap_or(u64::MAX),
+                // Their file system does not say; what changes a node there, `chmod`, is not done while it is in use.
+                None if is_pseudo_terminal(status.rdev()) => status
+                    .ctime()
+                    .cast_unsigned()
+                    .wrapping_mul(1_000_000_000)
+                    .wrapping_add(status.ctime_nsec().cast_unsigned()),
+                None => 0,
             }
+        }
+
+        /// Whether opening it keeps other programs out, as the lock of a serial port does.
+        pub(crate) fn locks(&self) -> bool {
+            matches!(self.0, Kind::Path(_))
         }
     }
 
-    /// Whether opening it keeps other programs out, as the lock of a serial port does.
-    pub(crate) fn locks(&self) -> bool {
-        matches!(self.0, Kind::Path(_))
+    /// The device that a node stands for, wherever the node is: containers have nodes of their own. But a pseudo-terminal of a
+    /// container may have the number of another one's, on a file system of its own. Source: `devices.txt` of Linux.
+    fn device(file_system: u64, number: u64) -> String {
+        if is_pseudo_terminal(number) { format!("port-{file_system:x}-{number:x}") } else { format!("port-{number:x}") }
+    }
+
+    fn is_pseudo_terminal(number: u64) -> bool {
+        (136..=143).contains(&rustix::fs::major(number)) || !cfg!(target_os = "linux")
+    }
+
+    /// The server at the other end of a connection to `address`.
+    pub(super) fn server(address: SocketAddr) -> String {
+        let (ip, port) = (address.ip().to_canonical(), address.port());
+        match listening(ip, port) {
+            Some(socket) => format!("server-here-{port}-{socket}"),
+            None => match ip {
+                IpAddr::V4(ip) => format!("server-{ip}-{port}"),
+                IpAddr::V6(ip) => format!("server-{}-{port}", ip.to_string().replace(':', "_")),
+            },
+        }
+    }
+
+    fn unknown(host: &str, port: u16) -> String {
+        let is_plain = |letter: char| letter.is_ascii_alphanumeric() || ".-".contains(letter);
+        let host = host.to_lowercase();
+        let host: String = host.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).take(64).collect();
+        format!("server-{host}-{port}")
+    }
+}
+
+#[cfg(all(test, unix, feature = "share"))]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+    use std::net::TcpListener;
+
+    use super::*;
+    use crate::ports::url::Known;
+
+    fn names(url: &str) -> Vec<String> {
+        PortUrl::parse(url, &Known::default()).unwrap().key().unwrap().names()
+    }
+
+    #[test]
+    fn an_address_is_the_same_however_it_is_written() {
+        assert_eq!(names("socket://192.0.2.7:4001"), ["server-192.0.2.7-4001"]);
+        assert_eq!(names("socket://[::ffff:192.0.2.7]:4001"), names("socket://192.0.2.7:4001"));
+        assert_eq!(names("socket://[2001:DB8:0::7]:4001"), names("socket://[2001:db8::7]:4001"));
+        assert_ne!(names("socket://192.0.2.7:4001"), names("socket://192.0.2.7:4002"));
+    }
+
+    #[test]
+    fn a_name_that_leads_nowhere_is_still_one_place() {
+        assert_eq!(names("socket://No_Such.Host.invalid:1"), ["server-no_such.host.invalid-1"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_server_of_this_machine_is_the_socket_that_listens() {
+        let server = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = server.local_addr().unwrap().port();
+        let of_it = names(&format!("socket://127.0.0.1:{port}"));
+        assert!(of_it[0].starts_with("server-here-"), "{of_it:?}");
+        // The name may have other addresses too, where nobody listens.
+        assert!(names(&format!("socket://localhost:{port}")).contains(&of_it[0]));
+        assert_eq!(names(&format!("socket://[::ffff:127.0.0.1]:{port}")), of_it);
+        // One that listens at all addresses is reached under each of them.
+        let everywhere = TcpListener::bind("0.0.0.0:0").unwrap();
+        let port = everywhere.local_addr().unwrap().port();
+        let first = names(&format!("socket://127.0.0.1:{port}"));
+        assert_eq!(first, names(&format!("socket://127.1.2.3:{port}")));
+        assert_ne!(first, of_it);
     }
 }

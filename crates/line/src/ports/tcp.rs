@@ -4,12 +4,13 @@
 //! that line. What Modbus TCP adds, a header instead of CRC and silence, is in [`mbap`](crate::mbap).
 
 use std::io::{self, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 
 use drivebus_rtu::{Duration, Instant, SerialFormat};
 
 use crate::line::{Line, PortError, PortErrorKind};
 use crate::system::clock::{monotonic, sleep_until};
+use crate::system::inherited::Kept;
 
 /// How long the network may take no byte of what it is given before the connection counts as lost.
 const STALL: Duration = Duration::from_millis(80);
@@ -69,6 +70,10 @@ impl Line for RtuOverTcp {
         self.connection.name.clone()
     }
 
+    fn connected_to(&self) -> Option<SocketAddr> {
+        self.connection.stream.peer_addr().ok()
+    }
+
     /// The server's own transceiver may hear what it sends, as an adapter's may.
     fn may_echo(&self) -> bool {
         true
@@ -78,7 +83,7 @@ impl Line for RtuOverTcp {
 /// What both kinds of TCP line share: bytes through a socket, with deadlines on our clock.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    stream: TcpStream,
+    stream: Kept<TcpStream>,
     /// As the user would write it: `scheme://host:port`.
     pub(crate) name: String,
 }
@@ -100,7 +105,7 @@ impl Connection {
         let mut failure = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
         for address in addresses {
             match TcpStream::connect_timeout(&address, timeout).and_then(prepared) {
-                Ok(stream) => return Ok(Self { stream, name }),
+                Ok(stream) => return Ok(Self { stream: Kept::new(stream), name }),
                 Err(error) => failure = error,
             }
         }
@@ -211,6 +216,6 @@ mod tests {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let port = listener.local_addr().unwrap().port();
         let connection = Connection::open("socket", "127.0.0.1", port, Duration::from_secs(20)).unwrap();
-        assert_eq!(rustix::net::sockopt::tcp_user_timeout(&connection.stream).unwrap(), 3_000); // milliseconds
+        assert_eq!(rustix::net::sockopt::tcp_user_timeout(&*connection.stream).unwrap(), 3_000); // milliseconds
     }
 }

@@ -33,6 +33,7 @@ use crate::ports::adapters::identity::{DeviceNumber, Places};
 use crate::ports::adapters::latency::LatencyTimer;
 use crate::ports::rs485::{self, InForce, Rs485, Wire};
 use crate::system::clock::{monotonic, sleep_until};
+use crate::system::inherited::Kept;
 use crate::system::process::Process;
 use transceiver::Transmission;
 
@@ -84,7 +85,7 @@ impl TtyOptions {
 /// An open serial port.
 #[derive(Debug)]
 pub struct Tty {
-    port: SerialPort,
+    port: Kept<SerialPort>,
     name: String,
     format: SerialFormat,
     /// Who switches the direction, and how long that takes: it belongs to the time a frame takes.
@@ -123,7 +124,7 @@ impl Tty {
         options: &TtyOptions,
         places: &Places,
     ) -> Result<Self, PortError> {
-        let port = system::open(path).map_err(|error| open_error(path, &error))?;
+        let port = system::open(path).map(Kept::new).map_err(|error| open_error(path, &error))?;
         let pseudo_terminal = system::is_pseudo_terminal(&port, path);
         if options.exclusive {
             system::lock(&port, pseudo_terminal).map_err(|error| open_error(path, &error))?;
@@ -156,14 +157,14 @@ impl Tty {
         configured.map_err(|error| format_error(path, format, made, &error))?;
         tty.notes.extend(made.and_then(|made| speed::note(format.baud_rate(), made)));
         tty.direction = match options.rs485 {
-            Some(rs485) => rs485.apply(&tty.port, path)?,
-            None => rs485::found(&tty.port),
+            Some(rs485) => rs485.apply(&*tty.port, path)?,
+            None => rs485::found(&*tty.port),
         };
         tty.notes.extend(tty.direction.note.take());
         if options.low_latency
             && let Some(entry) = tty.device_number().and_then(|number| places.entry_of(number))
         {
-            tty.latency = LatencyTimer::lower(&entry, &tty.port);
+            tty.latency = LatencyTimer::lower(&entry, &*tty.port);
             tty.notes.extend(tty.latency.note().map(str::to_owned));
         }
         tty.port.discard_buffers().map_err(|error| open_error(path, &error))?;
@@ -238,7 +239,7 @@ impl Drop for Tty {
     fn drop(&mut self) {
         // A child that was forked shares the adapter with its parent, who still wants it fast.
         if self.opened_by.is_current() {
-            self.latency.put_back(&self.port);
+            self.latency.put_back(&*self.port);
         }
         // A child that ends must not take the lock from its parent.
         if self.exclusive && self.opened_by.is_current() {

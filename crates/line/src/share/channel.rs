@@ -3,6 +3,7 @@
 use std::io::{self, Read};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
+use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
@@ -12,7 +13,9 @@ use rustix::net::SendFlags;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::system::clock::wait_for;
+use crate::system::clock::{wait_for, wait_for_any};
+use crate::system::inherited::Kept;
+use crate::system::process::Life;
 
 /// How long a program may leave unread what it is told, before it is cut off.
 const UNREAD: Duration = Duration::from_secs(1);
@@ -22,18 +25,27 @@ const HEAD: usize = 4;
 /// A connection.
 #[derive(Debug)]
 pub(crate) struct Channel {
-    stream: UnixStream,
+    stream: Arc<Kept<UnixStream>>,
+    /// The program at the other end: gone, it says nothing more, whoever has its descriptors.
+    other: Arc<Life>,
     came: Vec<u8>,
+    /// What is left of a message that was said in passing.
+    unsent: Vec<u8>,
     /// How long a message of the other side may be.
     most: usize,
 }
 
 impl Channel {
-    /// `most` is how long a message of the other side may be.
-    pub(crate) fn new(stream: UnixStream, most: usize) -> io::Result<Self> {
+    /// `most` is how long a message of the other side may be, whose program is `other`.
+    pub(crate) fn new(stream: UnixStream, most: usize, other: Arc<Life>) -> io::Result<Self> {
         stream.set_nonblocking(false)?;
         stream.set_write_timeout(Some(UNREAD))?;
-        Ok(Self { stream, came: Vec::new(), most })
+        Ok(Self { stream: Arc::new(Kept::new(stream)), other, came: Vec::new(), unsent: Vec::new(), most })
+    }
+
+    /// Whose program is at the other end is known now.
+    pub(crate) fn depends_on(&mut self, other: Arc<Life>) {
+        self.other = other;
     }
 
     pub(crate) fn say(&mut self, message: &impl Serialize) -> io::Result<()> {
@@ -46,19 +58,46 @@ impl Channel {
         self.send([&[0; HEAD], bytes].concat())
     }
 
-    fn send(&mut self, mut message: Vec<u8>) -> io::Result<()> {
-        let length = u32::try_from(message.len() - HEAD).map_err(io::Error::other)?;
-        message[..HEAD].copy_from_slice(&length.to_le_bytes());
-        let mut rest = &message[..];
-        while !rest.is_empty() {
+    /// As [`say`](Self::say), and waits for nobody: where the other side does not read, the message is left out, and this
+    /// is `false`.
+    pub(crate) fn say_in_passing(&mut self, message: &impl Serialize) -> io::Result<bool> {
+        if !self.finish(SendFlags::DONTWAIT)? {
+            return Ok(false);
+        }
+        let body = postcard::to_extend(message, vec![0; HEAD]).map_err(io::Error::other)?;
+        self.unsent = with_length(body)?;
+        let whole = self.unsent.len();
+        self.finish(SendFlags::DONTWAIT)?;
+        // What has begun to go out follows with the next one.
+        if self.unsent.len() == whole {
+            self.unsent.clear();
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    fn send(&mut self, message: Vec<u8>) -> io::Result<()> {
+        let message = with_length(message)?;
+        self.unsent.extend_from_slice(&message);
+        match self.finish(SendFlags::empty()) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(io::ErrorKind::TimedOut.into()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Sends what is left; `false` where the other side has no room for it.
+    fn finish(&mut self, how: SendFlags) -> io::Result<bool> {
+        while !self.unsent.is_empty() {
             // Where the other side is gone that is an error, and no signal that ends the program.
-            match rustix::net::send(&self.stream, rest, SendFlags::NOSIGNAL) {
-                Ok(count) => rest = &rest[count..],
+            match rustix::net::send(&**self.stream, &self.unsent, how | SendFlags::NOSIGNAL) {
+                Ok(count) => drop(self.unsent.drain(..count)),
                 Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) => return Ok(false),
                 Err(error) => return Err(error.into()),
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// The next message, `None` if none was whole by `until`.
@@ -77,16 +116,29 @@ impl Channel {
             if let Some(message) = self.whole()? {
                 return Ok(Some(message));
             }
-            if wait_for(self.stream.as_fd(), PollFlags::IN, until)?.is_none() {
+            if !self.something_comes(until)? {
                 return Ok(None);
             }
             let mut piece = [0; 4_096];
-            match self.stream.read(&mut piece) {
+            match (&**self.stream).read(&mut piece) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(count) => self.came.extend_from_slice(&piece[..count]),
                 Err(error) if matches!(error.kind(), io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock) => {}
                 Err(error) => return Err(error),
             }
+        }
+    }
+
+    /// Whether there is something to read before `until`. What a program said before it ended is still heard.
+    fn something_comes(&self, until: Instant) -> io::Result<bool> {
+        let Some(end) = self.other.end() else {
+            return Ok(wait_for(self.stream.as_fd(), PollFlags::IN, until)?.is_some());
+        };
+        let mut both = [PollFd::new(&**self.stream, PollFlags::IN), PollFd::from_borrowed_fd(end, PollFlags::IN)];
+        match wait_for_any(&mut both, until)? {
+            None => Ok(false),
+            Some([said, _]) if !said.is_empty() => Ok(true),
+            Some(_) => Err(io::ErrorKind::UnexpectedEof.into()),
         }
     }
 
@@ -97,14 +149,14 @@ impl Channel {
 
     /// Whether the other side is still there.
     pub(crate) fn is_there(&self) -> bool {
-        let mut descriptors = [PollFd::new(&self.stream, PollFlags::RDHUP)];
+        let mut descriptors = [PollFd::new(&**self.stream, PollFlags::RDHUP)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
-        !matches!(poll(&mut descriptors, Some(&now)), Ok(1..))
+        !matches!(poll(&mut descriptors, Some(&now)), Ok(1..)) && !self.other.is_gone()
     }
 
     /// The same connection, to end it from elsewhere.
-    pub(crate) fn end(&self) -> io::Result<UnixStream> {
-        self.stream.try_clone()
+    pub(crate) fn end(&self) -> Arc<Kept<UnixStream>> {
+        Arc::clone(&self.stream)
     }
 
     fn whole(&mut self) -> io::Result<Option<Vec<u8>>> {
@@ -124,6 +176,13 @@ impl Channel {
     }
 }
 
+/// `message`, which has room for it, with its length before it.
+fn with_length(mut message: Vec<u8>) -> io::Result<Vec<u8>> {
+    let length = u32::try_from(message.len() - HEAD).map_err(io::Error::other)?;
+    message[..HEAD].copy_from_slice(&length.to_le_bytes());
+    Ok(message)
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write;
@@ -134,7 +193,7 @@ mod tests {
 
     fn pair() -> (Channel, UnixStream) {
         let (one, other) = UnixStream::pair().unwrap();
-        (Channel::new(one, 100).unwrap(), other)
+        (Channel::new(one, 100, Arc::new(Life::Unknown)).unwrap(), other)
     }
 
     #[test]
@@ -180,5 +239,42 @@ mod tests {
         channel.stream.set_write_timeout(Some(Duration::from_millis(1))).unwrap();
         let said = (0..10_000).map(|_| channel.say_bytes(&[0; 100])).find(Result::is_err);
         assert!(said.is_some());
+    }
+
+    #[test]
+    fn what_is_said_in_passing_waits_for_nobody_and_is_whole_or_left_out() {
+        let (mut channel, far) = pair();
+        let mut said = Vec::new();
+        // Longer and longer, so that some end where there is no room any more.
+        let left_out = (1..u16::MAX).find(|&count| {
+            let is_said = channel.say_in_passing(&vec![count; usize::from(count)]).unwrap();
+            said.extend(is_said.then_some(count));
+            !is_said
+        });
+        assert!(left_out.is_some());
+        let mut far = Channel::new(far, 1 << 20, Arc::new(Life::Unknown)).unwrap();
+        let heard = said.iter().map(|_| {
+            let message = far.hear::<Vec<u16>>(monotonic()).unwrap();
+            // What had begun to go out goes on now that there is room.
+            channel.finish(SendFlags::DONTWAIT).unwrap();
+            message.or_else(|| far.hear(monotonic()).unwrap()).unwrap()
+        });
+        assert!(heard.zip(&said).all(|(message, &count)| message == vec![count; usize::from(count)]));
+    }
+
+    #[test]
+    fn who_has_ended_is_gone_whoever_has_its_descriptors() {
+        let mut child = std::process::Command::new("cat").stdin(std::process::Stdio::piped()).spawn().unwrap();
+        let (one, mut held) = UnixStream::pair().unwrap();
+        let mut channel = Channel::new(one, 100, Arc::new(Life::of(child.id()))).unwrap();
+        held.write_all(&[1, 0, 0, 0, 7]).unwrap();
+        drop(child.stdin.take());
+        child.wait().unwrap();
+        let far = monotonic() + Duration::from_secs(60);
+        assert_eq!(channel.hear::<u8>(far).unwrap(), Some(7), "what it said before");
+        if cfg!(target_os = "linux") {
+            assert_eq!(channel.hear::<u8>(far).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+            assert!(!channel.is_there());
+        }
     }
 }

@@ -27,6 +27,11 @@ pub(crate) enum Said {
     QueueFull {
         room: u64,
     },
+    BeingStopped {
+        unit: u8,
+        program: String,
+        process: u32,
+    },
     OutOfTurn,
     BroadcastRead,
     Quarantine {
@@ -94,6 +99,9 @@ impl From<&Failure> for Said {
             Failure::Interrupted => Self::Interrupted,
             Failure::ReadOnly { function } => Self::ReadOnly { function: *function },
             Failure::QueueFull { room } => Self::QueueFull { room: whole(*room) },
+            Failure::BeingStopped { unit, program, process } => {
+                Self::BeingStopped { unit: *unit, program: program.clone(), process: *process }
+            }
             Failure::NotBegun(BeginError::BroadcastRead) => Self::BroadcastRead,
             Failure::NotBegun(BeginError::Quarantine { unit }) => Self::Quarantine { unit: unit.get() },
             Failure::NotBegun(_) => Self::OutOfTurn,
@@ -129,6 +137,7 @@ impl From<Said> for Failure {
             Said::Interrupted => Self::Interrupted,
             Said::ReadOnly { function } => Self::ReadOnly { function },
             Said::QueueFull { room } => Self::QueueFull { room: length(room) },
+            Said::BeingStopped { unit, program, process } => Self::BeingStopped { unit, program, process },
             Said::OutOfTurn => Self::NotBegun(BeginError::OutOfTurn),
             Said::BroadcastRead => Self::NotBegun(BeginError::BroadcastRead),
             Said::Quarantine { unit } => match UnitAddress::new(unit) {
@@ -205,6 +214,7 @@ mod tests {
             Failure::Interrupted,
             Failure::ReadOnly { function: 6 },
             Failure::QueueFull { room: 9 },
+            Failure::BeingStopped { unit: 3, program: "python".to_owned(), process: 4711 },
             Failure::NotBegun(BeginError::OutOfTurn),
             Failure::NotBegun(BeginError::BroadcastRead),
             Failure::NotBegun(BeginError::Quarantine { unit: UnitAddress::new(7).unwrap() }),

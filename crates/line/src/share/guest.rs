@@ -6,7 +6,7 @@
 use std::io;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
@@ -15,18 +15,18 @@ use crate::share::channel::Channel;
 use crate::share::message::{GREETING, Hello, LET_IN, SENT_AWAY, Told, VERSION, Welcome, Wish};
 use crate::share::place::{Nobody, Place};
 use crate::system::clock::{LOOK_UP, monotonic};
-use crate::system::process::{self, Process};
+use crate::system::process::{self, Life, Process};
 
 /// The longest message of a program that has a port: the statistics of 247 units.
 const MOST: usize = 1 << 20;
 /// Connections of one program; stops get another one all the same.
 const CONNECTIONS: usize = 64;
-/// How long a program may take to open to one that knocks.
-const OPENS: Duration = Duration::from_secs(2);
 /// How long it may take to say what became of a call that is not wanted any more.
 const LETS_GO: Duration = Duration::from_secs(2);
-/// How long it may say nothing before it is looked whether it runs at all.
-const SILENT: Duration = Duration::from_secs(1);
+/// How long it may say nothing, be it to one that knocks or of a call under way, of which it says five times a second that it
+/// is still to come: then it hangs. Who wants a stop has less time.
+const SILENT: Duration = Duration::from_secs(2);
+const SILENT_ON_A_STOP: Duration = Duration::from_secs(1);
 
 /// A port that another program has, as this one uses it.
 #[derive(Debug)]
@@ -39,6 +39,8 @@ pub(crate) struct Guest {
     /// How often the other one had opened it again by then, and by what it said last.
     began: u64,
     seen: AtomicU64,
+    /// The program that has the port: gone when it is, whoever has its descriptors.
+    life: Arc<Life>,
     pool: Mutex<Pool>,
     freed: Condvar,
     gone: AtomicBool,
@@ -50,11 +52,19 @@ pub(crate) struct Guest {
 pub(crate) struct Host {
     pub(crate) program: String,
     pub(crate) process: u32,
+    /// Whether the number of its process is one of another container.
+    pub(crate) is_elsewhere: bool,
 }
 
 impl std::fmt::Display for Host {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} (process {})", self.program, self.process)
+        match self {
+            Self { program, process: 0, .. } => write!(f, "{program} outside of this container"),
+            Self { program, process, is_elsewhere: true } => {
+                write!(f, "{program} (process {process} of another container)")
+            }
+            Self { program, process, .. } => write!(f, "{program} (process {process})"),
+        }
     }
 }
 
@@ -68,13 +78,15 @@ struct Pool {
 #[derive(Debug)]
 pub(crate) enum Knocked {
     /// The port is there to be used.
-    Open(Guest),
+    Open(Box<Guest>),
     /// No program serves it.
     Absent,
     /// One did, and is gone or about to be.
     Gone,
     /// One does, and does not let this one in: why, in words.
     SentAway(String),
+    /// One does, or something else stands in its place, and says nothing: in words.
+    Silent(String),
 }
 
 /// Why a wish was not fulfilled.
@@ -95,36 +107,49 @@ pub(crate) enum Lost {
 enum Greeting {
     Gone,
     SentAway(String),
+    Silent(String),
 }
 
 impl Guest {
     /// Asks the program that serves the port at `place` to let this one in, which has seen the port opened again `before`
     /// times.
     pub(crate) fn knock(place: &Place, hello: &Hello, before: u64) -> Knocked {
-        let stream = match place.knock() {
+        let until = monotonic() + SILENT;
+        let stream = match place.knock(until) {
             Ok(stream) => stream,
             Err(Nobody::Absent) => return Knocked::Absent,
             Err(Nobody::Gone) => return Knocked::Gone,
+            Err(Nobody::Crowded) => return Knocked::Silent(crowded(SILENT)),
         };
-        match greet(stream, hello) {
-            Ok((channel, welcome)) => {
+        match greet(stream, hello, None, SILENT) {
+            Ok((channel, welcome, life)) => {
+                let peer = process::peer(&channel.end());
+                let process = if peer.process == 0 { welcome.process } else { peer.process };
+                let is_elsewhere = cfg!(target_os = "linux") && peer.process == 0;
                 let pool = Mutex::new(Pool { idle: vec![channel], under_way: 0 });
-                Knocked::Open(Self {
+                Knocked::Open(Box::new(Self {
                     place: place.clone(),
                     hello: hello.clone(),
-                    host: Host { program: readable(&welcome.program), process: welcome.process },
+                    host: Host { program: readable(&welcome.program), process, is_elsewhere },
                     before,
                     began: welcome.reconnects,
                     seen: AtomicU64::new(welcome.reconnects),
+                    life,
                     pool,
                     freed: Condvar::new(),
                     gone: AtomicBool::new(false),
                     made_by: Process::current(),
-                })
+                }))
             }
             Err(Greeting::Gone) => Knocked::Gone,
             Err(Greeting::SentAway(why)) => Knocked::SentAway(why),
+            Err(Greeting::Silent(why)) => Knocked::Silent(why),
         }
+    }
+
+    /// Where it was met.
+    pub(crate) fn place(&self) -> &Place {
+        &self.place
     }
 
     pub(crate) fn host(&self) -> &Host {
@@ -162,17 +187,18 @@ impl Guest {
         give_up: &mut dyn FnMut() -> bool,
         hear: &mut dyn FnMut(Told) -> bool,
     ) -> Result<(), Lost> {
-        let mut channel = self.take(is_stop, give_up)?;
-        let result = self.ask_on(&mut channel, wish, give_up, hear);
+        let (mut channel, is_for_all) = self.take(is_stop, give_up)?;
+        let silent = if is_stop { SILENT_ON_A_STOP } else { SILENT };
+        let result = self.ask_on(&mut channel, wish, silent, give_up, hear);
         let mut pool = self.lock();
         pool.under_way -= 1;
         match &result {
-            Ok(()) => pool.idle.push(channel),
+            Ok(()) if is_for_all => pool.idle.push(channel),
             Err(Lost::Unsent | Lost::Unknown) => {
                 self.gone.store(true, Ordering::Release);
                 pool.idle.clear();
             }
-            Err(_) => {}
+            _ => {}
         }
         drop(pool);
         self.freed.notify_one();
@@ -183,6 +209,7 @@ impl Guest {
         &self,
         channel: &mut Channel,
         wish: &Wish,
+        silent: Duration,
         give_up: &mut dyn FnMut() -> bool,
         hear: &mut dyn FnMut(Told) -> bool,
     ) -> Result<(), Lost> {
@@ -193,7 +220,7 @@ impl Guest {
             match channel.hear::<Told>(monotonic() + LOOK_UP) {
                 Ok(Some(told)) => {
                     heard = monotonic();
-                    if hear(told) {
+                    if !matches!(told, Told::Waiting) && hear(told) {
                         return Ok(());
                     }
                     // Where much is told, it is not asked each time.
@@ -213,20 +240,14 @@ impl Guest {
             if taken_back.is_some_and(|moment| now >= moment + LETS_GO) {
                 return Err(Lost::Silent(format!("{} has the port and does not answer", self.host)));
             }
-            if now >= heard + SILENT {
-                heard = now;
-                self.look()?;
+            if now >= heard + silent {
+                return Err(Lost::Silent(silence(&self.host, silent)));
             }
         }
     }
 
-    /// Looks whether the program that has the port runs: one that is stopped says nothing.
-    fn look(&self) -> Result<(), Lost> {
-        if process::is_stopped(self.host.process) { Err(Lost::Silent(stopped(&self.host))) } else { Ok(()) }
-    }
-
-    /// A connection for one wish.
-    fn take(&self, is_stop: bool, give_up: &mut dyn FnMut() -> bool) -> Result<Channel, Lost> {
+    /// A connection for one wish, and whether it is for others too: one that was made for a stop is for nothing else.
+    fn take(&self, is_stop: bool, give_up: &mut dyn FnMut() -> bool) -> Result<(Channel, bool), Lost> {
         let mut pool = self.lock();
         loop {
             if self.is_gone() || !self.made_by.is_current() {
@@ -234,7 +255,7 @@ impl Guest {
             }
             if let Some(channel) = pool.idle.pop() {
                 pool.under_way += 1;
-                return Ok(channel);
+                return Ok((channel, true));
             }
             if is_stop || pool.under_way < CONNECTIONS {
                 break;
@@ -248,16 +269,21 @@ impl Guest {
         }
         pool.under_way += 1;
         drop(pool);
-        let stream = self.place.knock().map_err(|_| Greeting::Gone);
-        let greeted = stream.and_then(|stream| greet(stream, &self.hello));
-        greeted.map(|(channel, _)| channel).map_err(|why| {
+        let silent = if is_stop { SILENT_ON_A_STOP } else { SILENT };
+        let hello = Hello { is_for_a_stop: is_stop, ..self.hello.clone() };
+        let stream = self.place.knock(monotonic() + silent).map_err(|nobody| match nobody {
+            Nobody::Absent | Nobody::Gone => Greeting::Gone,
+            Nobody::Crowded => Greeting::Silent(crowded(silent)),
+        });
+        let greeted = stream.and_then(|stream| greet(stream, &hello, Some(&self.life), silent));
+        greeted.map(|(channel, ..)| (channel, !is_stop)).map_err(|why| {
             self.lock().under_way -= 1;
             match why {
                 Greeting::Gone => {
                     self.gone.store(true, Ordering::Release);
                     Lost::Unsent
                 }
-                Greeting::SentAway(why) => Lost::SentAway(why),
+                Greeting::SentAway(why) | Greeting::Silent(why) => Lost::SentAway(why),
             }
         })
     }
@@ -267,44 +293,54 @@ impl Guest {
     }
 }
 
-/// Says hello, and waits to be let in.
-fn greet(stream: UnixStream, hello: &Hello) -> Result<(Channel, Welcome), Greeting> {
+/// Says hello, and waits to be let in, by the program that lives as `known` if that is who is at the other end.
+fn greet(
+    stream: UnixStream,
+    hello: &Hello,
+    known: Option<&Arc<Life>>,
+    patience: Duration,
+) -> Result<(Channel, Welcome, Arc<Life>), Greeting> {
     let peer = process::peer(&stream);
-    if !peer.is_this_user {
+    if peer.is_this_user == Some(false) {
         return Err(Greeting::SentAway("the socket of this port is another user's".to_owned()));
     }
     let gone = |_: io::Error| Greeting::Gone;
-    let mut channel = Channel::new(stream, MOST).map_err(gone)?;
+    let life = known.map_or_else(|| Arc::new(Life::of(peer.process)), Arc::clone);
+    if life.is_gone() {
+        return Err(Greeting::Gone); // somebody else has its socket, and nobody opens
+    }
+    let mut channel = Channel::new(stream, MOST, Arc::clone(&life)).map_err(gone)?;
     let greeting = postcard::to_extend(hello, [GREETING, &[VERSION]].concat()).map_err(|_| Greeting::Gone)?;
     channel.say_bytes(&greeting).map_err(gone)?;
-    let end = monotonic() + OPENS;
-    let answer = loop {
-        let until = end.min(monotonic() + LOOK_UP);
-        match channel.hear_bytes(until).map_err(gone)? {
-            Some(answer) => break answer,
-            None if monotonic() < end => {}
-            None => {
-                let host = Host { program: "a program".to_owned(), process: peer.process };
-                let is_stopped = process::is_stopped(host.process);
-                return Err(if is_stopped { Greeting::SentAway(stopped(&host)) } else { Greeting::Gone });
-            }
-        }
+    let Some(answer) = channel.hear_bytes(monotonic() + patience).map_err(gone)? else {
+        let is_elsewhere = cfg!(target_os = "linux") && peer.process == 0;
+        let host = Host { program: "a program".to_owned(), process: peer.process, is_elsewhere };
+        return Err(Greeting::Silent(silence(&host, patience)));
     };
     match answer.split_first() {
         Some((&LET_IN, welcome)) => {
             let welcome = postcard::from_bytes(welcome).map_err(|_| Greeting::Gone)?;
-            Ok((channel, welcome))
+            Ok((channel, welcome, life))
         }
         Some((&SENT_AWAY, why)) => Err(Greeting::SentAway(readable(&String::from_utf8_lossy(why)))),
-        _ => Err(Greeting::Gone),
+        _ => Err(Greeting::Silent("what stands where this port is shared is no program of drivebus".to_owned())),
     }
 }
 
-fn stopped(host: &Host) -> String {
-    let Host { process, .. } = host;
-    format!(
-        "{host} has the port and is stopped, perhaps by Ctrl-Z; let it go on (`fg`, or `kill -CONT {process}`), or end it"
-    )
+/// What is said of `host`, which said nothing for so long.
+fn silence(host: &Host, silent: Duration) -> String {
+    let Host { process, is_elsewhere, .. } = host;
+    if !is_elsewhere && process::is_stopped(*process) {
+        return format!(
+            "{host} has the port and is stopped, perhaps by Ctrl-Z; let it go on (`fg`, or `kill -CONT {process}`), or end it"
+        );
+    }
+    let end = if *is_elsewhere { "end it".to_owned() } else { format!("end it (`kill {process}`)") };
+    format!("{host} has the port and said nothing for {silent:?}: it hangs; {end}, or let it go on")
+}
+
+fn crowded(silent: Duration) -> String {
+    format!("a program has the port, and let nobody in for {silent:?}: it hangs; end it, or let it go on")
 }
 
 /// What another program says, without anything that a terminal would obey.

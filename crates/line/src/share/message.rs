@@ -20,7 +20,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 2;
+pub(crate) const VERSION: u8 = 3;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -31,6 +31,8 @@ pub(crate) const SENT_AWAY: u8 = 1;
 pub(crate) struct Hello {
     pub(crate) program: String,
     pub(crate) characters: Characters,
+    /// Whether the connection is for a stop and nothing else: there is always room for one.
+    pub(crate) is_for_a_stop: bool,
 }
 
 /// What it is told then.
@@ -83,6 +85,8 @@ pub(crate) enum Wish {
     Link(u8),
     FreshWord,
     Reconnects,
+    /// A last will was left: it is to be watched from now on.
+    Wills,
     /// The call or the listening under way is not wanted any more.
     Cancel,
 }
@@ -121,6 +125,11 @@ pub(crate) enum Told {
     },
     Word(u16),
     Reconnects(u64),
+    Wills,
+    /// What was wished is still to come: it waits for its turn, or is on the line.
+    Waiting,
+    /// So many pieces of what went over the line were left out, because the program did not take what it was told.
+    LeftOut(u64),
 }
 
 /// The statistics of a line.
@@ -223,6 +232,10 @@ impl Order {
             Length::AsItsFunction => Request::parse(&self.pdu),
         }
         .ok()
+    }
+
+    pub(crate) fn is_stop(&self) -> bool {
+        self.priority == Priority::Stop as u8
     }
 
     /// `None` where there is no such priority.

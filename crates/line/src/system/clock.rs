@@ -51,7 +51,17 @@ pub(crate) fn wait_for(
     events: rustix::event::PollFlags,
     until: Instant,
 ) -> std::io::Result<Option<rustix::event::PollFlags>> {
-    use rustix::event::{PollFd, Timespec, poll};
+    let ready = wait_for_any(&mut [rustix::event::PollFd::from_borrowed_fd(descriptor, events)], until)?;
+    Ok(ready.map(|[ready]| ready))
+}
+
+/// As [`wait_for`], for the first of several that is ready; each says what it is ready for.
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+pub(crate) fn wait_for_any<const COUNT: usize>(
+    descriptors: &mut [rustix::event::PollFd<'_>; COUNT],
+    until: Instant,
+) -> std::io::Result<Option<[rustix::event::PollFlags; COUNT]>> {
+    use rustix::event::{Timespec, poll};
 
     /// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take at most 24 days.
     const TURN: Duration = Duration::from_secs(3_600);
@@ -65,11 +75,10 @@ pub(crate) fn wait_for(
             Duration::ZERO
         };
         let timeout = Timespec::try_from(in_kernel).unwrap_or_default(); // cannot fail: at most an hour
-        let mut descriptors = [PollFd::from_borrowed_fd(descriptor, events)];
-        match poll(&mut descriptors, Some(&timeout)) {
+        match poll(descriptors, Some(&timeout)) {
             Ok(0) if left.is_zero() => return Ok(None),
             Ok(0) | Err(rustix::io::Errno::INTR) => {}
-            Ok(_) => return Ok(Some(descriptors[0].revents())),
+            Ok(_) => return Ok(Some(std::array::from_fn(|place| descriptors[place].revents()))),
             Err(error) => return Err(error.into()),
         }
     }

@@ -40,23 +40,100 @@ pub(crate) fn is_stopped(process: u32) -> bool {
 #[cfg(all(unix, feature = "share"))]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
-    /// 0 where the system does not tell.
+    /// 0 where the system does not tell: on systems that have no such question, and of a process that has no number here
+    /// because it is outside of this container.
     pub(crate) process: u32,
-    pub(crate) is_this_user: bool,
+    /// `None` where the system does not tell.
+    pub(crate) is_this_user: Option<bool>,
 }
 
-/// Who is at the other end of `stream`.
+/// Who is at the other end of `stream`: who called `connect`, or who called `listen`.
 #[cfg(all(target_os = "linux", feature = "share"))]
 pub(crate) fn peer(stream: &std::os::unix::net::UnixStream) -> Peer {
-    let Ok(found) = rustix::net::sockopt::socket_peercred(stream) else {
-        return Peer { process: 0, is_this_user: false };
-    };
-    let process = u32::try_from(found.pid.as_raw_nonzero().get()).unwrap_or(0);
-    Peer { process, is_this_user: found.uid == rustix::process::geteuid() }
+    match rustix::net::sockopt::socket_peercred(stream) {
+        Ok(found) => Peer {
+            process: u32::try_from(found.pid.as_raw_nonzero().get()).unwrap_or(0),
+            is_this_user: Some(found.uid == rustix::process::geteuid()),
+        },
+        Err(_) => Peer { process: 0, is_this_user: None },
+    }
 }
 
-/// Some program of this user's: the system does not tell which, and the folder that the socket stands in keeps others out.
+/// Some program: the system does not tell which.
 #[cfg(all(unix, not(target_os = "linux"), feature = "share"))]
 pub(crate) fn peer(_stream: &std::os::unix::net::UnixStream) -> Peer {
-    Peer { process: 0, is_this_user: true }
+    Peer { process: 0, is_this_user: None }
+}
+
+/// Whether a process lives, as far as the system tells: whoever else has its descriptors, it is gone when it is.
+#[cfg(all(unix, feature = "share"))]
+#[derive(Debug)]
+pub(crate) enum Life {
+    /// It can be waited for.
+    #[cfg(target_os = "linux")]
+    Watched(std::os::fd::OwnedFd),
+    Gone,
+    Unknown,
+}
+
+#[cfg(all(unix, feature = "share"))]
+impl Life {
+    /// Of `process` as this one counts them; 0 is nobody that this one knows.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn of(process: u32) -> Self {
+        use rustix::process::{Pid, PidfdFlags, pidfd_open};
+
+        let Some(pid) = i32::try_from(process).ok().and_then(Pid::from_raw) else { return Self::Unknown };
+        match pidfd_open(pid, PidfdFlags::empty()) {
+            Ok(watched) => Self::Watched(watched),
+            Err(rustix::io::Errno::SRCH) => Self::Gone,
+            Err(_) => Self::Unknown, // an old kernel, or one that does not let this program ask
+        }
+    }
+
+    /// Nothing is known of it.
+    #[cfg(not(target_os = "linux"))]
+    pub(crate) fn of(_process: u32) -> Self {
+        Self::Unknown
+    }
+
+    /// What is ready to be read once the process is gone, where that can be waited for.
+    pub(crate) fn end(&self) -> Option<std::os::fd::BorrowedFd<'_>> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Watched(watched) => Some(std::os::fd::AsFd::as_fd(watched)),
+            Self::Gone | Self::Unknown => None,
+        }
+    }
+
+    /// Whether it is known to be gone.
+    pub(crate) fn is_gone(&self) -> bool {
+        use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+        let Some(end) = self.end() else { return matches!(self, Self::Gone) };
+        let now = Timespec { tv_sec: 0, tv_nsec: 0 };
+        matches!(poll(&mut [PollFd::from_borrowed_fd(end, PollFlags::IN)], Some(&now)), Ok(1..))
+    }
+}
+
+#[cfg(all(test, target_os = "linux", feature = "share"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_is_gone_when_it_has_ended_and_not_before() {
+        let mut child = std::process::Command::new("cat").stdin(std::process::Stdio::piped()).spawn().unwrap();
+        let life = Life::of(child.id());
+        assert!(!life.is_gone());
+        drop(child.stdin.take());
+        let ends = crate::system::clock::wait_for(
+            life.end().unwrap(),
+            rustix::event::PollFlags::IN,
+            crate::system::clock::monotonic() + std::time::Duration::from_secs(60),
+        );
+        assert!(ends.unwrap().is_some() && life.is_gone());
+        child.wait().unwrap();
+        assert!(Life::of(child.id()).is_gone());
+        assert!(!Life::of(0).is_gone() && !Life::of(std::process::id()).is_gone());
+    }
 }

@@ -4,8 +4,12 @@
 mod work;
 
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
+use std::time::Duration;
+
+use drivebus_rtu::Instant;
 
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::turns::crew::Crew;
@@ -50,6 +54,8 @@ pub(crate) struct Queue<W> {
     pub(crate) state: Mutex<State<W>>,
     /// Where the crew waits to be called.
     pub(crate) called: Condvar,
+    /// When who has the line said last that it goes on; nanoseconds of the system's clock.
+    goes_on: AtomicU64,
 }
 
 #[derive(Debug)]
@@ -87,7 +93,7 @@ impl<W> Default for Queue<W> {
 impl<W> Queue<W> {
     /// A queue in which `room` may wait, stops aside.
     pub(crate) fn with_room(room: usize) -> Self {
-        Self { room, state: Mutex::default(), called: Condvar::new() }
+        Self { room, state: Mutex::default(), called: Condvar::new(), goes_on: AtomicU64::new(0) }
     }
 
     /// Waits for a turn.
@@ -140,6 +146,21 @@ impl<W> Queue<W> {
         self.lock().has(thread::current().id())
     }
 
+    /// Who has the line says that it goes on: to be called every 50 ms where it may wait for long.
+    pub(crate) fn goes_on(&self) {
+        // Who has stepped aside meanwhile says nothing for who has the line now.
+        let this = thread::current().id();
+        if self.lock().owner.as_ref().is_some_and(|(_, thread)| thread.id() == this) {
+            self.goes_on.store(monotonic().as_nanos(), Ordering::Relaxed);
+        }
+    }
+
+    /// What tells whether the line still goes from hand to hand.
+    #[cfg(all(unix, feature = "share"))]
+    pub(crate) fn watch(&self) -> Watching<'_, W> {
+        Watching { queue: self, seen: None }
+    }
+
     /// How many wait.
     #[cfg(test)]
     pub(crate) fn waiting(&self) -> usize {
@@ -164,6 +185,34 @@ impl<W> Queue<W> {
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
     pub(crate) fn lock(&self) -> MutexGuard<'_, State<W>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Whether the line goes from hand to hand, for who waits for it.
+#[cfg(all(unix, feature = "share"))]
+pub(crate) struct Watching<'a, W> {
+    queue: &'a Queue<W>,
+    /// Whose turn it was when this was asked last, and since when it was.
+    seen: Option<(Ticket, Instant)>,
+}
+
+#[cfg(all(unix, feature = "share"))]
+impl<W> Watching<'_, W> {
+    /// Whether the same one has had the line for so `long` and did not say that it goes on, asked again and again.
+    pub(crate) fn sees_nothing_move_for(&mut self, long: Duration) -> bool {
+        let has_it = self.queue.lock().owner.as_ref().map(|(ticket, _)| *ticket);
+        let now = monotonic();
+        let Some(ticket) = has_it else {
+            self.seen = None;
+            return false;
+        };
+        let (_, since) = *self.seen.get_or_insert((ticket, now));
+        if self.seen.is_some_and(|(seen, _)| seen != ticket) {
+            self.seen = Some((ticket, now));
+            return false;
+        }
+        let sign = Instant::from_nanos(self.queue.goes_on.load(Ordering::Relaxed));
+        now.saturating_duration_since(since.max(sign)) >= long
     }
 }
 

@@ -107,6 +107,13 @@ impl<'b> Call<'b, '_> {
             if let Err(failure) = owner.prepare(give_up) {
                 return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
             }
+            if self.priority != Priority::Stop
+                && let Some(failure) = self.bus.wills.keeps_from(self.unit)
+            {
+                drop(owner);
+                self.wait_for_the_halt(turn, failure, give_up)?;
+                continue;
+            }
             if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }

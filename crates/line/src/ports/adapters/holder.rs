@@ -42,14 +42,14 @@ pub(crate) fn advice(path: &Path) -> String {
 #[cfg(target_os = "linux")]
 pub(crate) fn holders(path: &Path) -> Vec<Holder> {
     let Ok(port) = std::fs::metadata(path) else { return Vec::new() };
-    let mut processes = linux::lockers(&port);
-    if processes.is_empty() {
-        processes = linux::openers(&port);
-    }
-    processes.sort_unstable();
-    processes.dedup();
-    processes.truncate(MOST);
-    processes.into_iter().filter_map(linux::holder).collect()
+    let known = |mut processes: Vec<u32>| -> Vec<Holder> {
+        processes.sort_unstable();
+        processes.dedup();
+        processes.into_iter().filter_map(linux::holder).take(MOST).collect()
+    };
+    // A lock that outlives who took it is in a child of theirs: that one has the port open.
+    let lockers = known(linux::lockers(&port));
+    if lockers.is_empty() { known(linux::openers(&port)) } else { lockers }
 }
 
 #[cfg(not(target_os = "linux"))]

@@ -1,0 +1,50 @@
+//! Where programs cannot share a port, nobody would carry out a last will: none is left.
+
+use std::sync::Arc;
+
+use drivebus_rtu::UnitAddress;
+
+use crate::bus::Bus;
+use crate::bus::shared::Shared;
+use crate::error::Failure;
+use crate::line::Opener;
+use crate::options::{BusOptions, LastWill};
+use crate::ports::key::PortKey;
+
+/// There are none.
+#[derive(Debug)]
+pub(super) struct Wills;
+
+impl Wills {
+    pub(super) fn new(_key: Option<PortKey>, _options: &BusOptions) -> Self {
+        Self
+    }
+
+    pub(super) fn finding(self: &Arc<Self>, open: Opener) -> Opener {
+        open
+    }
+
+    pub(super) fn serves(self: &Arc<Self>, _bus: &Arc<Shared>) {}
+
+    pub(super) fn let_go(&self) {}
+
+    pub(super) fn let_out(&self) {}
+
+    pub(super) fn keeps_from(&self, _unit: Option<UnitAddress>) -> Option<Failure> {
+        None
+    }
+
+    pub(super) fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+impl Bus {
+    /// Leaves a last will; here nobody would find it.
+    pub fn leave_will(&self, _will: LastWill) -> Option<u64> {
+        None
+    }
+
+    /// Takes it back.
+    pub fn withdraw_will(&self, _number: u64) {}
+}

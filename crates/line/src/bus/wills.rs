@@ -1,0 +1,482 @@
+//! The last wills of the programs of a port: who leaves them, who watches them, and who carries them out.
+//!
+//! A program that runs a motor leaves what halts it ([`LastWill`]), and takes that back when the motor was halted. Whoever
+//! has the port finds what a program left that is gone without a word: at once, or when it opens the port after that one.
+//! Until the unit took a halt, requests of others to it wait or are refused: each would keep the unit from acting by itself.
+//!
+//! Who has left nothing, and has nobody beside it who has, pays nothing for it: one thread looks after wills while there
+//! are any, and a request looks at one flag.
+
+mod halting;
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::thread;
+use std::time::Duration;
+
+use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
+
+use crate::bus::Bus;
+use crate::bus::call::Call;
+use crate::bus::shared::Shared;
+use crate::bus::wills::halting::{AT_ONCE, Halting, Next};
+use crate::bus::workers::pdu_of;
+use crate::error::Failure;
+use crate::line::Opener;
+use crate::options::{BusOptions, CallOptions, LastWill};
+use crate::ports::key::PortKey;
+use crate::share::guest::readable;
+use crate::share::message::{Characters, nanos};
+use crate::share::place::Place;
+use crate::share::will::{Found, Orphan, Paper, Will, find};
+use crate::system::clock::monotonic;
+use crate::system::process::own_name;
+use crate::turns::order::Priority;
+
+/// How often the wills of living programs are looked at.
+const LOOKS: Duration = Duration::from_millis(50);
+/// How often this for a while, where a program may just have ended: the system takes back what it had one after the other.
+const LOOKS_AT_ONCE: Duration = Duration::from_millis(5);
+const FOR_A_WHILE: Duration = Duration::from_millis(300);
+/// How often a program says in its wills that it is alive.
+const SAYS: Duration = Duration::from_secs(1);
+/// A will that is found when the port is opened is carried out if its program was alive so long ago at most. After that the
+/// motor may be somebody else's.
+const FRESH: Duration = Duration::from_secs(300);
+/// How long an answer to a halt is waited for at most: the next one is not to come late.
+const LONGEST_ANSWER: Duration = Duration::from_millis(500);
+/// How long the question takes at most, which makes sure that it still is the same unit.
+const LOOK: Duration = Duration::from_millis(100);
+/// How long the end of a bus waits for a halt that is being given.
+const LET_OUT: Duration = Duration::from_secs(1);
+/// Notes that are kept.
+const NOTES: usize = 16;
+
+/// The wills that one bus leaves, and those that it carries out.
+#[derive(Debug)]
+pub(super) struct Wills {
+    key: Option<PortKey>,
+    characters: Characters,
+    timeout: Duration,
+    bus: OnceLock<Weak<Shared>>,
+    /// Whether there is anybody who is being halted.
+    halts: AtomicBool,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    own: BTreeMap<u64, Paper>,
+    tokens: u64,
+    halting: BTreeMap<UnitAddress, Halted>,
+    /// How many wills of programs that live were seen at last.
+    living: usize,
+    /// Until when it is looked often.
+    hurries: Option<Instant>,
+    /// Whether a will was left of which the program that has the port was not told.
+    untold: bool,
+    is_attended: bool,
+    /// Where wills of the port that this bus opened last are found.
+    place: Option<Place>,
+    notes: Vec<String>,
+}
+
+/// A unit that is being halted, for whom.
+#[derive(Debug)]
+struct Halted {
+    course: Halting,
+    /// The last of them is carried out; it stands for all.
+    wills: Vec<(Paper, Will)>,
+    is_attended: bool,
+}
+
+impl Wills {
+    pub(super) fn new(key: Option<PortKey>, options: &BusOptions) -> Self {
+        Self {
+            key,
+            characters: Characters::of(&options.format),
+            timeout: options.timeout,
+            bus: OnceLock::new(),
+            halts: AtomicBool::new(false),
+            state: Mutex::default(),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// `open`, which finds the wills of programs that are gone before anybody uses the line.
+    pub(super) fn finding(self: &Arc<Self>, mut open: Opener) -> Opener {
+        let wills = Arc::clone(self);
+        Box::new(move || {
+            let line = open()?;
+            let name = wills.key.as_ref().and_then(|key| key.name_of(line.connected_to()));
+            wills.lock().place =
+                Place::all(name.into_iter().collect()).ok().and_then(|places| places.into_iter().next());
+            wills.look(Some(FRESH));
+            Ok(line)
+        })
+    }
+
+    /// The bus is made: what was found by now is carried out.
+    pub(super) fn serves(self: &Arc<Self>, bus: &Arc<Shared>) {
+        self.bus.get_or_init(|| Arc::downgrade(bus));
+        let mut state = self.lock();
+        self.begin(&mut state);
+        self.attend(&mut state);
+    }
+
+    /// A program may have ended, or left a will.
+    pub(super) fn look_soon(self: &Arc<Self>) {
+        let has_any = self.look(None);
+        let mut state = self.lock();
+        if has_any {
+            state.hurries = Some(monotonic() + FOR_A_WHILE);
+            self.attend(&mut state);
+            self.changed.notify_all();
+        }
+    }
+
+    /// Takes up the wills whose programs are gone: where it says so, those that were alive not longer ago. Whether there
+    /// are others.
+    fn look(self: &Arc<Self>, fresh: Option<Duration>) -> bool {
+        let Some(place) = self.lock().place.clone() else { return false };
+        let Ok(Found { orphans, living }) = find(&place) else { return false };
+        let mut state = self.lock();
+        state.living = living;
+        let now = monotonic();
+        for orphan in orphans {
+            self.take_up(&mut state, orphan, fresh, now);
+        }
+        self.begin(&mut state);
+        self.attend(&mut state);
+        living > 0
+    }
+
+    fn take_up(&self, state: &mut State, orphan: Orphan, fresh: Option<Duration>, now: Instant) {
+        let Orphan { paper, will, alive } = orphan;
+        let Some(will) = will else {
+            state.note("a program of another version of drivebus is gone, and left a will that this one cannot read");
+            return;
+        };
+        let will = Will { program: readable(&will.program), ..will };
+        let who = format!("{} (process {}), which ran unit {}, is gone", will.program, will.process, will.unit);
+        let Ok(unit) = UnitAddress::new(will.unit) else { return paper.remove() };
+        if will.characters != self.characters {
+            state.note(&format!("{who}; it is not halted for it, since this port is open at other characters"));
+            return;
+        }
+        let age = now.as_nanos().checked_sub(alive.as_nanos()).map(Duration::from_nanos);
+        if fresh.is_some_and(|fresh| age.is_none_or(|age| age > fresh)) {
+            state.note(&format!("{who} for long; what it left to halt the unit was not sent: `stop` halts it"));
+            return paper.remove();
+        }
+        if fresh.is_some() && self.key.as_ref().is_none_or(|key| key.made() != will.port) {
+            state.note(&format!("{who}; it is not halted for it, since this port was made anew: `stop` halts it"));
+            return paper.remove();
+        }
+        let course = Halting::new(will.ways.len(), will.look.is_some(), Duration::from_nanos(will.silence));
+        let halted =
+            state.halting.entry(unit).or_insert_with(|| Halted { course, wills: Vec::new(), is_attended: false });
+        halted.wills.push((paper, will));
+        halted.wills.sort_by_key(|(_, will)| will.left);
+        self.halts.store(true, Ordering::Release);
+    }
+
+    /// Gives each unit that is to be halted a thread that does it.
+    fn begin(self: &Arc<Self>, state: &mut State) {
+        let Some(bus) = self.bus.get() else { return };
+        for (&unit, halted) in &mut state.halting {
+            if std::mem::replace(&mut halted.is_attended, true) {
+                continue;
+            }
+            let (wills, bus) = (Arc::clone(self), Weak::clone(bus));
+            let made = thread::Builder::new()
+                .name(format!("drivebus-halts-{unit}"))
+                .spawn(move || wills.carry_out(&bus, unit));
+            // Without one it is kept from others, so that it acts by itself; the next look tries again.
+            halted.is_attended = made.is_ok();
+        }
+    }
+
+    /// Has the thread that looks after wills, while there are any.
+    fn attend(self: &Arc<Self>, state: &mut State) {
+        let Some(bus) = self.bus.get() else { return };
+        if state.is_attended || (state.own.is_empty() && state.living == 0) {
+            return;
+        }
+        let (wills, bus) = (Arc::clone(self), Weak::clone(bus));
+        let made = thread::Builder::new().name("drivebus-wills".to_owned()).spawn(move || wills.look_after(&bus));
+        state.is_attended = made.is_ok();
+    }
+
+    /// Says of the wills of this program that it lives, and looks after those of others where this one has the port.
+    fn look_after(self: &Arc<Self>, bus: &Weak<Shared>) {
+        let mut said = monotonic();
+        loop {
+            let Some(shared) = bus.upgrade().filter(|shared| !shared.is_shut()) else { return };
+            let is_guest = shared.is_guest();
+            let now = monotonic();
+            let mut state = self.lock();
+            let says = now >= said + SAYS;
+            if says {
+                said = now;
+                state.own.values().for_each(|paper| paper.is_alive(now));
+            }
+            let tells = is_guest && (std::mem::take(&mut state.untold) || says && !state.own.is_empty());
+            let looks = !is_guest && state.living > 0;
+            drop(state);
+            if tells && !shared.tell_of_wills() {
+                self.lock().untold = true;
+            }
+            if looks {
+                self.look(None);
+            }
+            drop(shared);
+            let mut state = self.lock();
+            if state.own.is_empty() && (is_guest || state.living == 0) {
+                state.is_attended = false;
+                return;
+            }
+            let hurries = state.hurries.is_some_and(|until| now < until);
+            let pause = match (looks, hurries) {
+                (true, true) => LOOKS_AT_ONCE,
+                (true, false) => LOOKS,
+                (false, _) => SAYS,
+            };
+            drop(self.changed.wait_timeout(state, pause).unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+
+    /// Where whoever has the port looks: the program through which this bus uses it, or this one.
+    fn place(&self) -> Option<Place> {
+        let guest = self.bus.get().and_then(Weak::upgrade).and_then(|shared| shared.sharing.as_ref()?.guest());
+        guest.map_or_else(|| self.lock().place.clone(), |guest| Some(guest.place().clone()))
+    }
+
+    /// Leaves `last` where the one who has the port finds it. `None` where nobody could.
+    fn leave(self: &Arc<Self>, last: LastWill) -> Option<u64> {
+        let place = self.place()?;
+        let now = monotonic();
+        let will = Will {
+            unit: last.unit.get(),
+            ways: last.ways,
+            look: last.look,
+            timeout: nanos(self.timeout.min(LONGEST_ANSWER)),
+            silence: nanos(last.silence),
+            port: self.key.as_ref()?.made(),
+            left: now.as_nanos(),
+            program: own_name(),
+            process: std::process::id(),
+            characters: self.characters,
+        };
+        let paper = Paper::leave(&place, &will, now);
+        let mut state = self.lock();
+        let paper = match paper {
+            Ok(paper) => paper,
+            Err(error) => {
+                state.note(&format!("nobody would halt unit {} for this program: {error}", will.unit));
+                return None;
+            }
+        };
+        state.tokens += 1;
+        let token = state.tokens;
+        state.own.insert(token, paper);
+        state.untold = true;
+        self.attend(&mut state);
+        self.changed.notify_all();
+        Some(token)
+    }
+
+    fn withdraw(&self, token: u64) {
+        let paper = self.lock().own.remove(&token);
+        if let Some(paper) = paper {
+            paper.remove();
+        }
+    }
+
+    /// Whoever has the port next carries out what is left here: this bus is closed.
+    pub(super) fn let_go(&self) {
+        let mut state = self.lock();
+        let (own, halting) = (std::mem::take(&mut state.own), std::mem::take(&mut state.halting));
+        self.halts.store(false, Ordering::Release);
+        drop(state);
+        drop((own, halting));
+        self.changed.notify_all();
+    }
+
+    /// Waits for the halts that are being given, a while.
+    pub(super) fn let_out(&self) {
+        let end = monotonic() + LET_OUT;
+        let mut state = self.lock();
+        while state.halting.values().any(|halted| halted.is_attended && !halted.course.is_late()) {
+            let left = end.saturating_duration_since(monotonic());
+            if left.is_zero() {
+                return;
+            }
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Why `unit` may not be asked now, or nobody by a broadcast.
+    pub(super) fn keeps_from(&self, unit: Option<UnitAddress>) -> Option<Failure> {
+        if !self.halts.load(Ordering::Acquire) {
+            return None;
+        }
+        let (state, now) = (self.lock(), monotonic());
+        let mut kept = state.halting.iter().filter(|(_, halted)| halted.course.is_kept_from_others(now));
+        let (unit, halted) = kept.find(|(halted, _)| unit.is_none_or(|unit| unit == **halted))?;
+        let (_, will) = halted.wills.last()?;
+        Some(Failure::BeingStopped { unit: unit.get(), program: will.program.clone(), process: will.process })
+    }
+
+    pub(super) fn notes(&self) -> Vec<String> {
+        self.lock().notes.clone()
+    }
+
+    /// Halts `unit` for a program that is gone, until it took that.
+    fn carry_out(&self, bus: &Weak<Shared>, unit: UnitAddress) {
+        loop {
+            let Some(shared) = bus.upgrade().filter(|shared| !shared.is_shut()) else { return };
+            if shared.is_guest() {
+                // The port is another program's by now: that one does it.
+                self.give_up(unit);
+                shared.tell_of_wills();
+                return;
+            }
+            let mut state = self.lock();
+            let Some(halted) = state.halting.get_mut(&unit) else { return };
+            let next = halted.course.next(monotonic());
+            let Some((_, will)) = halted.wills.last() else { return };
+            let will = will.clone();
+            drop(state);
+            let mut took = None;
+            match next {
+                Next::Look => {
+                    let is_another = will.look.as_ref().is_some_and(|look| is_another(&shared, unit, look));
+                    self.of(unit, |halted| halted.course.looked(is_another));
+                    took = is_another.then_some(false);
+                }
+                Next::Halt(way) => {
+                    let outcome = halt(&shared, unit, &will, way);
+                    let is_lost = matches!(outcome, Err(Failure::Port(_)));
+                    self.of(unit, |halted| halted.course.halted(monotonic(), outcome.is_ok(), is_lost));
+                    took = outcome.is_ok().then_some(true);
+                }
+                Next::Wait(until) => {
+                    drop(shared);
+                    thread::sleep(until.saturating_duration_since(monotonic()).min(LOOKS));
+                }
+                Next::Over => took = Some(false),
+            }
+            if let Some(took) = took {
+                self.is_done(unit, &will, took);
+                return;
+            }
+        }
+    }
+
+    fn of(&self, unit: UnitAddress, change: impl FnOnce(&mut Halted)) {
+        let mut state = self.lock();
+        let Some(halted) = state.halting.get_mut(&unit) else { return };
+        let was_late = halted.course.is_late();
+        change(halted);
+        if halted.course.is_late() && !was_late {
+            let who = halted.wills.last().map(|(_, will)| format!("{} (process {})", will.program, will.process));
+            state.note(&format!(
+                "unit {unit} took no halt within {} s; {}, which ran it, is gone. It is still told to halt now and then: \
+                 its motor may run",
+                AT_ONCE.as_secs(),
+                who.unwrap_or_default()
+            ));
+        }
+        self.changed.notify_all();
+    }
+
+    fn is_done(&self, unit: UnitAddress, will: &Will, took: bool) {
+        let mut state = self.lock();
+        let halted = state.halting.remove(&unit);
+        self.halts.store(!state.halting.is_empty(), Ordering::Release);
+        let who = format!("{} (process {}), which ran it, is gone", will.program, will.process);
+        state.note(&if took {
+            format!("unit {unit} was told to halt, and took it: {who}")
+        } else {
+            format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
+        });
+        drop(state);
+        for (paper, _) in halted.into_iter().flat_map(|halted| halted.wills) {
+            paper.remove();
+        }
+        self.changed.notify_all();
+    }
+
+    /// Leaves the halt of `unit` to who has the port.
+    fn give_up(&self, unit: UnitAddress) {
+        let mut state = self.lock();
+        let halted = state.halting.remove(&unit);
+        self.halts.store(!state.halting.is_empty(), Ordering::Release);
+        drop(state);
+        drop(halted);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn note(&mut self, text: &str) {
+        if !self.notes.iter().any(|note| note == text) {
+            self.notes.push(text.to_owned());
+            let more = self.notes.len().saturating_sub(NOTES);
+            self.notes.drain(..more);
+        }
+    }
+}
+
+impl Bus {
+    /// Leaves a last will: what halts a unit, should this program be gone without a word. Whoever has the port then, or
+    /// opens it within five minutes, sends that before anything else to this unit, until the unit takes it. Several of a
+    /// program add up, and the newest counts.
+    ///
+    /// `None` where nobody would find it: the port is of no kind that programs share, or the system gives no place. What
+    /// closes the bus leaves it to be carried out.
+    pub fn leave_will(&self, will: LastWill) -> Option<u64> {
+        (self.shared.is_of_this_process() && !self.is_shut()).then(|| self.shared.wills.leave(will)).flatten()
+    }
+
+    /// Takes back the will that [`leave_will`](Self::leave_will) gave this number. In a forked child it stays the parent's.
+    pub fn withdraw_will(&self, number: u64) {
+        if self.shared.is_of_this_process() {
+            self.shared.wills.withdraw(number);
+        }
+    }
+}
+
+/// Whether the unit says that it is another one than the will means.
+fn is_another(shared: &Shared, unit: UnitAddress, (question, others): &(Vec<u8>, Vec<Vec<u8>>)) -> bool {
+    let Ok(request) = Request::parse(question) else { return false };
+    if request.is_write() {
+        return false;
+    }
+    let mut came = Vec::new();
+    // At once: a halt waits for it, and it needs no echo before that makes sure of what is only a word against a halt.
+    let options = CallOptions::new().urgent(&request).timeout(LOOK).retries(0).in_doubt(true);
+    let ask = shared.ask(unit.into(), &request, &options);
+    let result = Call::new(shared, ask, options)
+        .run(&mut || shared.is_shut(), &mut |answer| came = pdu_of(Destination::Unit(unit), &answer));
+    result.is_ok() && others.contains(&came)
+}
+
+/// Halts the unit in one of the ways of `will`.
+fn halt(shared: &Shared, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure> {
+    for pdu in will.ways.get(way).into_iter().flatten() {
+        let Ok(request) = Request::parse(pdu) else { continue };
+        let options = CallOptions::new().urgent(&request).timeout(Duration::from_nanos(will.timeout)).retries(0);
+        let options = CallOptions { priority: Some(Priority::Stop), ..options };
+        let ask = shared.ask(unit.into(), &request, &options);
+        let result = Call::new(shared, ask, options).run(&mut || shared.is_shut(), &mut |_| ());
+        result.map_err(|error| error.failure)?;
+    }
+    Ok(())
+}

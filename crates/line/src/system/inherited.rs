@@ -1,0 +1,149 @@
+//! Descriptors that a forked child gives up: the lock of a port, its door, the connections behind it.
+//!
+//! A fork copies every descriptor, and what hangs on one lives until its last copy is closed: the lock of a port whose owner
+//! was killed, a connection at whose other end somebody waits for an answer. `close-on-exec` helps who runs another program,
+//! and not who goes on in a copy of this one. So each is listed while it is open. The child puts `/dev/null` in its place
+//! (`dup2`): nothing is unlocked, shut down or said, since all of that would be done to the parent's.
+//!
+//! The list is read after a fork, when nobody lets go of a lock that another thread held: it has none.
+
+use std::ops::{Deref, DerefMut};
+
+#[cfg(unix)]
+pub use list::{Inherited, inherited};
+
+/// What has a descriptor that a forked child gives up.
+#[derive(Debug)]
+pub(crate) struct Kept<T> {
+    /// Before what it lists, so that nobody gives up a number that is somebody else's by then.
+    #[cfg(unix)]
+    _listed: list::Listed,
+    kept: T,
+}
+
+#[cfg(unix)]
+impl<T: std::os::fd::AsFd> Kept<T> {
+    pub(crate) fn new(kept: T) -> Self {
+        Self { _listed: list::Listed::new(&kept), kept }
+    }
+}
+
+#[cfg(not(unix))]
+impl<T> Kept<T> {
+    pub(crate) fn new(kept: T) -> Self {
+        Self { kept }
+    }
+}
+
+impl<T> Deref for Kept<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.kept
+    }
+}
+
+impl<T> DerefMut for Kept<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.kept
+    }
+}
+
+#[cfg(unix)]
+mod list {
+    use std::fs::{File, OpenOptions};
+    use std::os::fd::{AsFd, AsRawFd, RawFd};
+    use std::sync::OnceLock;
+    use std::sync::atomic::{AtomicI32, Ordering};
+
+    /// No descriptor has this number.
+    const FREE: i32 = -1;
+
+    /// Some places of the list, and those that were needed beyond.
+    struct Block {
+        places: [AtomicI32; 64],
+        next: OnceLock<Box<Self>>,
+    }
+
+    impl Block {
+        const fn new() -> Self {
+            Self { places: [const { AtomicI32::new(FREE) }; 64], next: OnceLock::new() }
+        }
+    }
+
+    static FIRST: Block = Block::new();
+    static NOTHING: OnceLock<Option<File>> = OnceLock::new();
+
+    /// A place in the list, until this is dropped.
+    #[derive(Debug)]
+    pub(super) struct Listed(&'static AtomicI32);
+
+    impl Listed {
+        pub(super) fn new(descriptor: &impl AsFd) -> Self {
+            // Before it is needed: a child may find no descriptor free.
+            NOTHING.get_or_init(|| OpenOptions::new().read(true).write(true).open("/dev/null").ok());
+            let number = descriptor.as_fd().as_raw_fd();
+            let takes =
+                |place: &&AtomicI32| place.compare_exchange(FREE, number, Ordering::AcqRel, Ordering::Relaxed).is_ok();
+            let mut block = &FIRST;
+            loop {
+                if let Some(place) = block.places.iter().find(takes) {
+                    return Self(place);
+                }
+                block = block.next.get_or_init(|| Box::new(Block::new()));
+            }
+        }
+    }
+
+    impl Drop for Listed {
+        fn drop(&mut self) {
+            self.0.store(FREE, Ordering::Release);
+        }
+    }
+
+    /// What a forked child gives up, by `dup2(nothing, descriptor)` for each before it does anything else.
+    #[derive(Debug, Clone, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub struct Inherited {
+        /// An open `/dev/null`.
+        pub nothing: RawFd,
+        /// The descriptors of all ports that are open, of their locks, doors and connections.
+        pub descriptors: Vec<RawFd>,
+    }
+
+    /// What a child that is forked now has of its parent's ports; `None` where that is nothing.
+    ///
+    /// The Python package gives it up by itself. A program in Rust that forks, and runs no other program in the child, does so
+    /// there: no crate offers `pthread_atfork` in safe Rust.
+    #[must_use]
+    pub fn inherited() -> Option<Inherited> {
+        let nothing = NOTHING.get()?.as_ref()?.as_raw_fd();
+        let blocks = std::iter::successors(Some(&FIRST), |block| block.next.get().map(|next| &**next));
+        let numbers = blocks.flat_map(|block| &block.places).map(|place| place.load(Ordering::Acquire));
+        Some(Inherited { nothing, descriptors: numbers.filter(|number| *number != FREE).collect() })
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::fs::File;
+    use std::os::fd::{AsRawFd, RawFd};
+
+    use super::*;
+
+    fn listed() -> Vec<RawFd> {
+        inherited().map(|inherited| inherited.descriptors).unwrap_or_default()
+    }
+
+    #[test]
+    fn what_is_open_is_listed_for_as_long_as_it_is_however_much_it_is() {
+        let files: Vec<_> = (0..200).map(|_| File::open("/dev/null").unwrap()).collect();
+        let numbers: Vec<_> = files.iter().map(AsRawFd::as_raw_fd).collect();
+        let held: Vec<_> = files.iter().map(Kept::new).collect();
+        let now = listed();
+        assert!(numbers.iter().all(|number| now.contains(number)));
+        drop(held);
+        let now = listed();
+        assert!(!numbers.iter().any(|number| now.contains(number)));
+    }
+}

@@ -1,0 +1,102 @@
+"""The last will of a program: what halts a unit that it runs, left with whoever has the port.
+
+A program that is killed tells nobody to stop. What it left says it for it: in the words of the unit's family, before
+anything else goes there. What becomes of it stands in the core.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from drivebus import places
+from drivebus.identify import codes
+from drivebus.identify.answers import Answer
+from drivebus.identify.contradiction import contradiction
+from drivebus.line.protocols import KeepsWills
+from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
+
+__all__ = ["LastWill"]
+
+_READ = {"coil": 0x01, "discrete": 0x02, "holding": 0x03, "input": 0x04}
+_WRITE_COIL, _WRITE_ONE, _WRITE_MANY = 0x05, 0x06, 0x10
+
+_WAYS = ("stop", "coast")
+"""What halts a motor, a jog included: the first of them first."""
+
+
+class LastWill:
+    """What halts one unit, left and taken back.
+
+    Args:
+        unit: The unit, with the trust of what runs it.
+        silence: The drive's own time-out in seconds, where one was set.
+        first: What is tried first, `"stop"` or `"coast"`.
+    """
+
+    def __init__(self, unit: Unit, silence: float = 0.0, first: str = "stop") -> None:
+        self._unit = unit
+        self._silence = silence
+        self._ways = sorted(_WAYS, key=lambda way: way != first)
+        self._number: int | None = None
+
+    def leave(self) -> None:
+        """Leaves it, before what it is for."""
+        line, unit = self._unit.bus.line, self._unit
+        # Somebody's own bus may know of no such thing.
+        if self._number is None and isinstance(line, KeepsWills):
+            usable = [way for way in self._ways if unit.evidence.unusable(way) is None]
+            ways = [_requests(unit.profile, way) for way in usable]
+            if ways:
+                look = None if unit.identity.trusted else _look(unit.profile)
+                self._number = line.leave_will(unit.address, ways, look=look, silence=self._silence)
+
+    def unsure(self) -> str:
+        """Why the unit may run on when this program is gone, though it acts by itself when it hears nothing."""
+        line, unit = self._unit.bus.line, f"unit {self._unit.address}"
+        port = line.port if isinstance(line, KeepsWills) else ""
+        if port.startswith("sim:"):
+            return ""
+        feeds = f"each request of anybody else keeps {unit} from acting by itself"
+        if self._number is None:
+            return f"{feeds}, and nobody halts it when this program is gone"
+        if port.startswith("socket:"):
+            return f"{feeds}, and other computers may use this serial server"
+        return ""
+
+    def withdraw(self) -> None:
+        """Takes it back: it is not needed any more."""
+        line, number = self._unit.bus.line, self._number
+        self._number = None
+        if number is not None and isinstance(line, KeepsWills):
+            line.withdraw_will(number)
+
+
+def _requests(profile: Profile, command: str) -> list[bytes]:
+    """The PDUs of *command*, as it is sent."""
+    first = profile.command_first(command)
+    return [_write(profile, *each) for each in (first, profile.command(command)) if each is not None]
+
+
+def _write(profile: Profile, place: int, word: int) -> bytes:
+    table, address = places.split(place)
+    at = address.to_bytes(2, "big")
+    if table == "coil":
+        return bytes([_WRITE_COIL]) + at + (b"\xff\0" if word else b"\0\0")
+    if _WRITE_ONE not in profile.functions and _WRITE_MANY in profile.functions:
+        return bytes([_WRITE_MANY]) + at + b"\0\1\2" + word.to_bytes(2, "big")
+    return bytes([_WRITE_ONE]) + at + word.to_bytes(2, "big")
+
+
+@functools.lru_cache(maxsize=16)
+def _look(profile: Profile) -> tuple[bytes, tuple[bytes, ...]] | None:
+    """The read by which a unit says what it is, and the answers of units of other families; None if there is none."""
+    own = codes.address_of(profile)
+    at = next(iter(codes.registers()), None) if own is None else own
+    if at is None or (own is None and profile.name_at(at) is not None):
+        return None
+    table, address = places.split(at)
+    function = _READ[table]
+    others = [code for code in codes.listed() if contradiction(profile, 1, [Answer(at, code, None)]) is not None]
+    question = bytes([function]) + address.to_bytes(2, "big") + b"\0\1"
+    return question, tuple(bytes([function, 2]) + code.to_bytes(2, "big") for code in others)
