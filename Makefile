@@ -101,7 +101,7 @@ types: $(VENV)/.dev $(VENV)/.wheel
 
 rust-test: $(VENV)/.created
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-	    set -x; $(CARGO) nextest run $(LOCKED) --no-fail-fast $(RUST_TESTED) && $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED) --doc; \
+	    set -x; $(CARGO) nextest run $(LOCKED) --test-threads $(TEST_JOBS) --no-fail-fast $(RUST_TESTED) && $(CARGO) test $(LOCKED) --quiet $(RUST_TESTED) --doc; \
 	else \
 	    set -x; $(CARGO) test $(LOCKED) --quiet --no-fail-fast $(RUST_TESTED); \
 	fi

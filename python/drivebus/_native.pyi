@@ -196,6 +196,8 @@ class Bus:
         """
     def close(self) -> None:
         """Closes the port. Closing again does nothing."""
+    def step_aside(self, meanwhile: Callable[[], object], /) -> None:
+        """Gives the port up while *meanwhile* runs, and opens it again when something is asked next."""
     def now(self) -> float:
         """Seconds on the line's clock: real time, or the simulation's."""
     def sleep(self, seconds: float, /) -> None:

@@ -121,6 +121,16 @@ impl Bus {
         self.shared.close();
     }
 
+    /// Gives the port up for as long as `meanwhile` takes: another program of this port may have it. It is opened again, or
+    /// used through that program, when something is asked next; that counts as a reconnect.
+    ///
+    /// For a program that is about to be held, by Ctrl-Z for instance: nobody could use the line through it, not even for a
+    /// stop. Nothing is asked through this bus meanwhile. The exchange under way is waited for, two seconds at most; after
+    /// that, or in a forked child, `meanwhile` runs and the port is kept.
+    pub fn step_aside(&self, meanwhile: impl FnOnce()) {
+        self.shared.step_aside(meanwhile);
+    }
+
     /// Asks `request` of `destination` and gives the answer to `take`.
     ///
     /// A read that brings nothing is asked again by policy, and `take` is called for the answer that counts. A write

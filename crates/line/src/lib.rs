@@ -94,7 +94,7 @@ pub use ports::{rs485, tty};
 #[cfg(all(unix, feature = "share"))]
 pub use share::place::run_time_folder;
 pub use system::clock;
-#[cfg(unix)]
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
 pub use system::inherited::{Inherited, inherited};
 pub use trace::{Direction, Overheard, Traced, Watch};
 pub use turns::order::Priority;

@@ -104,6 +104,16 @@ impl Bus {
         detached(py, || self.core.close());
     }
 
+    #[pyo3(signature = (meanwhile, /))]
+    fn step_aside(&self, py: Python<'_>, meanwhile: &Bound<'_, PyAny>) -> PyResult<()> {
+        let meanwhile = meanwhile.clone().unbind();
+        let mut result = Ok(());
+        py.detach(|| {
+            self.core.step_aside(|| result = Python::attach(|py| meanwhile.call0(py).map(drop)));
+        });
+        result
+    }
+
     fn now(&self, py: Python<'_>) -> f64 {
         py.detach(|| to_seconds(self.core.now()))
     }

@@ -18,6 +18,7 @@ from typing import Any
 import click
 
 import drivebus
+from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import about, remark
 from drivebus.cli.session import Declined, Session, ask_once, exit_code, pass_session, tell
 
@@ -74,9 +75,10 @@ class Crew:
             for place, one in enumerate(self._sessions)
         ]
         try:
-            for thread in threads:
-                thread.start()
-            self._lead()
+            with gives_way_when_held(lambda: list(self._buses.values())):
+                for thread in threads:
+                    thread.start()
+                self._lead()
         except KeyboardInterrupt as error:
             self._end(threads)
             if hasattr(error, "add_note") and context.info_name == "run":

@@ -15,6 +15,7 @@ import click
 
 import drivebus
 from drivebus.cli.advice import in_commands
+from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import Output, remark
 from drivebus.site import forget, known_family, remember
 
@@ -149,7 +150,7 @@ class Session:
         if self.crew is not None:
             yield self.crew.bus(port, settings)
             return
-        with drivebus.Bus(port, **settings) as bus:
+        with drivebus.Bus(port, **settings) as bus, gives_way_when_held(lambda: [bus]):
             yield bus
 
     @contextmanager

@@ -120,6 +120,7 @@ class _Native(Protocol):
     @property
     def reconnects(self) -> int: ...
     def watch(self, function: Callable[[float, float | None, bool, bytes, bool], object] | None, /) -> None: ...
+    def step_aside(self, meanwhile: Callable[[], object], /) -> None: ...
     def now(self) -> float: ...
     def stats(self) -> dict[str, Any]: ...
     def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None: ...
@@ -195,6 +196,16 @@ class BusFace:
     def closed(self) -> bool:
         """Whether `close` was called; in a forked child True, for the line is its parent's."""
         return self._core().closed
+
+    def step_aside(self, meanwhile: Callable[[], object]) -> None:
+        """Gives the port up while *meanwhile* runs: another program that shares it has it, and serves the others.
+
+        For a program that is about to be held, as by Ctrl-Z: through one that is held nobody could stop a motor. The
+        commands of drivebus do it by themselves. The exchange under way is waited for, two seconds at most; after that
+        the port is kept. Nothing is asked over this bus meanwhile, by any thread. What is asked next opens the port
+        again, or goes through the program that has it; `reconnects` rises by one.
+        """
+        self._core().step_aside(meanwhile)
 
     @property
     def read_only(self) -> bool:

@@ -28,6 +28,8 @@ impl Wills {
 
     pub(super) fn let_go(&self) {}
 
+    pub(super) fn hand_over(&self) {}
+
     pub(super) fn let_out(&self) {}
 
     pub(super) fn keeps_from(&self, _unit: Option<UnitAddress>) -> Option<Failure> {

@@ -30,6 +30,9 @@ use crate::trace::{Trace, Watch};
 use crate::turns::order::Priority;
 use crate::turns::queue::{NoTurn, Queue, Stops, Turn};
 
+/// How long the exchange under way may take where the port is to be given up.
+const WAITS_TO_STEP_ASIDE: Duration = Duration::from_secs(2);
+
 /// One line, and all that its callers share.
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -126,6 +129,24 @@ impl Shared {
     /// Whether the line's clock is a simulation's.
     pub(crate) fn is_virtual(&self) -> bool {
         matches!(self.clock, Clock::Virtual(_))
+    }
+
+    /// Lets others have the line while `meanwhile` runs.
+    pub(crate) fn step_aside(&self, meanwhile: impl FnOnce()) {
+        if !self.opened_by.is_current() || self.is_shut() {
+            return meanwhile();
+        }
+        let end = monotonic() + WAITS_TO_STEP_ASIDE;
+        // Kept until the end, so that nobody here opens the port again.
+        let turn = self.queue.turn((Priority::Stop, None), &mut || monotonic() >= end);
+        if turn.is_ok() && !self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) {
+            self.lock().close();
+            self.wills.hand_over();
+            if let Some(sharing) = &self.sharing {
+                sharing.serves_no_more();
+            }
+        }
+        meanwhile();
     }
 
     /// Closes the line, after the exchange that is under way. From inside a `give_up`, whoever asked that does it.

@@ -242,14 +242,15 @@ impl Sharing {
         }
     }
 
-    /// Nobody is let in any more, and who is in is told so. The port is closed by now.
+    /// This bus is closed, and its port by now.
     pub(super) fn end(&self) {
         self.serves_no_more();
         self.is_guest.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    fn serves_no_more(&self) {
+    /// Nobody is let in any more until the port is opened again, and who is in is told so. The port is closed by now.
+    pub(super) fn serves_no_more(&self) {
         let mut serving = self.serving();
         (serving.host, serving.at) = (None, None);
         drop(serving);

@@ -48,6 +48,10 @@ impl Sharing {
         match self.0 {}
     }
 
+    pub(super) fn serves_no_more(&self) {
+        match self.0 {}
+    }
+
     pub(super) fn notes(&self) -> Vec<String> {
         match self.0 {}
     }

@@ -297,11 +297,18 @@ impl Wills {
 
     /// Whoever has the port next carries out what is left here: this bus is closed.
     pub(super) fn let_go(&self) {
+        let own = std::mem::take(&mut self.lock().own);
+        drop(own);
+        self.hand_over();
+    }
+
+    /// Whoever has the port next halts who is being halted.
+    pub(super) fn hand_over(&self) {
         let mut state = self.lock();
-        let (own, halting) = (std::mem::take(&mut state.own), std::mem::take(&mut state.halting));
+        let halting = std::mem::take(&mut state.halting);
         self.halts.store(false, Ordering::Release);
         drop(state);
-        drop((own, halting));
+        drop(halting);
         self.changed.notify_all();
     }
 

@@ -1,15 +1,14 @@
 //! Whose turn it is: one owner of the line at a time. Who waits sleeps until it is called; who is called is decided by
 //! [`Order`] at the last moment, so that a stop that comes while the next one wakes up still goes first.
 
+#[cfg(all(unix, feature = "share"))]
+mod watching;
 mod work;
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Thread, ThreadId};
-use std::time::Duration;
-
-use drivebus_rtu::Instant;
 
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::turns::crew::Crew;
@@ -155,12 +154,6 @@ impl<W> Queue<W> {
         }
     }
 
-    /// What tells whether the line still goes from hand to hand.
-    #[cfg(all(unix, feature = "share"))]
-    pub(crate) fn watch(&self) -> Watching<'_, W> {
-        Watching { queue: self, seen: None }
-    }
-
     /// How many wait.
     #[cfg(test)]
     pub(crate) fn waiting(&self) -> usize {
@@ -185,34 +178,6 @@ impl<W> Queue<W> {
     /// A thread that panicked cannot have left the order inconsistent: nothing is done under the lock that can.
     pub(crate) fn lock(&self) -> MutexGuard<'_, State<W>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Whether the line goes from hand to hand, for who waits for it.
-#[cfg(all(unix, feature = "share"))]
-pub(crate) struct Watching<'a, W> {
-    queue: &'a Queue<W>,
-    /// Whose turn it was when this was asked last, and since when it was.
-    seen: Option<(Ticket, Instant)>,
-}
-
-#[cfg(all(unix, feature = "share"))]
-impl<W> Watching<'_, W> {
-    /// Whether the same one has had the line for so `long` and did not say that it goes on, asked again and again.
-    pub(crate) fn sees_nothing_move_for(&mut self, long: Duration) -> bool {
-        let has_it = self.queue.lock().owner.as_ref().map(|(ticket, _)| *ticket);
-        let now = monotonic();
-        let Some(ticket) = has_it else {
-            self.seen = None;
-            return false;
-        };
-        let (_, since) = *self.seen.get_or_insert((ticket, now));
-        if self.seen.is_some_and(|(seen, _)| seen != ticket) {
-            self.seen = Some((ticket, now));
-            return false;
-        }
-        let sign = Instant::from_nanos(self.queue.goes_on.load(Ordering::Relaxed));
-        now.saturating_duration_since(since.max(sign)) >= long
     }
 }
 
