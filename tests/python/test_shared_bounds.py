@@ -6,6 +6,7 @@ Real processes, and a slave that keeps its own motor. Nothing waits without an e
 from __future__ import annotations
 
 import os
+import select
 import signal
 import socket
 import struct
@@ -38,6 +39,7 @@ def server() -> Iterator[OwnMotor]:
 
 
 RUNS = """
+import select
 import signal
 bus.drive(1, "gd350").run(hz=10.0)
 print("running", flush=True)
@@ -227,3 +229,39 @@ def test_a_flood_of_connections_sends_no_first_call_and_no_stop_away(folder: Pat
             for flood in floods:
                 flood.kill()
                 flood.communicate()
+
+
+LISTENS = """
+def hear(at, sent, data):
+    if data:
+        print("hears", flush=True)
+    return b"\\x03\\x04\\x56" in data
+
+bus._core().overhear(hear)
+print(*bus.stats()["notes"], sep=" | ", flush=True)
+"""
+
+
+@pytest.mark.usefixtures("folder")
+def test_who_listens_and_does_not_read_holds_up_nobody(motor: OwnMotor) -> None:
+    """What it missed is counted and told; nobody waited for it, since all of it would have come otherwise."""
+    with Bus(motor.port, parity="N") as bus, program(LISTENS, motor.port) as guest:
+        drive = bus.drive(1, "gd350")
+        drive.run(hz=10.0)
+        while not select.select([guest.process.stdout], [], [], 0.0)[0]:
+            bus.read(1, 0x2103)
+        assert guest.says() == "hears"
+        hold(guest.process)
+        # Far more than the system keeps for it.
+        for _ in range(3_000):
+            bus.read(1, 0x2103)
+        before = len(motor.events)
+        drive.stop()
+        motor.is_halted(since=before)
+        guest.process.send_signal(signal.SIGCONT)
+        said = "hears"
+        while said == "hears":
+            bus.read(1, 0x0456)
+            while select.select([guest.process.stdout], [], [], 0.0)[0] and said == "hears":
+                said = guest.says()
+    assert "pieces of what went over the line were not heard" in said
