@@ -6,6 +6,7 @@ Real processes, and a slave that keeps its own motor.
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -66,6 +67,9 @@ class Child:
     def says(self) -> str:
         assert self.process.stdout is not None
         return self.process.stdout.readline().strip()
+
+    def has_said_more(self) -> bool:
+        return bool(select.select([self.process.stdout.fileno() if self.process.stdout else -1], [], [], 0.0)[0])
 
     def goes_on(self) -> None:
         assert self.process.stdin is not None
