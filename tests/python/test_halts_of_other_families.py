@@ -187,23 +187,48 @@ class TestOneThatChanges:
 
     @pytest.mark.parametrize("exception", [*range(0x01, 0x09), 0x09, 0x0A, 0x0B])
     @pytest.mark.parametrize("seconds", [0.02, 0.5, 2.0, 5.0])
-    @pytest.mark.parametrize("end", ["stop", "coast", "block", "stop_all"])
+    @pytest.mark.parametrize(
+        "end", ["stop", "coast", "stop_all", "block", "exception", "jog", "jog block", "trial", "await"]
+    )
     def test_a_refusal_that_ends_leaves_no_motor_running(
         self, line: tuple[Simulator, Bus], exception: int, seconds: float, end: str
     ) -> None:
         simulator, bus = line
         drive = bus.drive(1, "gd350")
 
-        def refuse() -> None:
+        def refuse(*_: object) -> None:
             simulator.drive(1).refuse(exception, asked="writes", seconds=seconds)
 
-        ends = {"stop": drive.stop, "coast": drive.coast, "stop_all": bus.stop_all}
+        async def awaited() -> None:
+            async with drivebus.aio.Bus(simulator) as other, (await other.drive(1, "gd350")).running(20.0):
+                refuse()
+
         if end == "block":
             with drive.running(20.0):
                 refuse()
+        elif end == "exception":
+            with suppress(ZeroDivisionError), drive.running(20.0):
+                refuse()
+                raise ZeroDivisionError
+        elif end == "trial":
+            # Its setpoint may be refused, too: then it ends early.
+            with suppress(DrivebusError):
+                drivebus.trial.step(drive, 20.0, 25.0, duration=0.5, max_current=None, told=refuse)
+        elif end == "await":
+            asyncio.run(awaited())
+        elif end.startswith("jog"):
+            drive.stop()
+            drive.wait_until_stopped(timeout=60)
+            if end == "jog":
+                drive.jog()
+                refuse()
+                drive.jog_stop()
+            else:
+                with drive.jogging():
+                    refuse()
         else:
             refuse()
-            ends[end]()
+            {"stop": drive.stop, "coast": drive.coast, "stop_all": bus.stop_all}[end]()
         drive.wait_until_stopped(timeout=60)
         assert simulator.drive(1).state == "stopped"
 
