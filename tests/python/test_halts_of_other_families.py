@@ -31,6 +31,10 @@ RECTIFIERS = ("gd600-rectifier", "gd3000-rectifier")
 """They have no motor; INVT's stop word is all that the simulated ones take."""
 
 
+NO_SETPOINT = ("chf100a", "saj8000m")
+"""No document prints where they take one."""
+
+
 class Case(NamedTuple):
     """One unit, what it is named as, and what it is told."""
 
@@ -166,6 +170,55 @@ def test_nor_does_a_command_whose_family_was_kept(kept: str, family: str, comman
         assert unit.state == "stopped", result.output
         assert {(place, word) for _, place, word in unit.writes()} <= own_halts(family)
         assert "was not told" not in result.output
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pty")
+@pytest.mark.parametrize(("named", "family"), PAIRS[::3])
+@pytest.mark.parametrize("how", [(), ("--trust-profile",)], ids=["named", "trusted"])
+def test_nor_does_a_command_that_names_another_family(named: str, family: str, how: tuple[str, ...]) -> None:
+    with Simulator({1: family}, transport="pty") as simulator:
+        unit = simulator.drive(1)
+        before, eeprom = unit.state, unit.eeprom_writes
+        options = ["--port", simulator.port, "--profile", named, "--unverified", *how]
+        said = [CliRunner().invoke(cli, [*options, command]).output for command in ("stop", "coast")]
+        judge(simulator, family, before, eeprom, f"a {family} named {named}: {said}")
+
+
+@pytest.mark.parametrize(("named", "family"), PAIRS)
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_nor_does_the_end_of_a_block_that_began_by_another_name(named: str, family: str, motion: str) -> None:
+    """Who trusts a wrong name may start what they like. The end of the block is a halt, and nothing else."""
+    begins = Profile.builtin(named).commands()
+    of_it = Profile.builtin(family).commands()
+    if "run" not in begins or not of_it or (motion == "reverse" and "run_reverse" not in of_it):
+        return
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator:
+        assert set_going(simulator, family, motion)
+        unit = simulator.drive(1)
+        with Bus(simulator) as bus:
+            drive = bus.drive(1, named, unverified=True, trust_profile=True)
+            began = None
+            with suppress(DrivebusError), drive.running(force=True, confirm=0.0):
+                began = (unit.state, unit.eeprom_writes)
+                unit.take_writes()
+            if began is not None:
+                judge(simulator, family, *began, f"a {family} named {named}, {motion}")
+
+
+@pytest.mark.parametrize("family", drivebus.profiles())
+def test_one_that_a_program_ran_is_halted_by_the_first_frame(family: str) -> None:
+    if not Profile.builtin(family).commands():
+        return
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator:
+        assert set_going(simulator, family, "at rest")
+        with Bus(simulator) as bus:
+            drive = bus.drive(1, family, unverified=True)
+            drive.run(None if family in NO_SETPOINT else 20.0)
+            seen = len(simulator.line.trace())
+            with suppress(DrivebusError):
+                drive.stop()
+            first = next(frame for _, who, frame in simulator.line.trace()[seen:] if who == "master")
+            assert first[1] in (0x05, 0x06, 0x10), first.hex()
 
 
 class TestOneThatChanges:
