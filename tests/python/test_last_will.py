@@ -351,3 +351,18 @@ def test_what_is_left_halts_each_family(family: str) -> None:
                 bus.transact(1, pdu, force=True)
             simulator.advance(1000)
             assert simulated.state == "stopped", way
+
+
+@pytest.mark.parametrize(
+    ("transport", "says"), [("pty", ""), ("tcp", "other computers may use this serial server"), ("process", "")]
+)
+def test_a_watchdog_says_what_it_cannot_promise(transport: str, says: str) -> None:
+    """Who asks the drive keeps it from acting by itself, and of another computer nothing is known here."""
+    with (
+        drivebus.Simulator({1: "gd350"}, transport=transport) as simulator,
+        drivebus.Bus(simulator.port if transport != "process" else simulator) as bus,
+        bus.drive(1).watchdog(2.0, unverified=True) as watchdog,
+    ):
+        assert says in watchdog.unsure
+        assert bool(says) == bool(watchdog.unsure)
+        assert watchdog.unsure in repr(watchdog)

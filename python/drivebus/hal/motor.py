@@ -193,6 +193,8 @@ class Motor:
     def _arm(self) -> None:
         if self._watchdog is None and self._silence is not None and self._action is not None:
             self._watchdog = self._drive.watchdog(self._silence, self._action)
+            if self._watchdog.unsure:
+                self._say(self._watchdog.unsure)
 
     def _is_readable(self, name: str) -> bool:
         try:

@@ -182,7 +182,9 @@ class Motor:
                     if self._watchdog is not None:
                         settings = drive.profile.watchdog
                         action = "coast" if settings is None else settings.choices[0]
-                        stack.enter_context(drive.watchdog(self._watchdog, action))
+                        watchdog = stack.enter_context(drive.watchdog(self._watchdog, action))
+                        if watchdog.unsure:
+                            self._journal.say(f"{self.called}: watchdog: {watchdog.unsure}", "yellow")
                     if not block.over.is_set():
                         stack.enter_context(enter())
                         turns = True
