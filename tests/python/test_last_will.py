@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -254,6 +254,31 @@ def test_a_block_that_ended_leaves_nothing(shop: Workshop) -> None:
             bus.read(1, 0x2100)
         shop.wait_for(asks_the_state, killed)
     assert not [said for said in shop.frames(killed) if said.is_halt]
+
+
+ASKS_NOTHING = OPEN + 'say("open")\nsys.stdin.readline()\n'
+
+
+@pytest.mark.parametrize("beside", [1, 3])
+def test_a_guest_that_asks_for_nothing_halts_for_the_owner(shop: Workshop, beside: int) -> None:
+    """Nobody else would open the port: its program waits for its user, say."""
+    with ExitStack() as stack:
+        owner = stack.enter_context(program(shop, RUNS))
+        for _ in range(beside):
+            stack.enter_context(program(shop, ASKS_NOTHING))
+        killed = kill(owner)
+        shop.wait_for(is_halt, killed)
+        shop.wait_for(stands, killed)
+
+
+def test_a_port_of_which_nobody_is_halted_is_not_taken_over_unasked(shop: Workshop) -> None:
+    """The user may want it for another program."""
+    with program(shop, ASKS_NOTHING) as owner, program(shop, ASKS_NOTHING):
+        kill(owner)
+        # For longer than it is looked for somebody who is to be halted.
+        for _ in range(40):
+            with drivebus.Bus(shop.port, parity="N", timeout=0.3, share="never") as bus:
+                bus.read(1, 0x2100)
 
 
 FORKS = (

@@ -3,7 +3,8 @@
 //! The port decides: who opens it has it, and serves the others; who finds it taken looks for the one who serves it. When
 //! that one ends, all others do the same again, and one of them has the port.
 
-use std::net::SocketAddr;
+use std::net::{Shutdown, SocketAddr};
+use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
@@ -16,10 +17,11 @@ use crate::health::stats::{Program, Stats};
 use crate::line::{Line, Opener, PortError, PortErrorKind};
 use crate::options::{BusOptions, Share};
 use crate::ports::key::PortKey;
-use crate::share::guest::{Guest, Knocked};
+use crate::share::guest::{Guest, Knocked, Vigil};
 use crate::share::message::{Characters, Hello};
 use crate::share::place::Place;
 use crate::system::clock::monotonic;
+use crate::system::inherited::Kept;
 use crate::system::process::own_name;
 
 /// How long a port may stay taken whose owner is gone: the system closes what a program that was killed had open, one
@@ -49,6 +51,15 @@ pub(super) struct Sharing {
     guests: Arc<Guests>,
     /// Pieces of what went over the line that the program which has the port could not tell this one.
     left_out: AtomicU64,
+    /// To end the wait for the end of the program that has the port.
+    vigil: Mutex<Option<Arc<Kept<UnixStream>>>>,
+}
+
+fn end_vigil(connection: Option<Arc<Kept<UnixStream>>>) {
+    if let Some(connection) = connection {
+        // It may have ended already.
+        let _ = connection.shutdown(Shutdown::Both);
+    }
 }
 
 #[derive(Debug, Default)]
@@ -89,6 +100,7 @@ impl Sharing {
             host: Mutex::default(),
             guests: Arc::default(),
             left_out: AtomicU64::new(0),
+            vigil: Mutex::default(),
         }
     }
 
@@ -172,6 +184,35 @@ impl Sharing {
         self.takes_over.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(guest));
         self.is_guest.store(true, Ordering::Release);
+        self.begin_to_wait();
+    }
+
+    /// Waits for the end of the program that has the port, in a thread of its own: who asks for nothing would not notice it,
+    /// and nobody might halt what that program ran.
+    fn begin_to_wait(&self) {
+        let (Some(bus), Some(guest)) = (self.bus.get(), self.guest()) else { return };
+        let bus = Weak::clone(bus);
+        // Without a thread the next request notices it.
+        let _ = thread::Builder::new().name("drivebus-waits".to_owned()).spawn(move || {
+            let Some(vigil) = guest.waits() else { return };
+            let is_kept = |bus: Arc<Shared>| bus.sharing.as_ref().is_some_and(|this| this.keeps(&vigil, &guest));
+            if bus.upgrade().is_some_and(is_kept) {
+                vigil.keep();
+                if let Some(bus) = bus.upgrade() {
+                    bus.inherit(&guest);
+                }
+            }
+        });
+    }
+
+    /// Whether `vigil` at the program of `guest` is to be kept, until this bus ends it.
+    fn keeps(&self, vigil: &Vigil, guest: &Arc<Guest>) -> bool {
+        let mut kept = self.vigil.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_wanted = self.guest().is_some_and(|now| Arc::ptr_eq(&now, guest));
+        if is_wanted {
+            end_vigil(kept.replace(vigil.connection()));
+        }
+        is_wanted
     }
 
     /// The port is open, and a connection to it ends at `peer` if it has such an end: that says which of its names it has.
@@ -205,6 +246,7 @@ impl Sharing {
     pub(super) fn serves(&self, bus: &Arc<Shared>) {
         self.bus.get_or_init(|| Arc::downgrade(bus));
         self.begin_to_serve(&mut self.serving());
+        self.begin_to_wait();
     }
 
     fn begin_to_serve(&self, serving: &mut Serving) {
@@ -247,6 +289,7 @@ impl Sharing {
         self.serves_no_more();
         self.is_guest.store(false, Ordering::Release);
         *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        end_vigil(self.vigil.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 
     /// Nobody is let in any more until the port is opened again, and who is in is told so. The port is closed by now.

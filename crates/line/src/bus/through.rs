@@ -1,5 +1,6 @@
 //! What a bus does whose port may be another program's: it asks that one, or the line itself, whichever it is by now.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::{Adu, Answer, Destination, Instant, Request, UnitAddress};
@@ -8,6 +9,7 @@ use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
 use crate::bus::errand::Errand;
 use crate::bus::shared::Shared;
+use crate::bus::wills::Wills;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
@@ -344,6 +346,22 @@ impl Shared {
     /// Whether the port is another program's.
     pub(super) fn is_guest(&self) -> bool {
         self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
+    }
+
+    /// Takes the port over from a program that is gone or has closed it, if somebody is to be halted for one that is gone:
+    /// who asks for the port next would do that, and perhaps nobody does.
+    pub(super) fn inherit(&self, gone: &Arc<Guest>) {
+        let Some(sharing) = self.sharing.as_ref().filter(|_| !self.is_shut() && self.is_of_this_process()) else {
+            return;
+        };
+        if !Wills::has_orphans_at(gone.place()) {
+            return;
+        }
+        sharing.lost(gone);
+        let Ok(turn) = self.queue.turn((Priority::Stop, None), &mut || self.is_shut()) else { return };
+        // Whoever was quicker has the port, and halts it.
+        let _ = self.lock().prepare(&mut || self.is_shut());
+        drop(turn);
     }
 
     /// Tells the program that has the port of a will that was left. False where that is not known to have reached it: then

@@ -10,11 +10,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
+use rustix::event::{PollFd, PollFlags, poll};
 
 use crate::share::channel::Channel;
 use crate::share::message::{GREETING, Hello, LET_IN, SENT_AWAY, Told, VERSION, Welcome, Wish};
 use crate::share::place::{Nobody, Place};
 use crate::system::clock::{LOOK_UP, monotonic};
+use crate::system::inherited::Kept;
 use crate::system::process::{self, Life, Process};
 
 /// The longest message of a program that has a port: the statistics of 247 units.
@@ -65,6 +67,32 @@ impl std::fmt::Display for Host {
             }
             Self { program, process, .. } => write!(f, "{program} (process {process})"),
         }
+    }
+}
+
+/// A connection over which nothing is said: it ends when the program that has the port has closed it, or is gone.
+#[derive(Debug)]
+pub(crate) struct Vigil {
+    connection: Arc<Kept<UnixStream>>,
+    life: Arc<Life>,
+}
+
+impl Vigil {
+    /// Waits for its end.
+    pub(crate) fn keep(&self) {
+        loop {
+            let connection = PollFd::new(&**self.connection, PollFlags::RDHUP);
+            let life = self.life.end().map(|end| PollFd::from_borrowed_fd(end, PollFlags::IN));
+            let mut ends: Vec<_> = std::iter::once(connection).chain(life).collect();
+            if !matches!(poll(&mut ends, None), Err(rustix::io::Errno::INTR)) {
+                return;
+            }
+        }
+    }
+
+    /// How to end it from here.
+    pub(crate) fn connection(&self) -> Arc<Kept<UnixStream>> {
+        Arc::clone(&self.connection)
     }
 }
 
@@ -145,6 +173,14 @@ impl Guest {
             Err(Greeting::SentAway(why)) => Knocked::SentAway(why),
             Err(Greeting::Silent(why)) => Knocked::Silent(why),
         }
+    }
+
+    /// Waits at the program that has the port, over a connection of its own; `None` where that lets no more in.
+    pub(crate) fn waits(&self) -> Option<Vigil> {
+        let until = monotonic() + SILENT;
+        let stream = self.place.knock(until).ok()?;
+        let (channel, ..) = greet(stream, &self.hello, Some(&self.life), SILENT).ok()?;
+        Some(Vigil { connection: channel.end(), life: Arc::clone(&self.life) })
     }
 
     /// Where it was met.

@@ -137,22 +137,9 @@ impl Drop for Paper {
 
 /// The wills at `place` that nobody holds; they are held by this process from here on.
 pub(crate) fn find(place: &Place) -> io::Result<Found> {
-    let all = place.path("");
-    let (Some(folder), Some(name)) = (all.parent(), all.file_name().and_then(|name| name.to_str())) else {
-        return Ok(Found::default());
-    };
     let mut held = held();
     let mut found = Found::default();
-    for entry in fs::read_dir(folder)? {
-        let file_name = entry?.file_name();
-        let is_will = file_name.to_str().is_some_and(|file| {
-            file.strip_prefix(name)
-                .is_some_and(|rest| rest.ends_with(&format!(".{ENDING}")) && rest.len() > ENDING.len())
-        });
-        let path = folder.join(&file_name);
-        if !is_will || held.contains(&path) {
-            continue;
-        }
+    for path in of_others(place, &held)? {
         match take(&path) {
             Ok(Some(orphan)) => {
                 held.insert(path);
@@ -164,6 +151,37 @@ pub(crate) fn find(place: &Place) -> io::Result<Found> {
     }
     found.orphans.sort_by_key(|orphan| orphan.will.as_ref().map(|will| will.left));
     Ok(found)
+}
+
+/// Whether there is a will at `place` that nobody holds. It stays so.
+pub(crate) fn has_orphans(place: &Place) -> bool {
+    // Held until the end: what another thread takes up meanwhile would lose its lock with the descriptor closed here.
+    let held = held();
+    let is_free = |path: &PathBuf| {
+        let file = OpenOptions::new().read(true).write(true).open(path);
+        file.is_ok_and(|file| fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
+    };
+    of_others(place, &held).is_ok_and(|paths| paths.iter().any(is_free))
+}
+
+/// The wills at `place` that are not `held` by this process.
+fn of_others(place: &Place, held: &BTreeSet<PathBuf>) -> io::Result<Vec<PathBuf>> {
+    let all = place.path("");
+    let (Some(folder), Some(name)) = (all.parent(), all.file_name().and_then(|name| name.to_str())) else {
+        return Ok(Vec::new());
+    };
+    let ending = format!(".{ENDING}");
+    let is_one =
+        |file: &str| file.strip_prefix(name).is_some_and(|rest| rest.ends_with(&ending) && rest.len() >= ending.len());
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let file_name = entry?.file_name();
+        let path = folder.join(&file_name);
+        if file_name.to_str().is_some_and(is_one) && !held.contains(&path) {
+            paths.push(path);
+        }
+    }
+    Ok(paths)
 }
 
 /// The will at `path`, if nobody holds it.
@@ -234,13 +252,14 @@ mod tests {
             (Paper::leave(&room.1, &will(2), monotonic()), Paper::leave(&room.1, &will(1), monotonic()));
         let early = early.unwrap();
         early.is_alive(Instant::from_nanos(77));
-        assert!(find(&room.1).unwrap().orphans.is_empty(), "both are held");
+        assert!(find(&room.1).unwrap().orphans.is_empty() && !has_orphans(&room.1), "both are held");
         drop((late.unwrap(), early));
+        assert!(has_orphans(&room.1) && has_orphans(&room.1), "who looks takes none up");
         let found = find(&room.1).unwrap().orphans;
         let wills: Vec<_> = found.iter().map(|orphan| orphan.will.clone().unwrap()).collect();
         assert_eq!(wills, [will(1), will(2)], "in the order in which they were left");
         assert_eq!(found[0].alive, Instant::from_nanos(77));
-        assert!(find(&room.1).unwrap().orphans.is_empty(), "who found them holds them");
+        assert!(find(&room.1).unwrap().orphans.is_empty() && !has_orphans(&room.1), "who found them holds them");
         for orphan in found {
             orphan.paper.remove();
         }
