@@ -159,7 +159,7 @@ def test_who_opens_the_port_later_halts_before_anything_else_and_says_so(shop: W
         halt = shop.wait_for(is_halt, opened)
         shop.wait_for(asks_the_state, halt.at)
         assert [said.what for said in shop.frames(opened)][:2] == [QUESTION, "010620000005"]
-        [note] = [note for note in bus.stats()["notes"] if "halt" in note]
+        [note] = [note for note in bus.stats()["wills"] if "halt" in note]
         assert note.startswith("unit 1 was told to halt, and took it: python")
         assert f"(process {owner.pid}), which ran it, is gone" in note
 
@@ -204,7 +204,7 @@ def test_another_drive_at_the_address_gets_nothing(shop: Workshop) -> None:
     opened = shop.tell("code 010D")  # a Goodrive10
     with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus:
         assert bus.read(1, 0x2103) == [0x010D]
-        assert any("another drive answers at its address now" in note for note in bus.stats()["notes"])
+        assert any("another drive answers at its address now" in note for note in bus.stats()["wills"])
         shop.wait_for(lambda said: said.kind == "frame" and said.what == QUESTION, opened)
         bus.read(1, 0x2100)
         shop.wait_for(asks_the_state, opened)
@@ -223,7 +223,7 @@ def test_what_ran_long_ago_is_not_halted_unasked(shop: Workshop) -> None:
     with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus:
         bus.read(1, 0x2100)
         shop.wait_for(asks_the_state, opened)
-        assert any("is gone for long" in note for note in bus.stats()["notes"])
+        assert any("is gone for long" in note for note in bus.stats()["wills"])
     assert not [said for said in shop.frames(opened) if said.is_halt]
     assert not will.exists()
 
@@ -254,6 +254,17 @@ def test_a_block_that_ended_leaves_nothing(shop: Workshop) -> None:
             bus.read(1, 0x2100)
         shop.wait_for(asks_the_state, killed)
     assert not [said for said in shop.frames(killed) if said.is_halt]
+
+
+def test_a_command_says_what_it_halted_unasked(shop: Workshop) -> None:
+    with program(shop, RUNS) as owner:
+        killed = kill(owner)
+    options = ["--port", shop.port, "--format", "8N1", "--profile", "gd350"]
+    done = subprocess.run(
+        [sys.executable, "-m", "drivebus", *options, "status"], capture_output=True, text=True, check=False
+    )
+    shop.wait_for(stands, killed)
+    assert f"unit 1 was told to halt, and took it: python (process {owner.pid})" in " ".join(done.stderr.split())
 
 
 ASKS_NOTHING = OPEN + 'say("open")\nsys.stdin.readline()\n'

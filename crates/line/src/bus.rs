@@ -249,6 +249,12 @@ impl Bus {
         self.shared.notes()
     }
 
+    /// What this bus did for programs that are gone, and what it could not do, in words: see
+    /// [`leave_will`](Self::leave_will).
+    pub fn wills(&self) -> Vec<String> {
+        if self.shared.is_of_this_process() { self.shared.wills.notes() } else { Vec::new() }
+    }
+
     /// To be called by each thread that works for this bus alone: it goes before the programs around it, where the
     /// system allows that; where it does not, [`notes`](Self::notes) says so. In virtual time nothing is asked for.
     pub fn enter_thread(&self) {

@@ -280,10 +280,11 @@ impl Bus {
     }
 
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (stats, notes) = py.detach(|| (self.core.stats(), self.core.notes()));
+        let (stats, notes, wills) = py.detach(|| (self.core.stats(), self.core.notes(), self.core.wills()));
         let all = counters(py, &stats.total)?;
         all.set_item("reconnects", stats.reconnects)?;
         all.set_item("notes", notes)?;
+        all.set_item("wills", wills)?;
         all.set_item("hints", stats.hints().iter().map(ToString::to_string).collect::<Vec<_>>())?;
         all.set_item("hint_names", stats.hints().iter().map(Hint::name).collect::<Vec<_>>())?;
         let programs = stats.programs.iter().map(|program| {

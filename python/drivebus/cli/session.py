@@ -151,7 +151,12 @@ class Session:
             yield self.crew.bus(port, settings)
             return
         with drivebus.Bus(port, **settings) as bus, gives_way_when_held(lambda: [bus]):
-            yield bus
+            try:
+                yield bus
+            finally:
+                # What was halted that nobody here asked for is told, whatever came of the command.
+                for done in bus.stats().wills:
+                    remark(done)
 
     @contextmanager
     def drive(self) -> Iterator[drivebus.Drive]:

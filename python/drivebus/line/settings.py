@@ -264,5 +264,6 @@ class BusFace:
         """Counters and latencies since the bus was opened, for the line and (in `units`) for each unit.
 
         `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
+        `wills` says what this bus did for programs that are gone, such as to halt what one of them ran.
         """
         return Stats(self._core().stats())

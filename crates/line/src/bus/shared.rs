@@ -317,14 +317,7 @@ impl Shared {
         }
         let late = (!self.is_virtual()).then(punctual::note).flatten();
         let shared = self.sharing.iter().flat_map(|sharing| sharing.notes());
-        notes
-            .iter()
-            .cloned()
-            .chain(shared)
-            .chain(self.wills.notes())
-            .chain(late)
-            .chain(self.priority_refused.get().cloned())
-            .collect()
+        notes.iter().cloned().chain(shared).chain(late).chain(self.priority_refused.get().cloned()).collect()
     }
 
     /// A thread that works for this line alone comes: it goes before others where it may.
