@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import functools
 import re
 import shutil
 import subprocess
@@ -163,7 +164,11 @@ OPERATIONS = [
 
 def code_of(path: Path) -> str:
     """A Rust file without its comments, its strings, and its tests at the end."""
-    text = path.read_text(encoding="utf-8")
+    return _code_of(path.read_text(encoding="utf-8"))
+
+
+@functools.cache
+def _code_of(text: str) -> str:
     text = re.sub(r"//[^\n]*", "", text)
     text = re.sub(r'"(?:\\.|[^"\\])*"', '""', text)
     return text.partition("#[cfg(test)]")[0]
@@ -176,6 +181,12 @@ def package(crate: str) -> str:
 
 def tree(root: Path, crate: str) -> list[str]:
     """What `cargo tree` prints for *crate*: itself, and what it is built from."""
+    manifests = (root / "Cargo.toml", *sorted(root.glob("crates/*/Cargo.toml")))
+    return _tree(root, crate, "".join(path.read_text(encoding="utf-8") for path in manifests))
+
+
+@functools.cache
+def _tree(root: Path, crate: str, manifests: str) -> list[str]:  # noqa: ARG001 - of these it is made
     command = ["cargo", "tree", "-p", package(crate), "-e", "normal,build", "--prefix", "none"]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -232,10 +243,21 @@ def room_findings(root: Path) -> Iterator[str]:
                 yield f"{path.relative_to(root)}: names `{match[0]}`, and not the room it comes from"
 
 
+@functools.cache
+def nodes_of(text: str) -> tuple[ast.AST, ...]:
+    """All that is in a Python file: parsed once, however many rules look at it."""
+    return tuple(ast.walk(ast.parse(text)))
+
+
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """All that is in the Python file at *path*."""
+    return nodes_of(path.read_text(encoding="utf-8"))
+
+
 def imports(path: Path, package: Path) -> Iterator[tuple[int, list[str]]]:
     """Each module of ours that *path* imports: its names below the package, or `drivebus` for the package."""
     here = list(path.relative_to(package).with_suffix("").parts)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    for node in nodes(path):
         if not isinstance(node, (ast.Import, ast.ImportFrom)):
             continue
         dotted = [alias.name for alias in node.names]
@@ -288,10 +310,11 @@ def python_findings(root: Path) -> Iterator[str]:
                     yield f"{path.relative_to(root)}:{line}: {inside[0]} must not import {file[0]}"
 
 
-def own_names(tree: ast.AST) -> set[str]:
+@functools.cache
+def own_names(nodes: tuple[ast.AST, ...]) -> set[str]:
     """The names with an underscore that a file defines: functions, classes, variables, attributes and slots."""
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             names.add(node.name)
         elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -310,12 +333,12 @@ def is_private(name: str) -> bool:
 
 def borrowed(path: Path) -> Iterator[tuple[int, str]]:
     """Each name with an underscore that *path* uses and does not define: it belongs to another file."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
-    own = own_names(tree)
-    for node in ast.walk(tree):
-        is_python = isinstance(node, ast.Attribute) and ast.unparse(node) in PYTHONS_OWN
-        if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own and not is_python:
-            yield node.lineno, node.attr
+    here = nodes(path)
+    own = own_names(here)
+    for node in here:
+        if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own:
+            if ast.unparse(node) not in PYTHONS_OWN:
+                yield node.lineno, node.attr
         elif isinstance(node, ast.ImportFrom):
             for alias in node.names:
                 if is_private(alias.name) and alias.name != "_native":
@@ -328,14 +351,14 @@ def ancestors(package: Path) -> Iterator[tuple[Path, str, int]]:
     where: dict[str, tuple[Path, str]] = {}
     for path in sorted(package.rglob("*.py")):
         module = ".".join(["drivebus", *path.relative_to(package).with_suffix("").parts])
-        tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+        here = nodes(path)
         imported = {
             alias.asname or alias.name: f"{node.module}.{alias.name}"
-            for node in ast.walk(tree)
+            for node in here
             if isinstance(node, ast.ImportFrom)
             for alias in node.names
         }
-        for node in ast.walk(tree):
+        for node in here:
             if isinstance(node, ast.ClassDef):
                 named = [ast.unparse(base).partition("[")[0] for base in node.bases]
                 bases[f"{module}.{node.name}"] = [imported.get(base, f"{module}.{base}") for base in named]
@@ -444,18 +467,22 @@ def self_test(root: Path) -> int:
     """Breaks each rule once in a copy; returns how many breaks went unnoticed."""
     unnoticed = 0
     with tempfile.TemporaryDirectory(prefix="drivebus-layers-") as folder:
-        for number, (name, old, new, expected) in enumerate(BREAKS):
-            place = Path(folder) / str(number)
-            copy(root, place)
+        place = Path(folder) / "copy"
+        copy(root, place)
+        for name, old, new, expected in BREAKS:
             path = place / name
-            text = path.read_text(encoding="utf-8") if path.exists() else '""""""\n'
+            former = path.read_text(encoding="utf-8") if path.exists() else None
+            text = '""""""\n' if former is None else former
             if old is not None and old not in text:
                 raise SystemExit(f"check_layers: self-test is out of date: {name} does not hold {old!r}")
             path.write_text(text + new if old is None else text.replace(old, new, 1), encoding="utf-8")
             noticed = any(expected in finding for finding in findings(place))
             print(f"{'noticed' if noticed else 'UNNOTICED'}: {expected}")
             unnoticed += not noticed
-            shutil.rmtree(place)
+            if former is None:
+                path.unlink()
+            else:
+                path.write_text(former, encoding="utf-8")
     return unnoticed
 
 
