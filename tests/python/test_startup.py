@@ -122,6 +122,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
                 "commands",
                 "listing",
                 "crew",
+                "held",
                 "move",
                 "names",
                 "output",
