@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import functools
 
-from drivebus import places
+from drivebus import places, rtu
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer
 from drivebus.identify.contradiction import contradiction
 from drivebus.line.protocols import KeepsWills
 from drivebus.operations.unit import Unit
+from drivebus.operations.words import as_written
 from drivebus.profile import Profile
 
 __all__ = ["LastWill"]
 
 _READ = {"coil": 0x01, "discrete": 0x02, "holding": 0x03, "input": 0x04}
-_WRITE_COIL, _WRITE_ONE, _WRITE_MANY = 0x05, 0x06, 0x10
+_WRITE_COIL = 0x05
+_ANY = 1
+"""Some unit: a PDU does not say which."""
 
 _WAYS = ("stop", "coast")
 """What halts a motor, a jog included: the first of them first."""
@@ -80,12 +83,14 @@ def _requests(profile: Profile, command: str) -> list[bytes]:
 
 def _write(profile: Profile, place: int, word: int) -> bytes:
     table, address = places.split(place)
-    at = address.to_bytes(2, "big")
     if table == "coil":
-        return bytes([_WRITE_COIL]) + at + (b"\xff\0" if word else b"\0\0")
-    if _WRITE_ONE not in profile.functions and _WRITE_MANY in profile.functions:
-        return bytes([_WRITE_MANY]) + at + b"\0\1\2" + word.to_bytes(2, "big")
-    return bytes([_WRITE_ONE]) + at + word.to_bytes(2, "big")
+        return bytes([_WRITE_COIL]) + address.to_bytes(2, "big") + (b"\xff\0" if word else b"\0\0")
+    return _pdu(rtu.encode_write(_ANY, address, as_written(profile, word)))
+
+
+def _pdu(frame: bytes) -> bytes:
+    """What of *frame* says what is meant, and neither to whom nor whether it came whole."""
+    return frame[1:-2]
 
 
 @functools.lru_cache(maxsize=16)

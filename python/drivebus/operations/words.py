@@ -10,9 +10,10 @@ from drivebus import checks, places
 from drivebus.errors import PortError, Refused
 from drivebus.line.write_guard import check_words
 from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
 from drivebus.values import State
 
-__all__ = ["explained", "read_words", "send", "write", "write_words"]
+__all__ = ["as_written", "explained", "read_words", "send", "write", "write_words"]
 
 _WRITE_ONE, _WRITE_MANY = 0x06, 0x10
 
@@ -97,6 +98,12 @@ async def write(
         return
 
 
+def as_written(profile: Profile, value: int | Sequence[int]) -> int | Sequence[int]:
+    """*value* as a request carries it: a drive that knows no 06H gets a single word by 10H."""
+    by_many = _WRITE_ONE not in profile.functions and _WRITE_MANY in profile.functions
+    return [value] if by_many and isinstance(value, int) else value
+
+
 async def send(
     unit: Unit,
     address: int,
@@ -110,14 +117,10 @@ async def send(
 ) -> bool:
     """Writes to whatever unit answers at the address: for a stop, which asks nothing before.
 
-    A drive that knows no 06H gets a single word by 10H.
-
     Returns:
         Whether the drive confirmed it; False where it only said that it took it and is still at it.
     """
-    functions = unit.profile.functions
-    if isinstance(value, int) and _WRITE_ONE not in functions and _WRITE_MANY in functions:
-        value = [value]
+    value = as_written(unit.profile, value)
     # What a bus of somebody's own need not know: only a raw write is ever forced, and only a halt is in a hurry.
     rest: dict[str, Any] = {"force": True} if force else {}
     rest |= {} if timeout is None else {"timeout": timeout}
