@@ -111,6 +111,11 @@ SAYS = {
 ASKED_FOR_NO_CODE = ["ms300"]
 """Families that have something else where others have a code: what stands there is not asked for, since it is none."""
 
+SMALL, LARGE = ["chf100a", "chv100", "saj8000m"], ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier"]
+
+HELD_BACK = {"gd600": SMALL, "gd3000": SMALL, "chf100a": LARGE, "saj8000m": LARGE}
+"""What nothing speaks against, while the state that comes is one of another family: nothing is written to it either."""
+
 PAIRS = [(named, unit) for named in TAKEN_FOR for unit in TAKEN_FOR]
 
 every_pair = pytest.mark.parametrize(("named", "unit"), PAIRS)
@@ -166,6 +171,12 @@ def test_the_table_has_every_family() -> None:
 def test_what_is_contradicted_gets_nothing(named: str, unit: str) -> None:
     with line_with(unit) as simulator, Bus(simulator) as bus:
         drive = bus.drive(1, named)
+        if unit in HELD_BACK.get(named, ()):
+            with pytest.raises(NotAllowed, match=rf"unit 1 was named {named}.*nothing was written.*"):
+                drive.write_words(0x0114, 50)
+            assert written(simulator) == []
+            assert drive.contradiction() is None
+            return
         if unit in TAKEN_FOR[named]:
             # Another one may refuse it; that is the drive's own word, and not held back here.
             with suppress(drivebus.Refused):
@@ -321,25 +332,20 @@ class TestWhatTellsNothing:
         bus.drive(1, "gd350").write("P00.11", 2.0)
         assert len(written(simulator)) == 1
 
-    def test_a_drive_that_is_unlocked_is_asked_again(self, gd300: tuple[Simulator, Bus]) -> None:
-        simulator, bus = gd300
-        drive = bus.drive(1, "gd350")
-        refuse(simulator, 0x09)
-        drive.write_words(0x000B, 20)
-        with pytest.raises(NotAllowed, match="reports 010AH"):
-            drive.write_words(0x000B, 30)
-        assert len(written(simulator)) == 1
-
     @pytest.mark.parametrize("exception", [0x06, 0x09, 0x0A, 0x0B])
     def test_a_refusal_that_passes_is_not_the_last_word(self, gd300: tuple[Simulator, Bus], exception: int) -> None:
-        """06H: it was busy, or the request came damaged; 0AH and 0BH come from a gateway. Modbus V1.1b3, section 7."""
+        """06H: it was busy, or the request came damaged; 0AH and 0BH come from a gateway. Modbus V1.1b3, section 7.
+
+        09H: a password locks it. Where the word would be kept by another family it is asked once more, and says GD300.
+        """
         simulator, bus = gd300
         drive = bus.drive(1, "gd350")
         refuse(simulator, exception)
-        drive.write_words(0x000B, 20)
+        with pytest.raises(NotAllowed, match="it may be INVT Goodrive300"):
+            drive.write_words(0x000B, 20)
         with pytest.raises(NotAllowed, match="reports 010AH"):
             drive.write_words(0x000B, 30)
-        assert len(written(simulator)) == 1
+        assert written(simulator) == []
 
     def test_a_damaged_request_is_not_the_last_word_of_a_vfd500(self, vfd500: tuple[Simulator, Bus]) -> None:
         """03H is a frame error there. VFD500 manual, p. 133."""
@@ -372,12 +378,12 @@ class TestWhatTellsNothing:
         simulator, bus = gd300
         drive = bus.drive(1, "gd350")
         simulator.line.script([(1, "silence")])
-        drive.write_words(0x000B, 20)
-        assert len(written(simulator)) == 1
-        # It did not tell then, and is asked the next time.
+        with pytest.raises(NotAllowed, match="it may be INVT Goodrive300"):
+            drive.write_words(0x000B, 20)
+        # It did not tell all that it is asked, and is asked the next time.
         with pytest.raises(NotAllowed, match="reports 010AH"):
             drive.write_words(0x000B, 30)
-        assert len(written(simulator)) == 1
+        assert written(simulator) == []
 
 
 class TestWhatTells:
@@ -522,7 +528,7 @@ class TestCommandLine:
     def test_a_write_ends_with_2_and_says_why(self, named: str, unit: str) -> None:
         """`raw` sends what it is told; `write` of a word that has no name is what every family can be told."""
         result = at(unit, "--profile", named, "write", "--force", "0x0FFE=1", "--yes")
-        if unit in TAKEN_FOR[named]:
+        if unit in TAKEN_FOR[named] and unit not in HELD_BACK.get(named, ()):
             assert result.exit_code == 4, result.output  # there is nothing at that address
             return
         assert result.exit_code == 2, result.output

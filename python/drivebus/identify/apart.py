@@ -71,24 +71,29 @@ class Apart:
         self._answers[answer.address] = answer
         return True
 
-    def verdict(self, command: str) -> Verdict:
-        """What to ask, or as what to halt the unit by *command*."""
+    def verdict(self, what: str | int) -> Verdict:
+        """What to ask, or as what to take the unit.
+
+        Args:
+            what: The command that it is to be halted by, or the place that a word is to be written to. As what a unit
+                is taken that is written to, matters only for whether that one keeps the word, or starts by it.
+        """
         named = self._named
         live = [profile for profile in self._families if self._is_live(profile)]
         if self.shows_named:
-            return self._between(named, self._rivals(named, live, command))
+            return self._between(named, self._rivals(named, live, what))
         if named in live and (place := self._next_of(named)) is not None:
             return Verdict(ask=place)
         shown = [profile for profile in live if profile is not named and self._is_shown(profile)]
         if shown:
-            return self._one_of(shown, live, command)
+            return self._one_of(shown, live, what)
         for profile in live:
             # Of a family that an answer does not fit, no more is asked.
             if profile is not named and self._explains(profile, by_rule=True):
                 place = self._next_of(profile)
                 if place is not None:
                     return Verdict(ask=place)
-        if named in live or self._trusted:
+        if self._trusted or (named in live and (isinstance(what, str) or self._has_words)):
             return Verdict(take=named)
         return Verdict(others=tuple(profile for profile in live if profile.commands()))
 
@@ -96,17 +101,23 @@ class Apart:
         """The verdict on a unit that shows *taken*, where *rivals* could say the same and would take harm."""
         for rival in rivals:
             place = self._telling(taken, rival)
+            if place is None and not self._is_told(taken):
+                # Nothing but a state speaks for it: then the other one may show itself.
+                place = self._next_of(rival)
             if place is not None:
                 return Verdict(ask=place)
         rivals = [rival for rival in rivals if self._is_shown(rival)]
         return Verdict(others=(taken, *rivals)) if rivals else Verdict(take=taken)
 
-    def _one_of(self, shown: list[Profile], live: list[Profile], command: str) -> Verdict:
+    def _one_of(self, shown: list[Profile], live: list[Profile], what: str | int) -> Verdict:
         """The verdict on a unit that does not show what it was named as, and shows the families *shown*."""
         if len(shown) > 1 and (place := self._telling(*shown[:2])) is not None:
             return Verdict(ask=place)
+        if isinstance(what, int):
+            others = tuple(each for each in shown if harms(each, self._named, what))
+            return Verdict(others=others) if others else Verdict(take=shown[0])
         for taken in shown:
-            halt = halt_of(taken, command)
+            halt = halt_of(taken, what)
             if halt is None:
                 continue
             verdict = self._between(taken, self._rivals(taken, live, halt))
@@ -114,16 +125,21 @@ class Apart:
                 return verdict
         return Verdict(others=tuple(shown))
 
-    def _rivals(self, taken: Profile, live: list[Profile], command: str) -> list[Profile]:
-        """The families that could have answered the same as *taken*, and that *command* of it is not for.
+    def _rivals(self, taken: Profile, live: list[Profile], what: str | int) -> list[Profile]:
+        """The families that could have answered the same as *taken*, and that *what* is sent to it is not for.
 
         A code and a signature say which family it is, so that only those count which would take harm. A state alone
         says little: whoever halts by other words counts.
         """
         others = [each for each in live if each is not taken and self._explains(each)]
-        if self._is_told(taken):
-            return [each for each in others if harms(each, taken, command)]
+        if isinstance(what, int) or self._is_told(taken):
+            return [each for each in others if harms(each, taken, what)]
         return [each for each in others if not _halts_alike(each, taken)]
+
+    @property
+    def _has_words(self) -> bool:
+        """Whether the unit answered any question, and did not refuse them all."""
+        return any(answer.word is not None for answer in self._answers.values())
 
     def _is_live(self, profile: Profile) -> bool:
         """Whether nothing that was heard speaks against *profile*."""

@@ -11,11 +11,15 @@ from collections.abc import Iterable
 
 from drivebus import places
 from drivebus.profile import Profile, profiles
+from drivebus.values import Description
 
 __all__ = ["HALTS", "families", "halt_of", "harmed", "harms"]
 
 HALTS = ("stop", "coast", "jog_stop")
 """The commands that end a motion, in the order of who else may stand in for one that a family lacks."""
+
+_BIT_OF = {"ram": False, "eeprom": True}
+"""Whether the bit of an address that has one for RAM or EEPROM is set where EEPROM keeps the word."""
 
 
 def families(own: Profile) -> tuple[Profile, ...]:
@@ -32,18 +36,26 @@ def halt_of(profile: Profile, command: str) -> str | None:
     return next((name for name in (command, "stop", "coast") if name in known), None)
 
 
-@functools.lru_cache(maxsize=512)
-def harmed(named: Profile, command: str) -> tuple[Profile, ...]:
-    """The families that *command* of *named* would do harm to; none where it has no such command."""
-    if command not in named.commands():
+@functools.lru_cache(maxsize=4096)
+def harmed(named: Profile, what: str | int) -> tuple[Profile, ...]:
+    """The families that *what* is written to a unit of *named* would do harm to; none where it has no such command."""
+    if isinstance(what, str) and what not in named.commands():
         return ()
-    return tuple(profile for profile in families(named) if profile is not named and harms(profile, named, command))
+    return tuple(profile for profile in families(named) if profile is not named and harms(profile, named, what))
 
 
-def harms(profile: Profile, named: Profile, command: str) -> bool:
-    """Whether one of the words that *command* of *named* is made of does harm to a unit of *profile*."""
-    words: Iterable[tuple[int, int] | None] = (named.command_first(command), named.command(command))
-    return any(_does_harm(profile, *each, command) for each in words if each is not None)
+def harms(profile: Profile, named: Profile, what: str | int) -> bool:
+    """Whether *what* is written to a unit of *named* does harm to one of *profile*.
+
+    Args:
+        profile: The family that the unit may be of.
+        named: The family that it was named as.
+        what: A command of *named*, or a place that any word may be written to.
+    """
+    if isinstance(what, int):
+        return _starts_or_keeps(profile, what)
+    words: Iterable[tuple[int, int] | None] = (named.command_first(what), named.command(what))
+    return any(_does_harm(profile, *each, what) for each in words if each is not None)
 
 
 @functools.lru_cache(maxsize=8192)
@@ -52,18 +64,53 @@ def _does_harm(profile: Profile, place: int, word: int, command: str) -> bool:
 
     At a command register whatever is no halt of the family counts: nobody prints what each other code does.
     """
-    table, address = places.split(place)
-    plain = profile.plain_address(address) if table == "holding" else place
-    for each in {place, plain}:
-        if each in profile.command_registers() or profile.is_command(each):
+    for each in _both(profile, place):
+        if _commands(profile, each):
             same = (command,) if command not in HALTS else HALTS
             known = [profile.command(name) for name in same if name in profile.commands()]
             return (place, word) not in known
-    for each in {place, plain}:
-        name = profile.name_at(each, written=True)
-        if name is not None:
-            return profile.describe(name).access != "ro"
-    return table == "holding" and plain >> 8 in profile.parameter_groups()
+    row = _row(profile, place)
+    return _may_have_parameter(profile, place) if row is None else row.access != "ro"
+
+
+@functools.lru_cache(maxsize=65536)
+def _starts_or_keeps(profile: Profile, place: int) -> bool:
+    """Whether a word written to *place* may start a unit of *profile*, or is kept in its EEPROM."""
+    if any(_commands(profile, each) for each in _both(profile, place)):
+        return True
+    row = _row(profile, place)
+    is_parameter = (
+        _may_have_parameter(profile, place) if row is None else row.kind == "parameter" and row.access != "ro"
+    )
+    memory = profile.memory()
+    if not is_parameter or memory is None:
+        return is_parameter
+    return bool(place >> memory["bit"] & 1) is _BIT_OF[memory["means"]]
+
+
+def _both(profile: Profile, place: int) -> tuple[int, ...]:
+    """*place*, and where it is read if it has the bit that says where a parameter is kept."""
+    table, address = places.split(place)
+    plain = profile.plain_address(address) if table == "holding" else place
+    return (place,) if plain == place else (place, plain)
+
+
+def _commands(profile: Profile, place: int) -> bool:
+    """Whether units of *profile* take commands at *place*."""
+    return place in profile.command_registers() or profile.is_command(place)
+
+
+def _row(profile: Profile, place: int) -> Description | None:
+    """What *profile* knows to be written at *place*; None where it has no row."""
+    names = (profile.name_at(each, written=True) for each in _both(profile, place))
+    name = next(filter(None, names), None)
+    return None if name is None else profile.describe(name)
+
+
+def _may_have_parameter(profile: Profile, place: int) -> bool:
+    """Whether *place* is where units of *profile* have parameters, by the rule of their addresses."""
+    table, _ = places.split(place)
+    return table == "holding" and _both(profile, place)[-1] >> 8 in profile.parameter_groups()
 
 
 @functools.cache

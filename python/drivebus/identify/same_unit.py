@@ -58,7 +58,7 @@ class SameUnit:
         self._words, self._probes = _questions(profile)
         self._identity = record.identity(profile, bus.reconnects)
         if code is not None:
-            self._identity.known, self._identity.contradicts = _hex(code), False
+            self._identity.known, self._identity.spoke, self._identity.contradicts = _hex(code), True, False
             self._identity.is_sure = self._is_told([Answer(address, code, None) for address in self._words])
 
     def is_sure(self, bus: AwaitableBus) -> bool:
@@ -67,11 +67,22 @@ class SameUnit:
         return known.is_sure and not known.contradicts and known.connection == bus.reconnects
 
     def is_known(self, bus: AwaitableBus) -> bool:
-        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name."""
+        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name.
+
+        One that refused all that said nothing: any unit may.
+        """
         known = self._identity
-        return (
-            (known.is_sure or known.known is not None) and not known.contradicts and known.connection == bus.reconnects
-        )
+        is_told = known.is_sure or (known.known is not None and known.spoke)
+        return is_told and not known.contradicts and known.connection == bus.reconnects
+
+    def is_harmless(self, bus: AwaitableBus, place: int) -> bool:
+        """Whether a word at *place* was found to do no harm to it, over the connection that *bus* has."""
+        return place in self._identity.harmless and self._identity.connection == bus.reconnects
+
+    def found_harmless(self, bus: AwaitableBus, place: int) -> None:
+        """A word at *place* does it no harm, for as long as the port stays open: by what it answered."""
+        if self._identity.connection == bus.reconnects:
+            self._identity.harmless.add(place)
 
     def settle(self, bus: AwaitableBus) -> None:
         """Takes it for surely what it was named as, for as long as the port stays open: by what else it answered."""
@@ -116,6 +127,7 @@ class SameUnit:
             self._compare(answers, failure, known)
         if opened != self._identity.connection:
             self._identity.connection, self._identity.is_sure = opened, self._is_told(answers)
+            self._identity.harmless.clear()
         return opened
 
     def _judge(self, answers: Sequence[Answer], complete: bool, judged: bool, against: str | None) -> None:
@@ -126,6 +138,8 @@ class SameUnit:
         known = self._identity
         known.contradicts = against is not None
         known.known = self._told(answers) if complete and not self._put_off(answers) else None
+        # Of some families no document prints a word that they answer, so that a refusal is all there is.
+        known.spoke = any(answer.word is not None for answer in answers) or not _may_be_shown(self._profile)
         known.is_sure = against is None and known.known is not None and self._is_told(answers)
         if against is not None and judged:
             raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
@@ -221,6 +235,11 @@ def _questions(profile: Profile) -> tuple[Sequence[int], Sequence[int]]:
     # What the profile has there itself is no code.
     others = [address for address in codes.registers() if profile.name_at(address) is None]
     return (), (*others, *asked)
+
+
+def _may_be_shown(profile: Profile) -> bool:
+    """Whether there is a word by which a unit of *profile* shows what it is."""
+    return codes.is_listed(profile) or signature_of(profile) is not None or profile.role("state") is not None
 
 
 def _hex(code: int) -> str:

@@ -27,14 +27,18 @@ class Identity:
     Attributes:
         connection: The `reconnects` of the line when that was heard.
         known: Its answers, as they are compared with later ones; None while it has not told all of them.
+        spoke: Whether they tell anything: that it refuses whatever it is asked, any unit may say.
         contradicts: Whether they speak against the profile.
         is_sure: Whether they leave no other family that one of its halts could start.
+        harmless: The places that no family which it may be keeps words of, or starts by.
     """
 
     connection: int
     known: str | None = None
+    spoke: bool = False
     contradicts: bool = False
     is_sure: bool = False
+    harmless: set[int] = field(default_factory=set)
 
 
 @dataclass(slots=True, eq=False)

@@ -11,13 +11,13 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed
 from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.harm import halt_of, harmed, harms
 from drivebus.operations.unit import Unit
-from drivebus.profile import Profile
+from drivebus.profile import Profile, profiles
 
 __all__ = ["ANSWER_WITHIN", "Aim", "Target", "check_harmless", "goes_out_at_once"]
 
@@ -99,36 +99,63 @@ class Aim:
         return Target(unit.taken_for(profile), halt)
 
 
-def goes_out_at_once(unit: Unit, command: str) -> bool:
-    """Whether nothing is asked before *command*: the line has identified the unit, or the word harms no family.
+def goes_out_at_once(unit: Unit, what: str | int) -> bool:
+    """Whether nothing is asked before *what*: the line has identified the unit, or it harms no family.
 
-    Where a name is said to be meant, only what the unit itself shows counts.
+    Where a name is said to be meant, only what the unit itself shows counts for a command. What speaks against a name
+    is known of the shipped families alone: a unit of somebody's own one has to show it.
+
+    Args:
+        unit: The unit, as it was named.
+        what: A command, or a place that any word may be written to.
     """
     identity, bus = unit.identity, unit.bus
-    is_identified = identity.is_sure(bus) or (identity.is_known(bus) and not identity.trusted)
-    return is_identified or not harmed(unit.profile, command)
+    if identity.is_sure(bus):
+        return True
+    if isinstance(what, int) and (identity.trusted or identity.is_harmless(bus, what)):
+        return True
+    is_known = identity.is_known(bus) and not identity.trusted and unit.profile.family in profiles()
+    return is_known or not harmed(unit.profile, what)
 
 
-async def check_harmless(unit: Unit, command: str) -> None:
-    """Makes sure that *command*, which does not halt, is not sent to a unit of a family that it would do harm to.
+async def check_harmless(unit: Unit, what: str | int) -> None:
+    """Makes sure that *what* is not sent to a unit of a family that it would do harm to.
 
     Sends reads, and only where the line has not identified the unit.
 
+    Args:
+        unit: The unit, as it was named.
+        what: A command that does not halt, or a place that any word may be written to.
+
     Raises:
         NotAllowed: It shows such a family, or may be one. Nothing was written.
-        NoAnswer, BadAnswer, PortError: The line failed; nothing was written.
+        NoAnswer, BadAnswer, PortError: The line failed, or the unit is busy; nothing was written.
     """
-    if goes_out_at_once(unit, command):
+    if goes_out_at_once(unit, what):
         return
     apart = Apart(unit.profile, trusted=unit.identity.trusted)
     for _ in range(_QUESTIONS):
-        verdict = apart.verdict(command)
+        verdict = apart.verdict(what)
         if verdict.ask is None:
             taken = verdict.take
-            if taken is not None and (taken is unit.profile or not harms(taken, unit.profile, command)):
-                return
-            raise _another(unit, verdict.others if taken is None else (taken,))
-        if not apart.heard(await answer_at(unit.bus.read, unit.address, verdict.ask)):
+            if taken is None or (taken is not unit.profile and harms(taken, unit.profile, what)):
+                raise _another(unit, verdict.others if taken is None else (taken,))
+            if isinstance(what, int):
+                # Whoever would take harm from some word there, would from none that halts.
+                if apart.shows_named and unit.profile.is_command(what):
+                    unit.identity.settle(unit.bus)
+                unit.identity.found_harmless(unit.bus, what)
+            return
+        try:
+            answer = await answer_at(unit.bus.read, unit.address, verdict.ask)
+        except LINE_ERRORS as error:
+            # `started` stays None: of what was to follow, nothing left.
+            raise type(error)(
+                f"unit {unit.address} does not say what it is ({error}); nothing was written to it",
+                unit=unit.address,
+                raw=error.raw,
+            ) from error
+        if not apart.heard(answer):
             break
     raise _another(unit, ())
 

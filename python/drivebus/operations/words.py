@@ -9,6 +9,7 @@ from typing import Any
 from drivebus import checks, places
 from drivebus.errors import PortError, Refused
 from drivebus.line.write_guard import check_words
+from drivebus.operations.aim import check_harmless
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import State
@@ -80,7 +81,7 @@ async def write(
     not take it, it is sent again. With *read_back* the bus does that, and looks first.
     """
     again = 0 if absolute and read_back is None else _AGAIN
-    connection = await unit.identity.check(unit.bus, judged=judged)
+    connection = await _made_sure(unit, address, judged)
     while True:
         try:
             await send(unit, address, value, read_back=read_back, connection=connection, force=force)
@@ -88,7 +89,7 @@ async def write(
             if error.started is not None or unit.bus.reconnects == connection:
                 raise
             # A port that was lost is opened by what comes next. That was refused, to see first who answers there.
-            connection = await unit.identity.check(unit.bus, judged=judged)
+            connection = await _made_sure(unit, address, judged)
             await send(unit, address, value, read_back=read_back, connection=connection, force=force)
         except Refused as error:
             if again >= _AGAIN or error.means != "ask_again":
@@ -96,6 +97,14 @@ async def write(
             again += 1
             continue
         return
+
+
+async def _made_sure(unit: Unit, address: int, judged: bool) -> int:
+    """The connection over which the unit is what it was, and, where that is *judged*, takes no harm at *address*."""
+    connection = await unit.identity.check(unit.bus, judged=judged)
+    if judged:
+        await check_harmless(unit, address)
+    return connection
 
 
 def as_written(profile: Profile, value: int | Sequence[int]) -> int | Sequence[int]:
