@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 
 import drivebus
 import drivebus.aio
-from drivebus import Bus, Identification, NotAllowed, Simulator
+from drivebus import Bus, DrivebusError, Identification, NotAllowed, Simulator
 from drivebus.identify import codes, identify
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
@@ -359,3 +360,15 @@ def test_one_that_a_password_locks_says_what_to_do(bus: Bus) -> None:
     bus.drive(1).write("P07.00", 12, store=True, unverified=True)
     with pytest.raises(NotAllowed, match=r"refuses 2103H \(exception 09H.*user password.*at the keypad"):
         bus.drive(1)
+
+
+@pytest.mark.parametrize("family", ["gd350", "vfd500", "ms300", "a1000", "eds300", "sunfar-e300", "atv312", "acs355"])
+def test_one_that_was_identified_is_halted_by_the_first_frame(family: str) -> None:
+    """Also where no code says what it is, and its answers did: they are not asked for twice."""
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, unverified=True)
+        seen = len(simulator.line.trace())
+        with suppress(DrivebusError):
+            drive.stop()
+        first = next(frame for _, who, frame in simulator.line.trace()[seen:] if who == "master")
+        assert first[1] in (0x05, 0x06, 0x10), first.hex()

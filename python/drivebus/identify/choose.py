@@ -13,6 +13,7 @@ from drivebus.identify.families import one_of, shipped
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Identification
 from drivebus.line.protocols import AwaitableBus
+from drivebus.line.units import units_of
 from drivebus.profile import Profile, profiles
 
 __all__ = ["profile_of", "usable"]
@@ -33,9 +34,14 @@ async def profile_of(
         )
     code: int | None = None
     if profile is None:
+        connection = bus.reconnects
         read = functools.partial(bus.read, urgent=True) if checks.flag("urgent", urgent) else bus.read
         found = await identify(read, unit)
         known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code
+        if found.certainty == "by answers":
+            # The whole signature of that family and of no other: a halt need not ask for it again.
+            said = units_of(getattr(bus, "line", bus)).record(unit).identity(known, connection)
+            said.is_sure, said.heard = True, bus.now()
     else:
         known = Profile.find(profile)
     return known if variants is None else known.with_variants(variants), code

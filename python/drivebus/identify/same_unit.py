@@ -27,6 +27,9 @@ from drivebus.profile import Profile
 
 __all__ = ["SameUnit"]
 
+_HOLDS = 10.0
+"""Seconds of the line's clock for which a halt trusts that nobody has put another drive at the address."""
+
 
 class SameUnit:
     """Makes sure that the unit at an address is what it was named as, and still the one it was.
@@ -59,6 +62,7 @@ class SameUnit:
         self._identity = record.identity(profile, bus.reconnects)
         if code is not None:
             self._identity.known, self._identity.spoke, self._identity.contradicts = _hex(code), True, False
+            self._identity.heard = bus.now()
             self._identity.is_sure = self._is_told([Answer(address, code, None) for address in self._words])
 
     def is_sure(self, bus: AwaitableBus) -> bool:
@@ -87,7 +91,17 @@ class SameUnit:
     def settle(self, bus: AwaitableBus) -> None:
         """Takes it for surely what it was named as, for as long as the port stays open: by what else it answered."""
         if self._identity.connection == bus.reconnects:
-            self._identity.is_sure = True
+            self._identity.is_sure, self._identity.heard = True, bus.now()
+
+    def is_old(self, bus: AwaitableBus) -> bool:
+        """Whether what it said of itself was said so long ago that another drive may have taken its place unseen."""
+        heard = self._identity.heard
+        return heard is None or bus.now() - heard > _HOLDS
+
+    def is_another(self) -> None:
+        """It showed that it is not what it was named as, over whatever connection: that is asked again."""
+        self._identity.contradicts, self._identity.is_sure = True, False
+        self._identity.harmless.clear()
 
     async def check(self, bus: AwaitableBus, *, judged: bool = True, urgent: bool = False) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
@@ -125,6 +139,7 @@ class SameUnit:
             self._judge(answers, failure is None, judged or other is not None, against or other)
         else:
             self._compare(answers, failure, known)
+        self._identity.heard = bus.now()
         if opened != self._identity.connection:
             self._identity.connection, self._identity.is_sure = opened, self._is_told(answers)
             self._identity.harmless.clear()
@@ -179,10 +194,13 @@ class SameUnit:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
         answers: list[Answer] = []
         await self._ask(bus, answers, urgent)
+        self._identity.heard = bus.now()
         against = contradiction(self._profile, self._unit, answers) or await self._other(bus, answers, urgent)
         if against is None and self._identity.known is None:
             self._identity.connection = bus.reconnects
             self._judge(answers, True, False, None)
+        elif against is not None:
+            self.is_another()
         return against
 
     async def _other(self, bus: AwaitableBus, answers: Sequence[Answer], urgent: bool) -> str | None:

@@ -27,6 +27,7 @@ class Identity:
     Attributes:
         connection: The `reconnects` of the line when that was heard.
         known: Its answers, as they are compared with later ones; None while it has not told all of them.
+        heard: When it answered last, on the line's clock; None if nobody noted that.
         spoke: Whether they tell anything: that it refuses whatever it is asked, any unit may say.
         contradicts: Whether they speak against the profile.
         is_sure: Whether they leave no other family that one of its halts could start.
@@ -35,6 +36,7 @@ class Identity:
 
     connection: int
     known: str | None = None
+    heard: float | None = None
     spoke: bool = False
     contradicts: bool = False
     is_sure: bool = False

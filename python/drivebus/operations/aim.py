@@ -52,10 +52,12 @@ class Aim:
         self._apart = Apart(unit.profile, trusted=unit.identity.trusted)
         self._doubted = False
 
-    def doubt(self) -> None:
-        """Whether it is what it was halted as is in doubt: what it says now decides, and silence says nothing."""
-        if not self._doubted:
-            self._apart, self._doubted = Apart(self._unit.profile, trusted=self._unit.identity.trusted), True
+    def doubt(self) -> bool:
+        """Puts in doubt what it was halted as: what it says now decides, and silence says nothing. False if it was."""
+        if self._doubted:
+            return False
+        self._apart, self._doubted = Apart(self._unit.profile, trusted=self._unit.identity.trusted), True
+        return True
 
     async def take(self, command: str) -> Target | None:
         """As what to halt the unit by *command*, or None where it did not say yet.

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
+from drivebus.identify.harm import harmed
 from drivebus.operations import commands, state, words
 from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
 from drivebus.operations.unit import Unit
@@ -126,11 +127,54 @@ class Halt:
         try:
             await self.until_taken()
         except NotAllowed as error:
-            raise Unconfirmed(
-                f"{self.command} was sent to unit {unit.address} and taken; but {against}, and {error}. "
-                f"{commands.MAY[self.command]}",
-                unit=unit.address,
-            ) from error
+            raise self._is_another(f"{against}, and {error}") from error
+
+    async def vouch_anew(self) -> bool:
+        """Whether it was halted once more, as another family: it does not show the halt, and shows that family now.
+
+        A port that stayed open may have another drive behind it, whatever the line knew of the one before. It is asked
+        once, and waits for nothing.
+
+        Raises:
+            Unconfirmed: What it is now cannot be told, but that it is not what was halted: the motor may still turn.
+            Refused, NoAnswer, BadAnswer, PortError: As for `until_taken`.
+        """
+        if not self._aim.doubt():
+            return False
+        try:
+            target = await self._aim.take(self.command)
+        except PortError:
+            return False
+        except NotAllowed as error:
+            raise self._is_another(str(error)) from error
+        if target is None or target.unit.profile is self.unit.profile:
+            return False
+        self.unit.identity.is_another()
+        self.is_taken, self._until = False, self.unit.bus.now() + self._within
+        await self.until_taken()
+        return True
+
+    async def was_another(self) -> bool:
+        """Whether it was halted once more, as another family, although it showed the halt: in the words of that one.
+
+        Asks nothing of a unit that said lately what it is, nor where the halt does no harm to any family.
+        """
+        unit = self.unit
+        if not unit.identity.is_old(unit.bus) or not harmed(unit.profile, self.command):
+            return False
+        try:
+            against = await unit.identity.contradiction(unit.bus, urgent=True)
+        except LINE_ERRORS:
+            # What it showed stands: nothing speaks against it.
+            return False
+        return against is not None and await self.vouch_anew()
+
+    def _is_another(self, what: str) -> Unconfirmed:
+        unit = self.unit
+        return Unconfirmed(
+            f"{self.command} was sent to unit {unit.address} and taken; but {what}. {commands.MAY[self.command]}",
+            unit=unit.address,
+        )
 
     async def _contradiction(self) -> str | None:
         """What the unit says against its name; asked for until it is answered, for as long as a halt is sent."""

@@ -236,18 +236,21 @@ async def _halt(unit: Unit, command: str, confirm: float, within: float, *, coas
     unit.evidence.commands(command)
     can_coast = coasts and unit.evidence.unusable("coast") is None
     halt = Halt(unit, (command, command, command, "coast") if can_coast else (command,), within)
+    await halt.until_taken()
     while True:
-        await halt.until_taken()
+        proof = await prove(halt, confirm)
         try:
-            proof = await prove(halt, confirm)
             while not await proof.look():
                 await unit.bus.sleep(proof.pause)
         except Unconfirmed:
-            # What was only acknowledged may not have been carried out.
-            if halt.is_confirmed or halt.is_over:
+            if not halt.is_confirmed and not halt.is_over:
+                # What was only acknowledged may not have been carried out.
+                await halt.until_taken()
+            elif not await halt.vouch_anew():
                 raise
         else:
-            return
+            if confirm == 0.0 or not await halt.was_another():
+                return
 
 
 async def prove(halt: Halt, within: float) -> commands.Proof:

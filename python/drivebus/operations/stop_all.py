@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, NotStopped
+from drivebus.errors import DrivebusError, NotAllowed, NotStopped, Unconfirmed
 from drivebus.operations import commands, motion
 from drivebus.operations.aim import goes_out_at_once
 from drivebus.operations.halting import WITHIN, Halt
@@ -40,7 +40,15 @@ class _Stop:
 
     async def _next(self) -> bool:
         if self._proof is not None:
-            return await self._proof.look()
+            try:
+                if not await self._proof.look():
+                    return False
+                if self._confirm == 0.0 or not await self._halt.was_another():
+                    return True
+            except Unconfirmed:
+                if not await self._halt.vouch_anew():
+                    raise
+            self._proof = None
         if self._halt.is_taken:
             self._proof = await motion.prove(self._halt, self._confirm)
             return False
