@@ -20,7 +20,6 @@ __all__ = [
     "ALL",
     "FAMILIES",
     "MOTIONS",
-    "NOT_YET",
     "WAYS",
     "Case",
     "Judge",
@@ -58,9 +57,6 @@ WAYS = {
 
 HEEDS_MEMORY = ("stop", "coast", "stop_all")
 """What the command line tells a unit as the family that it was when it was asked last."""
-
-NOT_YET = [("chf100a", named) for named in ("gd600", "gd3000")]
-"""A unit, and what it is taken for once it was asked what it is, though it refused each word that it was asked."""
 
 MOTIONS = ("at rest", "forward", "reverse", "tripped")
 TURNING = ("forward", "reverse")
@@ -104,17 +100,12 @@ class Case(NamedTuple):
         """What it does before it is told: nothing starts in a fault, so a block is begun before that."""
         return "at rest" if self.is_block and self.motion == "tripped" else self.motion
 
-    @property
-    def is_not_yet_told_apart(self) -> bool:
-        """Whether what is wrong with it is known."""
-        return self.known == "identified" and (self.family, self.named) in NOT_YET
-
 
 def cases(family: str, by: str) -> list[Case]:
     """All cases of a unit of *family* that is told by *by*."""
     of_it = Profile.builtin(family).commands()
     halts, ways_to_know = WAYS[by]
-    every = [
+    return [
         Case(family, named, halt, by, known, motion)
         for motion in MOTIONS
         if motion not in TURNING or of_it
@@ -127,7 +118,6 @@ def cases(family: str, by: str) -> list[Case]:
         # The command line identifies what nobody named: as what it is, and none of those of which it only knows.
         if (by, known) != ("command line", "identified") or (named == family and halt != "stop_all")
     ]
-    return [case for case in every if not case.is_not_yet_told_apart]
 
 
 def sample(family: str, by: str) -> list[Case]:

@@ -67,11 +67,13 @@ class SameUnit:
         return known.is_sure and not known.contradicts and known.connection == bus.reconnects
 
     def is_known(self, bus: AwaitableBus) -> bool:
-        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name."""
+        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name.
+
+        Who refused every word that the profile has says nothing against the name, and nothing for it.
+        """
         known = self._identity
-        return (
-            (known.is_sure or known.known is not None) and not known.contradicts and known.connection == bus.reconnects
-        )
+        told = known.is_sure or (known.known is not None and not known.is_bare)
+        return told and not known.contradicts and known.connection == bus.reconnects
 
     def settle(self, bus: AwaitableBus) -> None:
         """Takes it for surely what it was named as, for as long as the port stays open: by what else it answered."""
@@ -127,6 +129,8 @@ class SameUnit:
         known.contradicts = against is not None
         known.known = self._told(answers) if complete and not self._put_off(answers) else None
         known.is_sure = against is None and known.known is not None and self._is_told(answers)
+        own = [answer.word for answer in answers if self._profile.name_at(answer.address) is not None]
+        known.is_bare = bool(own) and all(word is None for word in own)
         if against is not None and judged:
             raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
 

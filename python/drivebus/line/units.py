@@ -29,12 +29,14 @@ class Identity:
         known: Its answers, as they are compared with later ones; None while it has not told all of them.
         contradicts: Whether they speak against the profile.
         is_sure: Whether they leave no other family that one of its halts could start.
+        is_bare: Whether it refused all that it was asked of the words that the profile has, and so showed nothing.
     """
 
     connection: int
     known: str | None = None
     contradicts: bool = False
     is_sure: bool = False
+    is_bare: bool = False
 
 
 @dataclass(slots=True, eq=False)
