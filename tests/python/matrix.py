@@ -97,8 +97,9 @@ class Case(NamedTuple):
 
     @property
     def before(self) -> str:
-        """What it does before it is told: nothing starts in a fault, so a block is begun before that."""
-        return "at rest" if self.is_block and self.motion == "tripped" else self.motion
+        """What it does before it is told: nothing starts in a fault, so a block of a program is begun before that."""
+        begins_before = self.is_block and self.by != "command line" and self.motion == "tripped"
+        return "at rest" if begins_before else self.motion
 
 
 def cases(family: str, by: str) -> list[Case]:
