@@ -15,6 +15,7 @@ import drivebus
 from drivebus import Bus, Drive, Simulator
 from drivebus.hal import PINS, Alive, HalGone, Loop, Motor, Pins, Scale, Spindle, module
 from drivebus.hal.core import Action
+from drivebus.hal.loop import Watch
 
 COMMAND, SETPOINT = 0x2000, 0x2001
 FORWARD, REVERSE, STOP, COAST, RESET = 1, 2, 5, 6, 7
@@ -25,13 +26,16 @@ OL1 = 11
 class Cell:
     """A component of HAL's with the loop behind it."""
 
-    def __init__(self, simulator: Simulator, drive: Drive, watchdog: float | None = None) -> None:
+    def __init__(
+        self, simulator: Simulator, drive: Drive, watchdog: float | None = None, watch: Watch | None = None
+    ) -> None:
         self.pins: dict[str, bool | float] = {name: kind == "FLOAT" and 0.0 for name, (kind, _) in PINS.items()}
         self.said: list[str] = []
         self.simulator, self.machine = simulator, simulator.drive(1)
         self.motor = Motor(drive, watchdog, self.said.append)
         self.spindle = Spindle(Scale(60.0))
-        self.loop = Loop(Pins(self.pins), self.spindle, self.motor, drive, self.said.append)
+        self.watch = watch
+        self.loop = Loop(Pins(self.pins), self.spindle, self.motor, drive, self.said.append, watch)
         self.machine.take_writes()
         self.pins["enable"] = True
         self.loop.cycle()

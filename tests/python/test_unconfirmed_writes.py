@@ -19,8 +19,9 @@ import drivebus
 from drivebus import Bus, DrivebusError, NotAllowed, Profile, Simulator
 from drivebus.cli import cli
 
-from .matrix import STEP
+from .matrix import ALL
 
+STEP = 1 if ALL else 7
 FAMILIES = drivebus.profiles()
 
 REFUSALS = {"at once": None, "illegal": 0x07, "busy": 0x06, "locked": 0x09, "out of reach": 0x0B}
