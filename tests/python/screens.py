@@ -70,8 +70,14 @@ def on_a_terminal(
     )
     os.close(follower)
     raw, shown, waits = b"", [], until
+    presses = 0
     while True:
-        ready, _, _ = select.select([leader], [], [], 60)
+        ready, _, _ = select.select([leader], [], [], 2 if 0 < presses < 30 else 60)
+        if not ready and 0 < presses < 30:
+            # One that comes between a prompt and the reading behind it waits for the next key; people press again.
+            presses += 1
+            os.write(leader, b"\x03")
+            continue
         try:
             piece = os.read(leader, 65536) if ready else b""
         except OSError:  # the program has closed it
@@ -82,6 +88,7 @@ def on_a_terminal(
         stream.feed(piece)
         if waits is not None and waits([line.rstrip() for line in screen.display]):
             shown, waits = [line.rstrip() for line in screen.display], None
+            presses = 1
             os.write(leader, b"\x03")
     code = program.wait(60)
     os.close(leader)

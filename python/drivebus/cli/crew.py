@@ -20,7 +20,7 @@ import click
 import drivebus
 from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import about, remark
-from drivebus.cli.session import Declined, Session, ask_once, exit_code, pass_session, tell
+from drivebus.cli.session import Declined, Session, ask_once, exit_code, pass_session, tell, tell_wills
 
 __all__ = ["Crew", "each_drive"]
 
@@ -172,10 +172,11 @@ class Crew:
         """Closes the lines, which ends what is under way on them: a motor that a block runs is stopped before."""
         with self._lock:
             self._is_over = True
-            buses = list(self._buses.values())
+            buses, self._buses = list(self._buses.values()), {}
         for answers in self._answers:
             answers.put(_Ended())
         for bus in buses:
+            tell_wills(bus)
             with suppress(drivebus.DrivebusError):
                 bus.close()
         for thread in threads:

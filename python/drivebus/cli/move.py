@@ -14,7 +14,7 @@ from drivebus import State
 from drivebus.cli import names
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import remark
-from drivebus.cli.session import Session, force_option, pass_session, yes_option
+from drivebus.cli.session import Session, force_option, pass_session, within_option, yes_option
 from drivebus.cli.types import Hertz, Seconds
 
 __all__ = ["COMMANDS", "OBEYING", "going", "on_the_way"]
@@ -68,9 +68,10 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
 @click.command()
 @click.option("--wait", type=Seconds(0), metavar="SECONDS", help="Wait until the motor stands still.")
 @click.option("--all", "every", is_flag=True, help="Stop every drive that is known on the line, or in drivebus.toml.")
+@within_option
 @pass_session
 @click.pass_context
-def stop(context: click.Context, session: Session, wait: float | None, every: bool) -> None:
+def stop(context: click.Context, session: Session, wait: float | None, every: bool, within: float) -> None:
     """Stop the motor as the drive is set to stop it, usually by a ramp. Does not ask first.
 
     With --all, every drive that is known is told first, each by its own family's code, and then looked at. Known are
@@ -80,17 +81,17 @@ def stop(context: click.Context, session: Session, wait: float | None, every: bo
         from drivebus.cli.stop_all import stop_all
 
         session.will_write()
-        stop_all(context, session, lambda one, drive: _stopped(one, drive, wait))
+        stop_all(context, session, within, lambda one, drive: _stopped(one, drive, wait))
     else:
-        _stop_named(wait)
+        _stop_named(wait, within)
 
 
 @each_drive
-def _stop_named(session: Session, wait: float | None) -> None:
+def _stop_named(session: Session, wait: float | None, within: float) -> None:
     """Stops the drives that the options name."""
     session.will_write()
     with session.bus() as bus:
-        _stopped(session, session.halt(bus, "stop", lambda drive: drive.stop()), wait)
+        _stopped(session, session.halt(bus, "stop", lambda drive: drive.stop(within=within)), wait)
 
 
 def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> None:
@@ -101,12 +102,13 @@ def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> Non
 
 
 @click.command()
+@within_option
 @each_drive
-def coast(session: Session) -> None:
+def coast(session: Session, within: float) -> None:
     """Switch the output off: the motor turns on until friction stops it. Does not ask first."""
     session.will_write()
     with session.bus() as bus:
-        drive = session.halt(bus, "coast", lambda drive: drive.coast())
+        drive = session.halt(bus, "coast", lambda drive: drive.coast(within=within))
         _done(session, drive, "coast")
 
 

@@ -17,6 +17,7 @@ import drivebus
 from drivebus.cli.advice import in_commands
 from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import Output, remark
+from drivebus.cli.types import Seconds
 from drivebus.site import forget, known_family, remember
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ __all__ = [
     "parse_format",
     "pass_session",
     "tell",
+    "tell_wills",
+    "within_option",
     "yes_option",
 ]
 
@@ -154,9 +157,7 @@ class Session:
             try:
                 yield bus
             finally:
-                # What was halted that nobody here asked for is told, whatever came of the command.
-                for done in bus.stats().wills:
-                    remark(done)
+                tell_wills(bus)
 
     @contextmanager
     def drive(self) -> Iterator[drivebus.Drive]:
@@ -375,6 +376,13 @@ def force_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--force", is_flag=True, help=text)(command)
 
 
+def within_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The option that says for how long a halt is sent."""
+    text = "Send it until the drive takes it, for so long at most."
+    kind = Seconds(0, 3600)
+    return click.option("--within", type=kind, default=10.0, show_default=True, metavar="SECONDS", help=text)(command)
+
+
 def parse_format(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, str, str]:
     """Data bits, parity and stop bits of a text such as `8E1`."""
     match = re.fullmatch(r"([78])([NEO])([12])", value.strip().upper())
@@ -391,6 +399,12 @@ def parse_format(context: click.Context, parameter: click.Parameter, value: str)
 def exit_code(error: drivebus.DrivebusError) -> int:
     """What the process ends with after *error*."""
     return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), 1)
+
+
+def tell_wills(bus: drivebus.Bus) -> None:
+    """Says what was halted on *bus* that nobody here asked for, whatever came of the command."""
+    for done in bus.stats().wills:
+        remark(done)
 
 
 def tell(error: drivebus.DrivebusError, about: str = "") -> None:

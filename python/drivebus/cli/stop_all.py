@@ -20,12 +20,13 @@ __all__ = ["stop_all"]
 _Done = Callable[[Session, drivebus.Drive], None]
 
 
-def stop_all(context: click.Context, session: Session, done: _Done) -> None:
+def stop_all(context: click.Context, session: Session, within: float, done: _Done) -> None:
     """Stops all drives of the line that the options name, or of all lines of `drivebus.toml` where they name none.
 
     Args:
         context: Of the command.
         session: The options before it.
+        within: Seconds for which a drive is told until it takes it.
         done: Says what a drive does that was told to stop.
 
     Raises:
@@ -40,11 +41,11 @@ def stop_all(context: click.Context, session: Session, done: _Done) -> None:
     session = replace(session, several=()) if session.several else session
     lines = _lines(context, session)
     if len(lines) == 1:
-        _stop_line(*lines[0], done)
+        _stop_line(*lines[0], within, done)
         return
     by_session = {line.called: drives for line, drives in lines}
     crew = Crew([line for line, _ in lines])
-    crew.run(lambda line: _stop_line(line, by_session[line.called], done))
+    crew.run(lambda line: _stop_line(line, by_session[line.called], within, done))
 
 
 def _lines(context: click.Context, session: Session) -> list[tuple[Session, dict[int, Session]]]:
@@ -71,7 +72,7 @@ def _lines(context: click.Context, session: Session) -> list[tuple[Session, dict
     return list(lines.values())
 
 
-def _stop_line(line: Session, drives: dict[int, Session], done: _Done) -> None:
+def _stop_line(line: Session, drives: dict[int, Session], within: float, done: _Done) -> None:
     """Stops the *drives* of one line: those whose family is known at once, the others when they have told it."""
     if not drives:
         raise drivebus.NotAllowed(
@@ -97,7 +98,7 @@ def _stop_line(line: Session, drives: dict[int, Session], done: _Done) -> None:
         }
         if known:
             try:
-                bus.stop_all()
+                bus.stop_all(within=within)
             except drivebus.NotStopped as error:
                 failures |= error.failures
         for unit, one in allowed.items():
@@ -109,7 +110,7 @@ def _stop_line(line: Session, drives: dict[int, Session], done: _Done) -> None:
                     drive = one.as_it_shows(bus, drive) if unit not in failures else None
                 if drive is None:
                     drive = one.drive_on(bus, urgent=True)
-                    drive.stop()
+                    drive.stop(within=within)
                     failures.pop(unit, None)
                 if unit not in failures:
                     done(one, drive)
