@@ -159,10 +159,9 @@ def test_one_that_refuses_whatever_it_is_asked_has_not_said_what_it_is(family: s
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty")
-@pytest.mark.parametrize(("kept", "family"), [("gd350", "eds300"), ("gd350", "ms300"), ("gd10", "eds300")])
-@pytest.mark.parametrize("command", ["stop", "coast"])
+@pytest.mark.parametrize(("kept", "family", "command"), [("gd350", "eds300", "stop"), ("gd350", "ms300", "coast")])
 def test_nor_does_a_command_whose_family_was_kept(kept: str, family: str, command: str) -> None:
-    """2000H = 5 runs an EDS300 (its manual, p. 46), and 6 runs an MS300 (CP2000 manual, p. 514)."""
+    """2000H = 5 runs an EDS300 (its manual, p. 46), and 6 runs an MS300 (CP2000 manual, p. 514). On a port, too."""
     with Simulator({1: family}, transport="pty") as simulator:
         remember(simulator.port, 1, kept)
         result = CliRunner().invoke(cli, ["--port", simulator.port, command])
@@ -172,10 +171,8 @@ def test_nor_does_a_command_whose_family_was_kept(kept: str, family: str, comman
         assert "was not told" not in result.output
 
 
-@pytest.mark.parametrize("family", drivebus.profiles())
+@pytest.mark.parametrize("family", [family for family in FAMILIES if Profile.builtin(family).commands()])
 def test_one_that_a_program_ran_is_halted_by_the_first_frame(family: str) -> None:
-    if not Profile.builtin(family).commands():
-        return
     with Simulator({1: family}, transport="process", clock="virtual") as simulator:
         assert set_going(simulator, family, "at rest")
         with Bus(simulator) as bus:
