@@ -26,7 +26,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke \
-        pictures
+        pictures matrix
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -168,6 +168,9 @@ bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(BIN)/python -m pytest -q tests/python/test_cli_screens.py
+
+matrix: $(VENV)/.dev $(VENV)/.wheel ## every case of the tests of which `make test` runs a sample, some 20 minutes
+	DRIVEBUS_MATRIX=all $(BIN)/python -m pytest -q -n $(TEST_JOBS) -p no:benchmark tests/python/test_halts_of_other_families.py tests/python/test_ends_*.py
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)
