@@ -52,7 +52,8 @@ class Workshop:
         self.port = self.process.stdout.readline().strip()
         self.said: list[Said] = []
         self._coming: queue.Queue[Said] = queue.Queue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -84,6 +85,8 @@ class Workshop:
 
     def close(self) -> None:
         self.process.kill()
+        self.process.wait()
+        self._reader.join()  # of a pipe that it reads, which is closed now
         self.process.communicate()
 
 
