@@ -36,7 +36,7 @@ help: ## what can be made
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
-	@echo "make matrix  every family named as every other and told to halt in every way; drives that refuse to be halted"
+	@echo "make matrix  every case of the tests of which make test runs a sample"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
@@ -168,13 +168,15 @@ bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 	$(BENCH_PEERS)/bin/python tools/bench_report.py $(ONLY)
 
 # The tests of which `make test` runs a sample, whole; any test may go to any core.
-MATRIX := test_unconfirmed_writes test_halts_of_other_families test_halts_refused test_hal_refused test_panel_refused
+MATRIX := test_halts_of_other_families test_unconfirmed_writes test_halts_refused test_hal_refused test_panel_refused \
+          test_ends_beside_others test_ends_refused
 
 matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 	DRIVEBUS_MATRIX=all $(BIN)/python -m pytest -q -n $(TEST_JOBS) -p no:benchmark $(MATRIX:%=tests/python/%.py)
 
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(BIN)/python -m pytest -q tests/python/test_cli_screens.py
+
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)

@@ -40,7 +40,6 @@ __all__ = [
     "end_of_program",
     "exception_means",
     "fault_kinds",
-    "inherited",
     "open_bus",
     "port_facts",
     "port_url",
@@ -102,9 +101,6 @@ def port_url(
     *schemes* are those that the caller opens itself, *families* and *faults* what a simulated line can have. NotAllowed
     names the part that is wrong and what is allowed there.
     """
-
-def inherited() -> tuple[int, list[int]]:
-    """What a forked child has of its parent's ports: an open `/dev/null`, and the descriptors that it replaces."""
 
 def run_time_folder() -> str:
     """The folder for the sockets of this user's programs. OSError where there is none."""

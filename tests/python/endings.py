@@ -161,6 +161,10 @@ ENDINGS = (
         IN_A_THREAD.format(daemon=False, inside="time.sleep(0.2)", after="sys.exit(9)"),
         9,
     ),
+    Ending(
+        "an exception in a thread",
+        IN_A_THREAD.format(daemon=False, inside="time.sleep(0.2); raise RuntimeError", after=""),
+    ),
     Ending("a daemon thread", IN_A_THREAD.format(daemon=True, inside=HANG, after="")),
     Ending(
         "a daemon thread, an exception",

@@ -284,6 +284,46 @@ def test_what_other_threads_run_is_stopped_before_the_line_is_closed(simulator: 
     assert commands(simulator, 2) == [FORWARD, STOP]
 
 
+def test_a_child_that_is_asked_to_end_as_soon_as_it_is_there_ends(simulator: Simulator) -> None:
+    """`multiprocessing` does so at its exit, and then waits for the child, before anything else ends."""
+    body = """
+    with drive.running(10.0):
+        child = os.fork()
+        if not child:
+            signal.alarm(20)
+            while True:
+                signal.pause()
+        running()
+        print(os.WTERMSIG(os.waitpid(child, 0)[1]))
+    """
+    # The first hook of all: those of drivebus have not run when the signal comes.
+    early = "os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGTERM))"
+    child = start(simulator, body, PROGRAM.replace("import signal, sys", f"import os, signal\n{early}\nimport sys", 1))
+    out, said = child.communicate(timeout=60)
+    assert (child.returncode, out, said) == (0, f"{signal.SIGTERM:d}\n", "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
+@pytest.mark.parametrize("leave", ["pass", "sys.exit(0)", "raise RuntimeError", "os.kill(os.getpid(), signal.SIGTERM)"])
+def test_a_child_that_c_code_forked_leaves_the_motor_to_its_parent(simulator: Simulator, leave: str) -> None:
+    """Python runs no hooks for it, and it leaves the block, and the program, all the same."""
+    body = f"""
+    with drive.running(10.0):
+        child = ctypes.CDLL(None).fork()
+        if child:
+            running()
+            os.waitpid(child, 0)
+            print(drive.state().name)
+        else:
+            {leave}
+    """
+    child = start(simulator, body, PROGRAM.replace("import signal", "import ctypes, os, signal", 1))
+    out, said = child.communicate(timeout=60)
+    assert (child.returncode, out) == (0, "FORWARD\n"), said
+    assert "drivebus" not in said.replace("RuntimeError", "")
+    assert commands(simulator) == [FORWARD, STOP]
+
+
 @pytest.mark.parametrize("action", ["coast", "stop"])
 def test_a_killed_program_leaves_the_drive_to_its_watchdog(simulator: Simulator, action: str) -> None:
     body = f"""

@@ -87,10 +87,10 @@ def shop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workshop]:
 
 
 @contextmanager
-def program(shop: Workshop, text: str) -> Iterator[subprocess.Popen[str]]:
+def program(shop: Workshop, text: str, *more: str) -> Iterator[subprocess.Popen[str]]:
     """A program of its own, once it has said that it is there."""
     child = subprocess.Popen(
-        [sys.executable, "-c", text, shop.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", text, shop.port, *more], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert child.stdout is not None
     try:
@@ -278,6 +278,41 @@ def test_a_guest_that_asks_for_nothing_halts_for_the_owner(shop: Workshop, besid
         for _ in range(beside):
             stack.enter_context(program(shop, ASKS_NOTHING))
         killed = kill(owner)
+        shop.wait_for(is_halt, killed)
+        shop.wait_for(stands, killed)
+
+
+KILLS = """
+import os, signal, sys
+import drivebus
+bus = drivebus.Bus(sys.argv[1], parity="N", timeout=0.3)
+os.kill(int(sys.argv[2]), signal.SIGKILL)
+print("open", flush=True)
+sys.stdin.readline()
+"""
+
+
+@pytest.mark.parametrize("attempt", range(3))
+def test_a_guest_halts_for_an_owner_that_is_killed_when_it_has_just_come_in(shop: Workshop, attempt: int) -> None:
+    """Before it waits there: its second connection may be on its way, or in the queue at the door."""
+    assert attempt in range(3)
+    with program(shop, RUNS) as owner, program(shop, KILLS, str(owner.pid)):
+        shop.wait_for(is_halt)
+        shop.wait_for(stands)
+
+
+@pytest.mark.parametrize("comes_first", [True, False], ids=["it ran before", "it runs later"])
+def test_one_that_asks_for_nothing_halts_for_who_had_the_port_after_the_first_one(
+    shop: Workshop, comes_first: bool
+) -> None:
+    """The first one ends as it should: nobody is to be halted then, and nobody asks for the port."""
+    with ExitStack() as stack:
+        first = stack.enter_context(program(shop, ASKS_NOTHING))
+        runs = stack.enter_context(program(shop, RUNS)) if comes_first else None
+        stack.enter_context(program(shop, ASKS_NOTHING))
+        first.communicate("\n")
+        runs = runs or stack.enter_context(program(shop, RUNS))
+        killed = kill(runs)
         shop.wait_for(is_halt, killed)
         shop.wait_for(stands, killed)
 

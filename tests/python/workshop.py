@@ -3,8 +3,8 @@
 It keeps its own truth: the motor, and a bus time-out that switches the motor off when no frame comes for this unit. Who
 waits for something waits on the pipe. As a program: `python -m tests.python.workshop`, or by its path.
 
-On standard input it is told what to do: `refuse HEX` answers each halt with this exception, `silent` answers no halt,
-`take` takes them again, `code HEX` is the identification from then on.
+On standard input it is told what to do: `refuse HEX [SECONDS]` answers each halt with this exception, `silent` answers
+no halt, `take` takes them again, `code HEX` is the identification from then on.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ class Workshop:
         self.port = self.process.stdout.readline().strip()
         self.said: list[Said] = []
         self._coming: queue.Queue[Said] = queue.Queue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -84,6 +85,8 @@ class Workshop:
 
     def close(self) -> None:
         self.process.kill()
+        self.process.wait()
+        self._reader.join()  # of a pipe that it reads, which is closed now
         self.process.communicate()
 
 
@@ -105,6 +108,7 @@ class _Drive:
         self.runs = False
         self.heard = time.monotonic()
         self.halts = "take"
+        self.refuses_until = float("inf")
 
     def say(self, kind: str, what: str) -> None:
         print(f"{time.monotonic():.6f} {kind} {what}", flush=True)
@@ -127,6 +131,8 @@ class _Drive:
         if pdu[0] == 8:
             return pdu
         written = [value] if pdu[0] == 6 else list(struct.unpack(f">{value}H", pdu[6:]))
+        if self.heard >= self.refuses_until:
+            self.halts = "take"
         if address == CONTROL and written[0] in (STOP, COAST) and self.halts != "take":
             return None if self.halts == "silent" else bytes([pdu[0] | 0x80, int(self.halts.split()[1], 16)])
         for at, word in enumerate(written, address):
@@ -159,6 +165,8 @@ def _serve() -> None:
                 drive.code = int(words.split()[1], 16)
             elif words:
                 drive.halts = words
+                seconds = words.split()[2:]
+                drive.refuses_until = time.monotonic() + float(seconds[0]) if seconds else float("inf")
             drive.say("told", words.replace(" ", "_") or "nothing")
         if master not in ready:
             came = b"" if not ready else came

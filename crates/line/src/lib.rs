@@ -36,7 +36,7 @@
 //! | --- | --- |
 //! | `line`, `error` | what every kind of line promises; what can become of a call |
 //! | `by_unit` | what is kept of each unit |
-//! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is |
+//! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is, forked children |
 //! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
 //! | `trace` | the frames on a line, for whoever watches it |
 //! | `options`, `ask` | what a bus, a unit and a call may be told to do otherwise; one request as it goes to the line |
@@ -94,7 +94,5 @@ pub use ports::{rs485, tty};
 #[cfg(all(unix, feature = "share"))]
 pub use share::place::run_time_folder;
 pub use system::clock;
-#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
-pub use system::inherited::{Inherited, inherited};
 pub use trace::{Direction, Overheard, Traced, Watch};
 pub use turns::order::Priority;

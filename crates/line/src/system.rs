@@ -1,5 +1,7 @@
-//! What is asked of the machine: the time, waits that end on time, and whose process this is.
+//! What is asked of the machine: the time, waits that end on time, whose process this is, and what a forked child gives up.
 
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+mod at_fork;
 pub mod clock;
 #[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
 pub(crate) mod inherited;

@@ -43,7 +43,7 @@ mod _native {
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]
-    use crate::open::{check_port_options, inherited, port_facts, port_url, run_time_folder};
+    use crate::open::{check_port_options, port_facts, port_url, run_time_folder};
     #[pymodule_export]
     use crate::plan::Plan;
     #[pymodule_export]

@@ -167,16 +167,6 @@ pub(crate) fn port_facts(
     Ok(all)
 }
 
-/// What a forked child has of its parent's ports: nothing to put in their places, and their descriptors.
-#[pyfunction]
-pub(crate) fn inherited() -> (i32, Vec<i32>) {
-    #[cfg(unix)]
-    if let Some(inherited) = drivebus_line::inherited() {
-        return (inherited.nothing, inherited.descriptors);
-    }
-    (-1, Vec::new())
-}
-
 /// The folder for the sockets of this user's programs.
 #[pyfunction]
 pub(crate) fn run_time_folder() -> PyResult<PathBuf> {

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
-from drivebus.line import forked as forked  # for what it registers
 from drivebus.line import ports
 from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace

@@ -37,6 +37,8 @@ _numbers = itertools.count()
 _guards: dict[int, Guard] = {}
 """All that is to be ended, oldest first. Without a lock: a signal handler may interrupt whoever holds one, and a dict
 takes and gives one item at a time."""
+_process = [os.getpid()]
+"""Whose all this is: another one in a child whose fork Python was not told of, or not yet."""
 _over: list[bool] = []
 """Not empty once the end of the program has begun."""
 _starting: ContextVar[Guard | None] = ContextVar("drivebus_starting", default=None)
@@ -69,6 +71,7 @@ class Guard:
         Raises:
             NotAllowed: The end of the program has begun: nobody would end it.
         """
+        _notice_fork()
         _guards[self._number] = self
         if _over or sys.is_finalizing():
             # In this order: either the end of the program finds it, or this finds the end.
@@ -110,6 +113,7 @@ class Guard:
 
     def begin_to_end(self) -> bool:
         """Whether its owner is to end it now: not where the end of the program did. A signal meanwhile waits."""
+        _notice_fork()
         self.ending = True
         return not (self._ended or sys.is_finalizing())
 
@@ -199,6 +203,11 @@ def _stop_listening() -> None:
 
 def _on_signal(number: int, _: FrameType | None) -> None:
     """Unwinds the main thread, whose blocks then end what they run, and ends what other threads run."""
+    if _notice_fork():
+        # Nothing here is the child's. What is raised in the hooks of a fork would be lost, and the child go on.
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+        return
     leave = SystemExit(128 + number)
     inside = None
     for guard in list(_guards.values()):
@@ -215,6 +224,7 @@ def _on_signal(number: int, _: FrameType | None) -> None:
 
 def _end_all() -> None:
     """What is left when the interpreter ends: blocks in daemon threads, and generators that nobody closed."""
+    _notice_fork()
     _over.append(True)
     with Kept(lambda: False, _on_signal):
         for number, guard in reversed(list(_guards.items())):
@@ -234,12 +244,21 @@ atexit.register(_end_the_rest)
 
 def _forget() -> None:
     """In a forked child: the motors are the parent's, also where the child leaves the blocks that it was forked in."""
+    _process[:] = [os.getpid()]
     for guard in _guards.values():
         guard.leave_alone()
     _guards.clear()
     _over.clear()
     begin_of_child()
     _stop_listening()
+
+
+def _notice_fork() -> bool:
+    """Whether this is a forked child that did not know it."""
+    if _process == [os.getpid()]:
+        return False
+    _forget()
+    return True
 
 
 if hasattr(os, "register_at_fork"):

@@ -17,7 +17,7 @@ use crate::health::stats::{Program, Stats};
 use crate::line::{Line, Opener, PortError, PortErrorKind};
 use crate::options::{BusOptions, Share};
 use crate::ports::key::PortKey;
-use crate::share::guest::{Guest, Knocked, Vigil};
+use crate::share::guest::{Guest, Knocked, Vigil, Wait};
 use crate::share::message::{Characters, Hello};
 use crate::share::place::Place;
 use crate::system::clock::monotonic;
@@ -32,6 +32,8 @@ const LETS_GO: Duration = Duration::from_millis(400);
 const QUIET: Duration = Duration::from_millis(50);
 /// How often it is tried meanwhile.
 const STEP: Duration = Duration::from_millis(5);
+/// How often it is looked whether somebody runs a motor by the port, where its program has ended and nobody here has asked since.
+const LOOKS: Duration = Duration::from_secs(1);
 
 /// What a bus knows of the programs it shares its port with.
 #[derive(Debug)]
@@ -194,13 +196,23 @@ impl Sharing {
         let bus = Weak::clone(bus);
         // Without a thread the next request notices it.
         let _ = thread::Builder::new().name("drivebus-waits".to_owned()).spawn(move || {
-            let Some(vigil) = guest.waits() else { return };
-            let is_kept = |bus: Arc<Shared>| bus.sharing.as_ref().is_some_and(|this| this.keeps(&vigil, &guest));
-            if bus.upgrade().is_some_and(is_kept) {
-                vigil.keep();
-                if let Some(bus) = bus.upgrade() {
-                    bus.inherit(&guest);
+            loop {
+                match guest.waits() {
+                    Wait::Kept(vigil) => {
+                        let keeps =
+                            |bus: Arc<Shared>| bus.sharing.as_ref().is_some_and(|this| this.keeps(&vigil, &guest));
+                        if !bus.upgrade().is_some_and(keeps) {
+                            return;
+                        }
+                        vigil.keep();
+                    }
+                    Wait::Ended => {}
+                    Wait::Impossible => return,
                 }
+                if !bus.upgrade().is_some_and(|bus| bus.inherit(&guest)) {
+                    return;
+                }
+                thread::sleep(LOOKS);
             }
         });
     }
@@ -281,6 +293,14 @@ impl Sharing {
             self.takes_over.store(true, Ordering::Release);
             self.is_guest.store(false, Ordering::Release);
             *guest = None;
+        }
+    }
+
+    /// Whether `gone` is the program through which the port was used last, and nobody opened it since.
+    pub(super) fn is_left_by(&self, gone: &Arc<Guest>) -> bool {
+        match self.guest() {
+            Some(guest) => Arc::ptr_eq(&guest, gone),
+            None => self.takes_over.load(Ordering::Acquire),
         }
     }
 

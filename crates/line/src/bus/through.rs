@@ -9,7 +9,6 @@ use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
 use crate::bus::errand::Errand;
 use crate::bus::shared::Shared;
-use crate::bus::wills::Wills;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
@@ -18,6 +17,7 @@ use crate::options::CallOptions;
 use crate::share::failure::Said;
 use crate::share::guest::{Guest, Lost};
 use crate::share::message::{Order, Told, Wish, nanos};
+use crate::share::will::is_any;
 use crate::system::clock::monotonic;
 use crate::trace::{Direction, Overheard, Traced};
 use crate::turns::order::Priority;
@@ -348,20 +348,26 @@ impl Shared {
         self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
     }
 
-    /// Takes the port over from a program that is gone or has closed it, if somebody is to be halted for one that is gone:
-    /// who asks for the port next would do that, and perhaps nobody does.
-    pub(super) fn inherit(&self, gone: &Arc<Guest>) {
+    /// Takes the port over from a program that is gone or has closed it, if somebody has left a will: whose program is gone is
+    /// halted, and whose program lives may have to be. Who asks for the port next would do that, and perhaps nobody does.
+    ///
+    /// Whether it is to be tried again later: nobody has left one yet, or the port cannot be opened.
+    pub(super) fn inherit(&self, gone: &Arc<Guest>) -> bool {
         let Some(sharing) = self.sharing.as_ref().filter(|_| !self.is_shut() && self.is_of_this_process()) else {
-            return;
+            return false;
         };
-        if !Wills::has_orphans_at(gone.place()) {
-            return;
+        if !sharing.is_left_by(gone) {
+            return false;
+        }
+        if !is_any(gone.place()) {
+            return true;
         }
         sharing.lost(gone);
-        let Ok(turn) = self.queue.turn((Priority::Stop, None), &mut || self.is_shut()) else { return };
-        // Whoever was quicker has the port, and halts it.
-        let _ = self.lock().prepare(&mut || self.is_shut());
+        let Ok(turn) = self.queue.turn((Priority::Stop, None), &mut || self.is_shut()) else { return false };
+        // Whoever was quicker has the port, and halts it: then this one is its guest.
+        let opened = self.lock().prepare(&mut || self.is_shut());
         drop(turn);
+        opened.is_err() && !sharing.is_guest()
     }
 
     /// Tells the program that has the port of a will that was left. False where that is not known to have reached it: then

@@ -29,7 +29,7 @@ use crate::ports::key::PortKey;
 use crate::share::guest::readable;
 use crate::share::message::{Characters, nanos};
 use crate::share::place::Place;
-use crate::share::will::{Found, Orphan, Paper, Will, find, has_orphans};
+use crate::share::will::{Found, Orphan, Paper, Will, find};
 use crate::system::clock::monotonic;
 use crate::system::process::own_name;
 use crate::turns::order::Priority;
@@ -134,21 +134,6 @@ impl Wills {
             state.hurries = Some(monotonic() + FOR_A_WHILE);
             self.attend(&mut state);
             self.changed.notify_all();
-        }
-    }
-
-    /// Whether a program is gone that left a will at `place`, or goes within a while: the system takes back what it had one
-    /// after the other.
-    pub(super) fn has_orphans_at(place: &Place) -> bool {
-        let end = monotonic() + FOR_A_WHILE;
-        loop {
-            if has_orphans(place) {
-                return true;
-            }
-            if monotonic() >= end {
-                return false;
-            }
-            thread::sleep(LOOKS_AT_ONCE);
         }
     }
 

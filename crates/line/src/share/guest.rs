@@ -75,6 +75,18 @@ impl std::fmt::Display for Host {
 pub(crate) struct Vigil {
     connection: Arc<Kept<UnixStream>>,
     life: Arc<Life>,
+    /// The other end, where the program that has the port has none: only its life is watched then.
+    _own: Option<Kept<UnixStream>>,
+}
+
+/// What came of wanting to wait at the program that has the port.
+#[derive(Debug)]
+pub(crate) enum Wait {
+    Kept(Vigil),
+    /// It is gone, or has closed the port: it may have ended before it let this one in.
+    Ended,
+    /// It lets nobody in, and cannot be watched otherwise.
+    Impossible,
 }
 
 impl Vigil {
@@ -175,12 +187,28 @@ impl Guest {
         }
     }
 
-    /// Waits at the program that has the port, over a connection of its own; `None` where that lets no more in.
-    pub(crate) fn waits(&self) -> Option<Vigil> {
-        let until = monotonic() + SILENT;
-        let stream = self.place.knock(until).ok()?;
-        let (channel, ..) = greet(stream, &self.hello, Some(&self.life), SILENT).ok()?;
-        Some(Vigil { connection: channel.end(), life: Arc::clone(&self.life) })
+    /// Waits at the program that has the port, over a connection of its own; where that lets no more in, for its end alone.
+    pub(crate) fn waits(&self) -> Wait {
+        let life = Arc::clone(&self.life);
+        match self.connect(&self.hello, SILENT) {
+            Ok(channel) => Wait::Kept(Vigil { connection: channel.end(), life, _own: None }),
+            Err(Greeting::Gone) => Wait::Ended,
+            Err(Greeting::SentAway(_) | Greeting::Silent(_)) => match UnixStream::pair() {
+                Ok((one, other)) if life.end().is_some() => {
+                    Wait::Kept(Vigil { connection: Arc::new(Kept::new(one)), life, _own: Some(Kept::new(other)) })
+                }
+                _ => Wait::Impossible,
+            },
+        }
+    }
+
+    /// Another connection to the program that has the port.
+    fn connect(&self, hello: &Hello, patience: Duration) -> Result<Channel, Greeting> {
+        let stream = self.place.knock(monotonic() + patience).map_err(|nobody| match nobody {
+            Nobody::Absent | Nobody::Gone => Greeting::Gone,
+            Nobody::Crowded => Greeting::Silent(crowded(patience)),
+        })?;
+        greet(stream, hello, Some(&self.life), patience).map(|(channel, ..)| channel)
     }
 
     /// Where it was met.
@@ -307,12 +335,7 @@ impl Guest {
         drop(pool);
         let silent = if is_stop { SILENT_ON_A_STOP } else { SILENT };
         let hello = Hello { is_for_a_stop: is_stop, ..self.hello.clone() };
-        let stream = self.place.knock(monotonic() + silent).map_err(|nobody| match nobody {
-            Nobody::Absent | Nobody::Gone => Greeting::Gone,
-            Nobody::Crowded => Greeting::Silent(crowded(silent)),
-        });
-        let greeted = stream.and_then(|stream| greet(stream, &hello, Some(&self.life), silent));
-        greeted.map(|(channel, ..)| (channel, !is_stop)).map_err(|why| {
+        self.connect(&hello, silent).map(|channel| (channel, !is_stop)).map_err(|why| {
             self.lock().under_way -= 1;
             match why {
                 Greeting::Gone => {

@@ -139,7 +139,10 @@ impl Drop for Paper {
 pub(crate) fn find(place: &Place) -> io::Result<Found> {
     let mut held = held();
     let mut found = Found::default();
-    for path in of_others(place, &held)? {
+    for path in all(place)? {
+        if held.contains(&path) {
+            continue;
+        }
         match take(&path) {
             Ok(Some(orphan)) => {
                 held.insert(path);
@@ -153,21 +156,15 @@ pub(crate) fn find(place: &Place) -> io::Result<Found> {
     Ok(found)
 }
 
-/// Whether there is a will at `place` that nobody holds. It stays so.
-pub(crate) fn has_orphans(place: &Place) -> bool {
-    // Held until the end: what another thread takes up meanwhile would lose its lock with the descriptor closed here.
-    let held = held();
-    let is_free = |path: &PathBuf| {
-        let file = OpenOptions::new().read(true).write(true).open(path);
-        file.is_ok_and(|file| fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
-    };
-    of_others(place, &held).is_ok_and(|paths| paths.iter().any(is_free))
+/// Whether there is a will at `place`, whoever holds it.
+pub(crate) fn is_any(place: &Place) -> bool {
+    all(place).is_ok_and(|paths| !paths.is_empty())
 }
 
-/// The wills at `place` that are not `held` by this process.
-fn of_others(place: &Place, held: &BTreeSet<PathBuf>) -> io::Result<Vec<PathBuf>> {
-    let all = place.path("");
-    let (Some(folder), Some(name)) = (all.parent(), all.file_name().and_then(|name| name.to_str())) else {
+/// The wills at `place`.
+fn all(place: &Place) -> io::Result<Vec<PathBuf>> {
+    let prefix = place.path("");
+    let (Some(folder), Some(name)) = (prefix.parent(), prefix.file_name().and_then(|name| name.to_str())) else {
         return Ok(Vec::new());
     };
     let ending = format!(".{ENDING}");
@@ -176,9 +173,8 @@ fn of_others(place: &Place, held: &BTreeSet<PathBuf>) -> io::Result<Vec<PathBuf>
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder)? {
         let file_name = entry?.file_name();
-        let path = folder.join(&file_name);
-        if file_name.to_str().is_some_and(is_one) && !held.contains(&path) {
-            paths.push(path);
+        if file_name.to_str().is_some_and(is_one) {
+            paths.push(folder.join(&file_name));
         }
     }
     Ok(paths)
@@ -252,18 +248,18 @@ mod tests {
             (Paper::leave(&room.1, &will(2), monotonic()), Paper::leave(&room.1, &will(1), monotonic()));
         let early = early.unwrap();
         early.is_alive(Instant::from_nanos(77));
-        assert!(find(&room.1).unwrap().orphans.is_empty() && !has_orphans(&room.1), "both are held");
+        assert!(find(&room.1).unwrap().orphans.is_empty() && is_any(&room.1), "both are held");
         drop((late.unwrap(), early));
-        assert!(has_orphans(&room.1) && has_orphans(&room.1), "who looks takes none up");
+        assert!(is_any(&room.1) && is_any(&room.1), "who looks takes none up");
         let found = find(&room.1).unwrap().orphans;
         let wills: Vec<_> = found.iter().map(|orphan| orphan.will.clone().unwrap()).collect();
         assert_eq!(wills, [will(1), will(2)], "in the order in which they were left");
         assert_eq!(found[0].alive, Instant::from_nanos(77));
-        assert!(find(&room.1).unwrap().orphans.is_empty() && !has_orphans(&room.1), "who found them holds them");
+        assert!(find(&room.1).unwrap().orphans.is_empty() && is_any(&room.1), "who found them holds them");
         for orphan in found {
             orphan.paper.remove();
         }
-        assert!(find(&room.1).unwrap().orphans.is_empty());
+        assert!(find(&room.1).unwrap().orphans.is_empty() && !is_any(&room.1));
         assert_eq!(fs::read_dir(&room.0).unwrap().count(), 0);
     }
 

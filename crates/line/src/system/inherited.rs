@@ -2,15 +2,15 @@
 //!
 //! A fork copies every descriptor, and what hangs on one lives until its last copy is closed: the lock of a port whose owner
 //! was killed, a connection at whose other end somebody waits for an answer. `close-on-exec` helps who runs another program,
-//! and not who goes on in a copy of this one. So each is listed while it is open. The child puts `/dev/null` in its place
-//! (`dup2`): nothing is unlocked, shut down or said, since all of that would be done to the parent's.
+//! and not who goes on in a copy of this one. So each is listed while it is open, and the child puts `/dev/null` in its place
+//! (`at_fork`).
 //!
 //! The list is read after a fork, when nobody lets go of a lock that another thread held: it has none.
 
 use std::ops::{Deref, DerefMut};
 
 #[cfg(unix)]
-pub use list::{Inherited, inherited};
+pub(super) use list::each;
 
 /// What has a descriptor that a forked child gives up.
 #[derive(Debug)]
@@ -56,6 +56,8 @@ mod list {
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicI32, Ordering};
 
+    use crate::system::at_fork::give_up_in_children;
+
     /// No descriptor has this number.
     const FREE: i32 = -1;
 
@@ -80,6 +82,7 @@ mod list {
 
     impl Listed {
         pub(super) fn new(descriptor: &impl AsFd) -> Self {
+            give_up_in_children();
             // Before it is needed: a child may find no descriptor free.
             NOTHING.get_or_init(|| OpenOptions::new().read(true).write(true).open("/dev/null").ok());
             let number = descriptor.as_fd().as_raw_fd();
@@ -101,26 +104,12 @@ mod list {
         }
     }
 
-    /// What a forked child gives up, by `dup2(nothing, descriptor)` for each before it does anything else.
-    #[derive(Debug, Clone, PartialEq, Eq)]
-    #[non_exhaustive]
-    pub struct Inherited {
-        /// An open `/dev/null`.
-        pub nothing: RawFd,
-        /// The descriptors of all ports that are open, of their locks, doors and connections.
-        pub descriptors: Vec<RawFd>,
-    }
-
-    /// What a child that is forked now has of its parent's ports; `None` where that is nothing.
-    ///
-    /// The Python package gives it up by itself. A program in Rust that forks, and runs no other program in the child, does so
-    /// there: no crate offers `pthread_atfork` in safe Rust.
-    #[must_use]
-    pub fn inherited() -> Option<Inherited> {
-        let nothing = NOTHING.get()?.as_ref()?.as_raw_fd();
+    /// Gives each descriptor that is listed to `give_up`, with an open `/dev/null`. It allocates nothing and waits for nobody.
+    pub(in crate::system) fn each(mut give_up: impl FnMut(RawFd, RawFd)) {
+        let Some(Some(nothing)) = NOTHING.get() else { return };
         let blocks = std::iter::successors(Some(&FIRST), |block| block.next.get().map(|next| &**next));
         let numbers = blocks.flat_map(|block| &block.places).map(|place| place.load(Ordering::Acquire));
-        Some(Inherited { nothing, descriptors: numbers.filter(|number| *number != FREE).collect() })
+        numbers.filter(|number| *number != FREE).for_each(|number| give_up(nothing.as_raw_fd(), number));
     }
 }
 
@@ -132,7 +121,9 @@ mod tests {
     use super::*;
 
     fn listed() -> Vec<RawFd> {
-        inherited().map(|inherited| inherited.descriptors).unwrap_or_default()
+        let mut numbers = Vec::new();
+        each(|_, number| numbers.push(number));
+        numbers
     }
 
     #[test]
