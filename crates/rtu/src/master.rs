@@ -18,6 +18,7 @@ use crate::event::{BeginError, Event, Tally};
 use crate::expected::Expected;
 use crate::frame::{Adu, Frame};
 use crate::framer::Framer;
+use crate::others::Others;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
@@ -67,6 +68,7 @@ pub struct Master {
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
     doubts: Doubts,
+    others: Others,
     tally: Tally,
 }
 
@@ -124,6 +126,7 @@ impl Master {
             torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,
+            others: Others::NONE,
             tally: Tally::EMPTY,
         }
     }
@@ -272,6 +275,7 @@ impl Master {
                     }
                     self.echo_due = self.strips_echo;
                     self.doubts.goes_out();
+                    self.others.goes_out();
                     self.beside.clear();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
@@ -340,6 +344,20 @@ impl Master {
         }
     }
 
+    /// Says whether another master may ask on this line, so that its answers are heard here, too: some serial servers copy
+    /// every byte to all who are connected. Not so at first.
+    ///
+    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
+    /// [`OTHERS`](crate::OTHERS) at least. Read what came in before each request.
+    pub const fn expect_others(&mut self, may_be: bool) {
+        self.others.expect(may_be);
+    }
+
+    /// Whether another master was heard that asks `unit`.
+    pub fn has_others(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.others.are_at(now, unit)
+    }
+
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or
     /// a read whose answer cannot be mistaken.
     pub fn in_quarantine(&self, now: Instant, unit: UnitAddress) -> bool {
@@ -360,13 +378,17 @@ impl Master {
     /// Whether the answer of `unit` to `request`, asked at `now`, could not be mistaken for any that it may still give:
     /// then it ends a quarantine.
     pub fn tells_apart(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> bool {
-        self.doubts.tells_apart(now, unit, request.expected())
+        let expected = request.expected();
+        self.doubts.tells_apart(now, unit, expected) && self.others.ask(now, unit, expected).is_none()
     }
 
     /// How sure the answer to `request` can be that `unit` is asked at `now`. Certain while nothing that it owes could
     /// overtake.
     pub fn attribution(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Attribution {
-        self.doubts.attribution(now, unit, request.expected())
+        match self.others.ask(now, unit, request.expected()) {
+            Some(until) => Attribution::Others(until),
+            None => self.doubts.attribution(now, unit, request.expected()),
+        }
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.
