@@ -177,7 +177,11 @@ impl Master {
         if destination == Destination::Broadcast && !request.is_write() {
             return Err(BeginError::BroadcastRead);
         }
-        self.framer.expect_anything();
+        if self.others.may_be() {
+            self.framer.listen();
+        } else {
+            self.framer.expect_anything();
+        }
         self.request.set_request(destination, request);
         // Nothing is known of a line that was never watched: it may be busy now.
         self.busy.get_or_insert(now);
@@ -348,9 +352,18 @@ impl Master {
     /// every byte to all who are connected. Not so at first.
     ///
     /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
-    /// [`OTHERS`](crate::OTHERS) at least. Read what came in before each request.
+    /// [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
     pub const fn expect_others(&mut self, may_be: bool) {
         self.others.expect(may_be);
+    }
+
+    /// Takes down what others say, while nothing is in flight on a line that may have others: what was held behind the
+    /// latest answer, too.
+    pub fn overhear(&mut self, now: Instant) {
+        if self.others.may_be() && matches!(self.state, State::Idle) {
+            self.framer.listen();
+            self.count_strays(now);
+        }
     }
 
     /// Whether another master was heard that asks `unit`.

@@ -88,7 +88,9 @@ impl fmt::Display for AnswerError {
             Self::Refusal { code } => {
                 write!(f, "exception {:02X}H came, which may be meant for another request", code.0)
             }
-            Self::Others => f.write_str("another master asks the same of this unit, and nothing tells whose answer it is"),
+            Self::Others => {
+                f.write_str("another master asks the same of this unit, and nothing tells whose answer it is")
+            }
         }
     }
 }

@@ -14,9 +14,10 @@ use crate::framer::Step;
 use crate::{Instant, UnitAddress};
 
 /// What is told of `frame` at the end of the wait, which may be another's and came in the place of the answer to `expected`.
-fn passed_over(expected: Expected, frame: Frame<'_>) -> Event<'_> {
+/// `doubted`: its unit owes others.
+fn passed_over(expected: Expected, frame: Frame<'_>, doubted: bool) -> Event<'_> {
     match expected.judge(frame.pdu()) {
-        Ok(answer) if expected.is_read() => Event::Answer(answer),
+        Ok(answer) if expected.is_read() && !doubted => Event::Answer(answer),
         // Had a write been refused, it would not have been done; that is not known.
         Ok(Answer::Exception { code, .. }) => {
             Event::Wrong { error: AnswerError::Refusal { code }, frame: frame.as_bytes() }
@@ -104,7 +105,7 @@ impl Master {
                             self.tally.add_late();
                         }
                         Err(error) if self.patience.is_some() => {
-                            self.overhear(now, range.clone());
+                            self.see_if_others(now, range.clone());
                             self.spoils(&range, Why::Wrong(error));
                             self.add_beside(range);
                         }
@@ -146,6 +147,7 @@ impl Master {
     fn end_in_vain(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Event<'_> {
         self.give_account(false);
         self.state = State::Idle;
+        let doubted = self.others.passed().is_some() && self.in_quarantine(now, unit);
         match self.is_still_open(now, unit, expected) {
             Open::No => self.doubts.taken(now, unit, expected, timeout, false),
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
@@ -154,7 +156,7 @@ impl Master {
         if !self.beside.is_spoilt()
             && let Some(frame) = self.others.passed()
         {
-            return passed_over(expected, frame);
+            return passed_over(expected, frame, doubted);
         }
         self.beside.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() })
     }
@@ -216,7 +218,7 @@ impl Master {
     }
 
     /// A frame came in the place of the answer that is not it.
-    fn overhear(&mut self, now: Instant, range: Range<usize>) {
+    fn see_if_others(&mut self, now: Instant, range: Range<usize>) {
         if self.others.may_be() {
             self.see(now, range);
         }

@@ -68,7 +68,9 @@ fn where_there_are_no_others_nothing_is_theirs() {
 #[test]
 fn it_counts_for_ten_times_as_long_as_it_was_heard_for() {
     let mut asker = overheard(&words(unit(1), 1, 7));
-    for (value, heard, over) in [(8, 5_000, MINUTE), (9, 6_000, MINUTE), (8, 60_000, 600_000), (9, 3_600_000, 36_000_000)] {
+    for (value, heard, over) in
+        [(8, 5_000, MINUTE), (9, 6_000, MINUTE), (8, 60_000, 600_000), (9, 3_600_000, 36_000_000)]
+    {
         assert_eq!(asker.hears(NOW + heard, &words(unit(1), 1, value)), Came::Nothing);
         assert_eq!(asker.attribution(ms(NOW + heard), &read(1)), theirs(NOW + heard + over), "after {heard} ms");
     }
