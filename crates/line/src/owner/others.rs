@@ -167,18 +167,21 @@ impl Owner {
     /// A read whose answer cannot be taken for that to `request`, nor for one of others.
     fn parts(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<Next> {
         let Request::Read { address, table: Table::Holding, .. } = *request else { return None };
-        let count = self.other_length(now, unit, request, MAX_WORDS)?;
+        let count = self.other_length(now, unit, request)?;
         Some(Next::Probe(unit, Probe::OtherRead { address, count }))
     }
 
-    /// So many words from where `request` reads, `most` at most, that look like neither its answer nor anybody's.
-    fn other_length(&self, now: Instant, unit: UnitAddress, request: &Request<'_>, most: u16) -> Option<u16> {
-        let Request::Read { table, address, .. } = *request else { return None };
-        let is_free = |words: &u16| {
-            Request::read_of(table, address, *words)
-                .is_ok_and(|read| look(&read) != look(request) && self.is_told(now, unit, &read, false))
-        };
-        let free: Vec<_> = (1..=most).filter(is_free).take(CHOICE).collect();
+    /// So many words from where `request` reads, as that looks like neither its answer nor anybody's: fewer than it asks for,
+    /// or more, unless `unit` was heard to refuse them.
+    fn other_length(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
+        let Request::Read { table, address, count, .. } = *request else { return None };
+        let is_free = |read: &Request<'_>| look(read) != look(request) && self.is_told(now, unit, read, false);
+        let fewer = (1..count).filter_map(|words| Some((words, Request::read_of(table, address, words).ok()?)));
+        let mut free: Vec<_> = fewer.filter(|(_, read)| is_free(read)).map(|(words, _)| words).take(CHOICE).collect();
+        if free.is_empty() {
+            let more = self.longer.lengths(unit, request).filter(|(_, read)| is_free(read));
+            free.extend(more.map(|(words, _)| words).take(CHOICE));
+        }
         if self.master.has_others(now, unit) { by_chance(&free).copied() } else { free.first().copied() }
     }
 
@@ -220,15 +223,13 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<bool, Box<CallError>> {
         let Request::Read { table, address, count, .. } = *ask.request else { return Ok(true) };
-        // Of the words that the unit has just given, it gives fewer; of a single one that is not possible. Bits fill bytes.
-        let most = count.max(if table.is_bits() { MAX_WORDS } else { 2 });
-        let other = self.other_length(self.now(), unit, ask.request, most);
+        let other = self.other_length(self.now(), unit, ask.request);
         if let Some(read) = other.and_then(|words| Request::read_of(table, address, words).ok()) {
             self.stats().count(Some(unit), |counters| counters.resyncs += 1);
             match self.exchange(&Ask { request: &read, ..*ask }, give_up, &mut |_| ()) {
                 Ok(_) => {}
                 Err(error) if matches!(error.failure, Failure::Refused { .. }) => {
-                    self.longer.refused(unit, (table, address), other.unwrap_or(u16::MAX).max(count + 1));
+                    self.longer.refused(unit, (table, address), other.filter(|&words| words > count).unwrap_or(u16::MAX));
                 }
                 Err(error) => return Err(error),
             }
