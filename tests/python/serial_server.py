@@ -1,4 +1,4 @@
-"""A serial server as many are: it takes requests of any number of clients in turn, and copies every answer to all of them."""
+"""A serial server as many are: it takes the requests of all its clients in turn, and copies every answer to all."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import queue
 import socket
 import struct
 import threading
-import time
 from collections.abc import Iterable, Iterator
 
 UNIT = 1
@@ -41,7 +40,7 @@ def place_of(word: int) -> int:
 
 
 class SerialServer:
-    """Listens on 127.0.0.1 while it is entered. `asked` has the requests in their order, with the number of their client."""
+    """Listens on 127.0.0.1 while it is entered. `asked`: the requests in order, with the number of their client."""
 
     def __init__(self, *, loop_back: bool = True, end: int = END, delay: float = DELAY) -> None:
         self.asked: list[tuple[int, bytes]] = []
@@ -51,6 +50,7 @@ class SerialServer:
         self._delay = delay
         self._requests: queue.SimpleQueue[tuple[int, bytes] | None] = queue.SimpleQueue()
         self._clients: list[socket.socket] = []
+        self._over = threading.Event()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
         self.url = f"socket://127.0.0.1:{self.port}"
@@ -61,6 +61,7 @@ class SerialServer:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._over.set()
         self._requests.put(None)
         for each in (self._listener, *self._clients):
             with contextlib.suppress(OSError):
@@ -93,7 +94,7 @@ class SerialServer:
             self.asked.append(asked)
             unit, pdu = asked[1][0], asked[1][1:-2]
             count += 1
-            time.sleep(self._delay)  # the unit is at work
+            self._over.wait(self._delay)  # the unit is at work
             answer = self._pdu(pdu, count)
             if unit == UNIT and answer:
                 self.say(unit, answer)

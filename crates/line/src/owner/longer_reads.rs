@@ -48,13 +48,16 @@ impl Longer {
         unit: UnitAddress,
         request: &Request<'r>,
     ) -> impl Iterator<Item = (u16, Request<'r>)> + use<'r> {
-        let (table, address, counts) = match *request {
-            Request::Read { table, address, count, .. } => (table, address, count..=count.max(MAX_WORDS)),
-            _ => (Table::Holding, 0, 1..=0),
+        let asked = match *request {
+            Request::Read { table, address, count, .. } => Some((table, address, count)),
+            _ => None,
         };
-        let refused = self.0.get(&(unit, (table, address))).map_or(u16::MAX, |limit| limit.refused);
-        let given = counts.take_while(move |&words| words < refused);
-        given.filter_map(move |words| Some((words, Request::read_of(table, address, words).ok()?)))
+        let limit = asked.and_then(|(table, address, _)| self.0.get(&(unit, (table, address))));
+        let refused = limit.map_or(u16::MAX, |limit| limit.refused);
+        asked.into_iter().flat_map(move |(table, address, count)| {
+            let given = (count..=count.max(MAX_WORDS)).take_while(move |&words| words < refused);
+            given.filter_map(move |words| Some((words, Request::read_of(table, address, words).ok()?)))
+        })
     }
 
     /// `unit` refused to give `count` words from `place`.

@@ -229,7 +229,11 @@ impl Owner {
             match self.exchange(&Ask { request: &read, ..*ask }, give_up, &mut |_| ()) {
                 Ok(_) => {}
                 Err(error) if matches!(error.failure, Failure::Refused { .. }) => {
-                    self.longer.refused(unit, (table, address), other.filter(|&words| words > count).unwrap_or(u16::MAX));
+                    self.longer.refused(
+                        unit,
+                        (table, address),
+                        other.filter(|&words| words > count).unwrap_or(u16::MAX),
+                    );
                 }
                 Err(error) => return Err(error),
             }

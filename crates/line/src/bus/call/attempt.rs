@@ -148,8 +148,6 @@ impl<'b> Call<'b, '_> {
             match owner.next(&self.ask, tried, in_time, apart) {
                 Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
                 Next::AskApart(count) => return Ok((owner, Question::Apart(count))),
-                Next::AskUntold if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
-                Next::AskUntold => return Ok((owner, Question::Untold)),
                 Next::OthersAsk => {
                     return Err(self.ask.failed(Failure::OthersAsk, None, self.bus.now_of(&owner), &[]));
                 }
@@ -164,7 +162,10 @@ impl<'b> Call<'b, '_> {
                     }
                 }
                 // Where the words can be read, what they are is known sooner than who was confirmed.
-                Next::Overtaken(_) if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
+                Next::Overtaken(_) | Next::AskUntold if self.read_back.is_some() => {
+                    return Ok((owner, Question::Unproven));
+                }
+                Next::AskUntold => return Ok((owner, Question::Untold)),
                 Next::Overtaken(until) => {
                     drop(owner);
                     self.stand_by(turn, until, give_up)?;
