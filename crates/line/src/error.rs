@@ -219,6 +219,12 @@ pub enum Failure {
         /// How often it was asked.
         attempts: u32,
     },
+    /// Another master asks the same of the unit, so that its answers cannot be told from the own ones.
+    #[error(
+        "another master asks the same of this unit through this serial server, which copies the answers to all, and nothing \
+         tells whose they are; let one master use each server, or share its port through drivebus"
+    )]
+    OthersAsk,
     /// The line was never silent long enough to send. Nothing was sent.
     #[error("the line was never silent for {} ms: another master, or noise from a missing bias", timeout.as_millis())]
     Busy {

@@ -82,6 +82,12 @@ pub trait Line: Send + fmt::Debug {
         false
     }
 
+    /// Whether another master may ask on the same line, so that its answers come here, too: serial servers have many
+    /// clients, and some copy every byte to all of them.
+    fn may_have_others(&self) -> bool {
+        false
+    }
+
     /// How late a character may be handed over after it was on the wire, because an adapter collects what it receives.
     ///
     /// A time-out shorter than the unit's own time and this hears no answer. A silence is seen this much late, never early.

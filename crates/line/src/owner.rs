@@ -8,6 +8,7 @@ pub(crate) mod exchange;
 mod longer_reads;
 pub(crate) mod meanings;
 pub(crate) mod opener;
+mod others;
 pub(crate) mod resync;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -31,6 +32,7 @@ use crate::owner::exchange::exchange;
 use crate::owner::longer_reads::Longer;
 use crate::owner::meanings::UnitMeanings;
 use crate::owner::opener::LineOpener;
+use crate::owner::others::Others;
 use crate::owner::resync::{FreshWords, Probe, Resync, Tried};
 use crate::trace::{Trace, Watched};
 
@@ -39,6 +41,8 @@ use crate::trace::{Trace, Watched};
 pub(crate) enum Next {
     /// Send it.
     Ask(Attribution),
+    /// Send it, but the answer may be that to another master's.
+    AskUntold,
     /// Send it as a read of so many words, which nothing that the unit owes could pass for.
     AskApart(u16),
     /// See whether the adapter echoes.
@@ -51,6 +55,8 @@ pub(crate) enum Next {
     Overtaken(Instant),
     /// The unit may still answer something else, and everything was tried.
     GiveUp,
+    /// Another master asks the same, in every length that the unit gives.
+    OthersAsk,
 }
 
 /// The line, and all that is known about it.
@@ -67,6 +73,7 @@ pub(crate) struct Owner {
     resync: Resync,
     /// Which reads can be asked in a longer form.
     pub(crate) longer: Longer,
+    others: Others,
     /// What its units say by their exceptions.
     pub(crate) meanings: Arc<UnitMeanings>,
     links: Arc<Mutex<Links>>,
@@ -107,6 +114,7 @@ impl Owner {
             echo,
             resync: Resync::default(),
             longer: Longer::default(),
+            others: Others::default(),
             meanings: Arc::default(),
             links: Arc::default(),
             heard: [false; 256],
@@ -165,6 +173,7 @@ impl Owner {
 
     /// Counts what came while nothing was asked.
     pub(crate) fn stray(&mut self, now: Instant, mut bytes: &[u8]) {
+        self.master.overhear(now);
         loop {
             bytes = &bytes[self.master.receive(now, bytes)..];
             let _ = self.master.poll(now); // nothing is in flight: it only counts
@@ -202,6 +211,8 @@ impl Owner {
         if !line.gapless() {
             self.master.opened(line.now());
         }
+        self.others = Others::of_line(line.may_have_others());
+        self.master.expect_others(self.others.may_be());
         self.clock = line.clock();
         self.lumps = Lumps::of(line.as_ref());
         self.line = Some(match &self.trace {
@@ -234,6 +245,11 @@ impl Owner {
         let now = self.now();
         let in_quarantine = self.master.in_quarantine(now, unit);
         let attribution = self.master.attribution(now, unit, ask.request);
+        if self.others.may_be()
+            && let Some(next) = self.next_among_others(now, unit, ask, attribution, in_quarantine, apart)
+        {
+            return next;
+        }
         // A unit that returns echoes proves more by one: that it has caught up.
         let may_be_mistaken =
             if in_quarantine { self.resync.knows_no_echo(unit) } else { attribution.may_be_mistaken() };
@@ -263,6 +279,7 @@ impl Owner {
         self.resync.is_sure(unit);
         match attribution {
             Attribution::Wait(until) => Next::Overtaken(until),
+            Attribution::Others(_) => Next::OthersAsk,
             sure => Next::Ask(sure),
         }
     }
@@ -340,6 +357,12 @@ impl Owner {
         if result.is_ok() && unit.is_some() {
             self.opener.answered();
         }
+        if self.others.may_be()
+            && let Some(unit) = unit
+        {
+            let refused = matches!(&result, Err(error) if matches!(error.failure, Failure::Refused { .. }));
+            self.others.asked(self.now(), unit, ask, refused);
+        }
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);
         if let Some(unit) = unit {
@@ -413,6 +436,6 @@ impl Owner {
 
 /// Whether `failure` is of a kind that another request over the same line may not have.
 pub(crate) fn is_line_trouble(failure: &Failure) -> bool {
-    use Failure::{Corrupt, NoAnswer, Refused, Unreached, Wrong};
-    matches!(failure, NoAnswer { .. } | Unreached | Corrupt(_) | Wrong(_) | Refused { .. })
+    use Failure::{Corrupt, NoAnswer, OthersAsk, Refused, Unreached, Wrong};
+    matches!(failure, NoAnswer { .. } | Unreached | Corrupt(_) | Wrong(_) | Refused { .. } | OthersAsk)
 }

@@ -219,6 +219,10 @@ impl Line for Watched {
         self.line.clock()
     }
 
+    fn may_have_others(&self) -> bool {
+        self.line.may_have_others()
+    }
+
     fn may_echo(&self) -> bool {
         self.line.may_echo()
     }

@@ -28,11 +28,11 @@ pub struct Agreement {
 impl Agreement {
     /// As often as `attribution` asks for, and words at least `at_least` times.
     ///
-    /// [`Attribution::Wait`] counts as certain: it is for the caller to wait.
+    /// [`Attribution::Wait`] and [`Attribution::Others`] count as certain: it is for the caller to wait, or to ask otherwise.
     pub fn new(attribution: Attribution, at_least: u8) -> Self {
         let (words, refusal) = match attribution {
             Attribution::Repeat { words, refusal } => (words, refusal),
-            Attribution::Certain | Attribution::Wait(_) => (1, 1),
+            Attribution::Certain | Attribution::Wait(_) | Attribution::Others(_) => (1, 1),
         };
         Self { words: words.max(at_least), refusal, heard: 0, last: Adu::new() }
     }

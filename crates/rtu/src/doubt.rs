@@ -71,6 +71,9 @@ pub enum Attribution {
     },
     /// Open answers could pass for it, and repeating does not help: ask at this moment or later.
     Wait(Instant),
+    /// Another master asks the same of the unit, as long as until this moment if nothing more is heard of it. Only another
+    /// length helps.
+    Others(Instant),
 }
 
 impl Attribution {
@@ -80,7 +83,7 @@ impl Attribution {
         match self {
             Self::Certain => false,
             Self::Repeat { words, .. } => words > 1,
-            Self::Wait(_) => true,
+            Self::Wait(_) | Self::Others(_) => true,
         }
     }
 }
@@ -245,26 +248,34 @@ impl Doubts {
     ///
     /// Not so an answer that looks like its request, which an adapter may have sent back; nor one of the first second, which
     /// another program may have asked for; nor the same frame again within `at_once`, which the line may have brought twice.
-    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) {
+    ///
+    /// Returns whether it can be none of ours, as far as is remembered.
+    pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
         let is_new = self.hear(now, frame, at_once);
-        let Ok(unit) = UnitAddress::new(frame.address()) else { return };
-        if !is_new || self.is_strange(now, unit) {
-            return;
+        let Ok(unit) = UnitAddress::new(frame.address()) else { return false };
+        if !is_new {
+            return false;
+        }
+        let fits = |open: &Open| open.expected.judge_frame(unit, frame).is_ok();
+        let is_nobodys = !self.has_forgotten(now, unit) && !self.of(unit).any(fits);
+        if self.is_strange(now, unit) {
+            return is_nobodys;
         }
         let answers = |open: &Open| {
             open.unit == unit
                 && matches!(open.expected.judge(frame.pdu()), Ok(answer) if !matches!(answer, Answer::Exception { .. }))
         };
         let mut fitting = self.ledger.iter_mut().filter(|open| open.as_ref().is_some_and(answers));
-        let (Some(place), None) = (fitting.next(), fitting.next()) else { return };
+        let (Some(place), None) = (fitting.next(), fitting.next()) else { return is_nobodys };
         match place {
-            Some(open) if open.expected.may_repeat_request() => return,
+            Some(open) if open.expected.may_repeat_request() => return is_nobodys,
             Some(open) if open.count > 1 => open.count -= 1,
             other => *other = None,
         }
         if !self.has_forgotten(now, unit) && self.of(unit).all(|open| open.expected.is_echo()) {
             self.open.remove(unit);
         }
+        is_nobodys
     }
 
     /// Whether `frame` is, as it stands, the answer to something that `unit` left open.

@@ -69,7 +69,7 @@ impl Expected {
         }
     }
 
-    const fn pdu_len(self) -> Option<usize> {
+    pub(crate) const fn pdu_len(self) -> Option<usize> {
         match self.0 {
             Kind::Read { table, count } => Some(2 + table.bytes(count as usize)),
             Kind::WriteCoil { .. } | Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => {
@@ -109,6 +109,22 @@ impl Expected {
     /// Whether the answer returns a word of the request's own choosing: proof that it is the answer to this request.
     pub(crate) const fn is_echo(self) -> bool {
         matches!(self.0, Kind::Echo { .. })
+    }
+
+    /// Whether the answer repeats all that was written: it says what the unit took, whoever asked it.
+    pub(crate) const fn repeats_value(self) -> bool {
+        matches!(self.0, Kind::WriteCoil { .. } | Kind::WriteSingle { .. })
+    }
+
+    /// Address and count, as the answer has to repeat them; `None` where it repeats nothing, or more.
+    pub(crate) const fn repeats(self) -> Option<[u8; 4]> {
+        match self.0 {
+            Kind::WriteMultiple { address, count } => {
+                let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
+                Some([a, b, c, d])
+            }
+            _ => None,
+        }
     }
 
     /// Whether something may be changed: neither a read nor an echo.

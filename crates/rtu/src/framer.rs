@@ -119,6 +119,12 @@ impl Framer {
         self.own.clear();
     }
 
+    /// From now on takes frames of any unit and both directions, what is held included.
+    pub(crate) const fn listen(&mut self) {
+        self.expect = None;
+        self.patience = None;
+    }
+
     /// From now on takes frames of any unit and both directions; what is held is dropped.
     pub fn expect_anything(&mut self) {
         self.clear();

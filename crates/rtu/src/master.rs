@@ -18,6 +18,7 @@ use crate::event::{BeginError, Event, Tally};
 use crate::expected::Expected;
 use crate::frame::{Adu, Frame};
 use crate::framer::Framer;
+use crate::others::Others;
 use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
@@ -67,6 +68,7 @@ pub struct Master {
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
     doubts: Doubts,
+    others: Others,
     tally: Tally,
 }
 
@@ -124,6 +126,7 @@ impl Master {
             torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,
+            others: Others::NONE,
             tally: Tally::EMPTY,
         }
     }
@@ -174,7 +177,11 @@ impl Master {
         if destination == Destination::Broadcast && !request.is_write() {
             return Err(BeginError::BroadcastRead);
         }
-        self.framer.expect_anything();
+        if self.others.may_be() {
+            self.framer.listen();
+        } else {
+            self.framer.expect_anything();
+        }
         self.request.set_request(destination, request);
         // Nothing is known of a line that was never watched: it may be busy now.
         self.busy.get_or_insert(now);
@@ -272,6 +279,7 @@ impl Master {
                     }
                     self.echo_due = self.strips_echo;
                     self.doubts.goes_out();
+                    self.others.goes_out();
                     self.beside.clear();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
@@ -340,6 +348,29 @@ impl Master {
         }
     }
 
+    /// Says whether another master may ask on this line, so that its answers are heard here, too: some serial servers copy
+    /// every byte to all who are connected. Not so at first.
+    ///
+    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
+    /// [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
+    pub const fn expect_others(&mut self, may_be: bool) {
+        self.others.expect(may_be);
+    }
+
+    /// Takes down what others say, while nothing is in flight on a line that may have others: what was held behind the
+    /// latest answer, too.
+    pub fn overhear(&mut self, now: Instant) {
+        if self.others.may_be() && matches!(self.state, State::Idle) {
+            self.framer.listen();
+            self.count_strays(now);
+        }
+    }
+
+    /// Whether another master was heard that asks `unit`.
+    pub fn has_others(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.others.are_at(now, unit)
+    }
+
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or
     /// a read whose answer cannot be mistaken.
     pub fn in_quarantine(&self, now: Instant, unit: UnitAddress) -> bool {
@@ -360,13 +391,17 @@ impl Master {
     /// Whether the answer of `unit` to `request`, asked at `now`, could not be mistaken for any that it may still give:
     /// then it ends a quarantine.
     pub fn tells_apart(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> bool {
-        self.doubts.tells_apart(now, unit, request.expected())
+        let expected = request.expected();
+        self.doubts.tells_apart(now, unit, expected) && self.others.ask(now, unit, expected).is_none()
     }
 
     /// How sure the answer to `request` can be that `unit` is asked at `now`. Certain while nothing that it owes could
     /// overtake.
     pub fn attribution(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Attribution {
-        self.doubts.attribution(now, unit, request.expected())
+        match self.others.ask(now, unit, request.expected()) {
+            Some(until) => Attribution::Others(until),
+            None => self.doubts.attribution(now, unit, request.expected()),
+        }
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.

@@ -163,7 +163,7 @@ impl Program {
             return None;
         }
         match attribution {
-            Attribution::Wait(_) => None,
+            Attribution::Wait(_) | Attribution::Others(_) => None,
             sure => Some(Question::Plain(sure)),
         }
     }

@@ -31,7 +31,8 @@ impl Owner {
             Request::Read { table: Table::Holding, address, .. } => address,
             _ => 0,
         };
-        let Ok(read) = Request::read(address, 1) else {
+        let count = self.free_length(ask.destination, address);
+        let Ok(read) = Request::read(address, count) else {
             return Ok(());
         };
         tried.looks += 1;

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, Destination, Event, ExceptionCode, Instant, Master};
+use drivebus_rtu::{Adu, Answer, AnswerError, Destination, Event, ExceptionCode, Instant, Master};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
@@ -204,6 +204,7 @@ fn conclude(
             return Ok(Done { sent, ended });
         }
         (Event::BroadcastDone, Some(sent)) => return Ok(Done { sent, ended }),
+        (Event::Wrong { error: AnswerError::Others, frame }, _) => (Failure::OthersAsk, frame),
         (Event::Wrong { error, frame }, _) => (Failure::Wrong(error), frame),
         (Event::Corrupt { error, bytes }, _) => (Failure::Corrupt(error), bytes),
         (Event::NoAnswer { bytes }, _) => (Failure::NoAnswer { timeout, attempts: 1 }, bytes),

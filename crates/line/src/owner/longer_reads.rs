@@ -32,16 +32,31 @@ impl Longer {
     /// How many words to ask for, as many as `request` does or more, so that the answer of `unit` can be no other's; `None`
     /// where nothing helps.
     pub(crate) fn form(&self, master: &Master, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
-        let Request::Read { table, address, count, .. } = *request else { return None };
-        let refused = self.0.get(&(unit, (table, address))).map_or(u16::MAX, |limit| limit.refused);
         let find = |tells_apart: &dyn Fn(&Request<'_>) -> bool| {
-            let mut given = (count..=count.max(MAX_WORDS)).take_while(|&words| words < refused);
-            given.find(|&words| Request::read_of(table, address, words).is_ok_and(|read| tells_apart(&read)))
+            self.lengths(unit, request).find(|(_, read)| tells_apart(read)).map(|(words, _)| words)
         };
         // More words than anything open has, so that not even an answer that is cut short could pass; else another number.
         find(&|read| master.tells_apart(now, unit, read)).or_else(|| {
             let is_sure = |read: &Request<'_>| !master.attribution(now, unit, read).may_be_mistaken();
             find(&is_sure).filter(|_| !master.in_quarantine(now, unit))
+        })
+    }
+
+    /// The reads of so many words as `request` asks for, and of more, that `unit` was not heard to refuse.
+    pub(crate) fn lengths<'r>(
+        &self,
+        unit: UnitAddress,
+        request: &Request<'r>,
+    ) -> impl Iterator<Item = (u16, Request<'r>)> + use<'r> {
+        let asked = match *request {
+            Request::Read { table, address, count, .. } => Some((table, address, count)),
+            _ => None,
+        };
+        let limit = asked.and_then(|(table, address, _)| self.0.get(&(unit, (table, address))));
+        let refused = limit.map_or(u16::MAX, |limit| limit.refused);
+        asked.into_iter().flat_map(move |(table, address, count)| {
+            let given = (count..=count.max(MAX_WORDS)).take_while(move |&words| words < refused);
+            given.filter_map(move |words| Some((words, Request::read_of(table, address, words).ok()?)))
         })
     }
 

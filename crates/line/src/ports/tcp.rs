@@ -74,6 +74,11 @@ impl Line for RtuOverTcp {
         self.connection.stream.peer_addr().ok()
     }
 
+    /// Some servers copy every byte of their line to all clients.
+    fn may_have_others(&self) -> bool {
+        true
+    }
+
     /// The server's own transceiver may hear what it sends, as an adapter's may.
     fn may_echo(&self) -> bool {
         true

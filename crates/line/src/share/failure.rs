@@ -121,9 +121,11 @@ impl From<&Failure> for Said {
                 Self::Crc { computed: *computed, received: *received }
             }
             Failure::Refused { function, code } => Self::Refused { function: *function, code: code.0 },
-            Failure::Wrong(_) | Failure::Corrupt(_) | Failure::Unheard { .. } | Failure::Elsewhere { .. } => {
-                Self::BadAnswer { message: failure.to_string() }
-            }
+            Failure::Wrong(_)
+            | Failure::Corrupt(_)
+            | Failure::Unheard { .. }
+            | Failure::OthersAsk
+            | Failure::Elsewhere { .. } => Self::BadAnswer { message: failure.to_string() },
         }
     }
 }
@@ -230,6 +232,7 @@ mod tests {
             Failure::Corrupt(FrameError::Crc { computed: 1, received: 2 }),
             Failure::Refused { function: 3, code: ExceptionCode(2) },
             Failure::Wrong(wrong),
+            Failure::OthersAsk,
         ]
     }
 
@@ -239,7 +242,7 @@ mod tests {
             let bytes = postcard::to_stdvec(&Said::from(&failure)).unwrap();
             let told = Failure::from(postcard::from_bytes::<Said>(&bytes).unwrap());
             assert_eq!((told.to_string(), told.kind()), (failure.to_string(), failure.kind()));
-            if !matches!(failure, Failure::Wrong(_)) {
+            if !matches!(failure, Failure::Wrong(_) | Failure::OthersAsk) {
                 assert_eq!(told, failure);
             }
         }

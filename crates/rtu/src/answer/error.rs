@@ -66,6 +66,8 @@ pub enum AnswerError {
         /// Why.
         code: ExceptionCode,
     },
+    /// It looks like the answer, and like those to another master's questions that were overheard.
+    Others,
 }
 
 impl fmt::Display for AnswerError {
@@ -84,7 +86,10 @@ impl fmt::Display for AnswerError {
             Self::Coil { value } => write!(f, "a coil is FF00H or 0000H, {value:04X}H came"),
             Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
             Self::Refusal { code } => {
-                write!(f, "exception {:02X}H came, which may be meant for an earlier read", code.0)
+                write!(f, "exception {:02X}H came, which may be meant for another request", code.0)
+            }
+            Self::Others => {
+                f.write_str("another master asks the same of this unit, and nothing tells whose answer it is")
             }
         }
     }

@@ -9,8 +9,23 @@ use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
 use crate::expected::Expected;
+use crate::frame::Frame;
 use crate::framer::Step;
 use crate::{Instant, UnitAddress};
+
+/// What is told of `frame` at the end of the wait, which may be another's and came in the place of the answer to `expected`.
+/// `doubted`: its unit owes others.
+fn passed_over(expected: Expected, frame: Frame<'_>, doubted: bool) -> Event<'_> {
+    match expected.judge(frame.pdu()) {
+        Ok(answer) if expected.is_read() && !doubted => Event::Answer(answer),
+        // Had a write been refused, it would not have been done; that is not known.
+        Ok(Answer::Exception { code, .. }) => {
+            Event::Wrong { error: AnswerError::Refusal { code }, frame: frame.as_bytes() }
+        }
+        Ok(_) => Event::Wrong { error: AnswerError::Others, frame: frame.as_bytes() },
+        Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
+    }
+}
 
 impl Master {
     /// What came of the request in flight by `now`, if anything did.
@@ -59,6 +74,11 @@ impl Master {
                             self.see(now, range);
                             self.tally.add_late();
                         }
+                        // It may be theirs, and the own answer still comes.
+                        Ok(Answer::Exception { .. }) | Err(_) if self.others.use_function(now, unit, expected) => {
+                            self.beside.cut();
+                            self.pass(now, range);
+                        }
                         // Refusals of reads look alike: it may be meant for an earlier one, and then this one's is owed.
                         Ok(Answer::Exception { code, .. }) if apart && doubted && expected.is_read() => {
                             self.give_account(false);
@@ -68,6 +88,15 @@ impl Master {
                             let frame = self.framer.held(range);
                             return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
                         }
+                        // Nothing tells whose words these are.
+                        Ok(Answer::Read { .. }) if self.others.ask(now, unit, expected).is_some() => {
+                            self.give_account(false);
+                            self.state = State::Idle;
+                            self.hear(now, range.clone());
+                            self.doubts.left_open(now, unit, expected, timeout);
+                            let frame = self.framer.held(range);
+                            return Some(Event::Wrong { error: AnswerError::Others, frame });
+                        }
                         // So do those of writes, and what went out in doubt was not refused because another was.
                         Ok(Answer::Exception { .. })
                             if expected.is_write() && self.doubts.may_refuse_another(now, unit, expected) =>
@@ -76,6 +105,7 @@ impl Master {
                             self.tally.add_late();
                         }
                         Err(error) if self.patience.is_some() => {
+                            self.see_if_others(now, range.clone());
                             self.spoils(&range, Why::Wrong(error));
                             self.add_beside(range);
                         }
@@ -85,7 +115,11 @@ impl Master {
                             let right = wrong.is_none();
                             self.give_account(right);
                             self.state = State::Idle;
-                            self.hear(now, range.clone());
+                            if right || !self.others.may_be() {
+                                self.hear(now, range.clone());
+                            } else {
+                                self.see(now, range.clone());
+                            }
                             // The answer proves that the request has left the wire, whatever was computed; but not one
                             // that may be late.
                             if apart || !doubted {
@@ -113,10 +147,16 @@ impl Master {
     fn end_in_vain(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Event<'_> {
         self.give_account(false);
         self.state = State::Idle;
+        let doubted = self.others.passed().is_some() && self.in_quarantine(now, unit);
         match self.is_still_open(now, unit, expected) {
             Open::No => self.doubts.taken(now, unit, expected, timeout, false),
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
             Open::Long => self.doubts.left_open(now, unit, expected, timeout),
+        }
+        if !self.beside.is_spoilt()
+            && let Some(frame) = self.others.passed()
+        {
+            return passed_over(expected, frame, doubted);
         }
         self.beside.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() })
     }
@@ -169,7 +209,26 @@ impl Master {
     fn see(&mut self, now: Instant, range: Range<usize>) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
         self.torn.see(&frame);
-        self.doubts.seen(now, &frame, at_once);
+        let is_nobodys = self.doubts.seen(now, &frame, at_once);
+        if is_nobodys && self.others.may_be() && frame.as_bytes() != self.request.as_bytes() {
+            let strange = UnitAddress::new(frame.address()).ok();
+            let strange_until = strange.and_then(|unit| self.doubts.first_contact_ends(now, unit));
+            self.others.hear(now, &frame, strange_until);
+        }
+    }
+
+    /// A frame came in the place of the answer that is not it.
+    fn see_if_others(&mut self, now: Instant, range: Range<usize>) {
+        if self.others.may_be() {
+            self.see(now, range);
+        }
+    }
+
+    /// A frame came in the place of the answer that may be theirs.
+    fn pass(&mut self, now: Instant, range: Range<usize>) {
+        self.others.pass(&self.framer.frame(range.clone()));
+        self.see(now, range);
+        self.tally.add_foreign();
     }
 
     /// A frame came that answers what is in flight.

@@ -7,6 +7,7 @@ mod asker;
 mod beside;
 mod forgotten;
 mod open;
+mod others;
 mod quarantine;
 mod torn;
 mod turns;

@@ -3,7 +3,7 @@
 
 use std::sync::MutexGuard;
 
-use drivebus_rtu::{Agreement, Answer, AnswerError, Attribution, Request};
+use drivebus_rtu::{Adu, Agreement, Answer, AnswerError, Attribution, Frame, Request};
 
 use crate::ask::{Ask, Done};
 use crate::bus::call::course::{Course, Form, Hearing};
@@ -25,6 +25,8 @@ enum Question {
     New(Attribution),
     /// As it is, although it may be another one that is confirmed: whether it was taken is looked up afterwards.
     Unproven,
+    /// The same, and nothing can be looked up.
+    Untold,
 }
 
 impl<'b> Call<'b, '_> {
@@ -54,6 +56,13 @@ impl<'b> Call<'b, '_> {
                 Question::Same(Form::Apart(count)) | Question::Apart(count) => {
                     let again = matches!(question, Question::Same(_));
                     match self.ask_apart(course, &mut owner, count, again, give_up, take) {
+                        // It was asked as the caller did, and is the own one as far as that can be told.
+                        Err(error) if self.is_asked_by(&error) && owner.may_have_others() => return Err(error),
+                        // Another master has the same length: the next has one that it was not heard to have.
+                        Err(error) if error.failure == Failure::OthersAsk => {
+                            course.asks_otherwise();
+                            continue;
+                        }
                         Err(error) if is_refusal(&error.failure) && !self.is_to_ask_again(&error) => {
                             // It may be meant for something else that was asked, or for the words that nobody asked for.
                             apart = false;
@@ -67,6 +76,10 @@ impl<'b> Call<'b, '_> {
                     course.is_unproven();
                     let result = put(course, &mut owner, &self.ask, Form::Plain, give_up, &mut |_| ());
                     return owner.unless_echoed(&self.ask, result, give_up);
+                }
+                Question::Untold => {
+                    let done = put(course, &mut owner, &self.ask, Form::Plain, give_up, &mut |_| ())?;
+                    return Err(self.ask.failed(Failure::OthersAsk, Some(done.sent), done.ended, &[]));
                 }
                 // What was heard goes on.
                 Question::Same(Form::Repeated) => Attribution::Certain,
@@ -117,6 +130,9 @@ impl<'b> Call<'b, '_> {
             if self.connection.is_some_and(|known| known != owner.stats().reconnects) {
                 return Err(self.ask.failed(Failure::Reopened, None, self.bus.now_of(&owner), &[]));
             }
+            if let Err(failure) = owner.overhear() {
+                return Err(self.ask.failed(failure, None, self.bus.now_of(&owner), &[]));
+            }
             let in_time = course.is_in_time(self.bus.now_of(&owner));
             if !course.sends() {
                 return Err(match &course.hearing {
@@ -132,6 +148,9 @@ impl<'b> Call<'b, '_> {
             match owner.next(&self.ask, tried, in_time, apart) {
                 Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
                 Next::AskApart(count) => return Ok((owner, Question::Apart(count))),
+                Next::OthersAsk => {
+                    return Err(self.ask.failed(Failure::OthersAsk, None, self.bus.now_of(&owner), &[]));
+                }
                 Next::LookForEcho => owner.look_for_echo(&self.ask, tried, give_up)?,
                 Next::Probe(unit, probe) => {
                     owner.probe(unit, probe, &self.ask, tried, give_up)?;
@@ -143,7 +162,10 @@ impl<'b> Call<'b, '_> {
                     }
                 }
                 // Where the words can be read, what they are is known sooner than who was confirmed.
-                Next::Overtaken(_) if self.read_back.is_some() => return Ok((owner, Question::Unproven)),
+                Next::Overtaken(_) | Next::AskUntold if self.read_back.is_some() => {
+                    return Ok((owner, Question::Unproven));
+                }
+                Next::AskUntold => return Ok((owner, Question::Untold)),
                 Next::Overtaken(until) => {
                     drop(owner);
                     self.stand_by(turn, until, give_up)?;
@@ -166,6 +188,11 @@ impl<'b> Call<'b, '_> {
         }
     }
 
+    /// Whether `error` is the refusal of what was asked, and that had the caller's own length.
+    fn is_asked_by(&self, error: &CallError) -> bool {
+        matches!(error.failure, Failure::Refused { .. }) && error.request == self.ask.frame()
+    }
+
     /// Asks as a read of `count` words, which tells its answer apart, and gives those that were asked for to `take`.
     fn ask_apart(
         &self,
@@ -186,7 +213,25 @@ impl<'b> Call<'b, '_> {
             owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
         }
         let ask = Ask { request: &request, in_doubt: again, ..self.ask };
-        let result = put(course, owner, &ask, Form::Apart(count), give_up, &mut |answer| take(answer.shortened(asked)));
+        let is_unproven = owner.is_unproven(unit, &request);
+        let mut held = Adu::new();
+        let mut result = put(course, owner, &ask, Form::Apart(count), give_up, &mut |answer| {
+            if is_unproven {
+                held.set_answer(unit, &answer);
+            } else {
+                take(answer.shortened(asked));
+            }
+        });
+        if let (true, Ok(done)) = (is_unproven, &result) {
+            if owner.prove(unit, &ask, give_up)? {
+                let answer = Frame::parse(held.as_bytes()).ok();
+                if let Some(Ok(answer)) = answer.map(|frame| request.expected().judge(frame.pdu())) {
+                    take(answer.shortened(asked));
+                }
+            } else {
+                result = Err(ask.failed(Failure::OthersAsk, Some(done.sent), done.ended, held.as_bytes()));
+            }
+        }
         if count > asked {
             match &result {
                 Ok(_) => owner.longer.given(unit, (table, address)),

@@ -181,7 +181,9 @@ impl Course {
         let is_over = (cost > 0 && self.left == 0) || self.attempts > self.asked.saturating_add(PROBED_IN_VAIN);
         self.left = self.left.saturating_sub(cost);
         let in_time = error.ended.is_some_and(|ended| self.is_in_time(ended));
-        !is_over && self.requests > 0 && (to_ask_again || is_passing(&error.failure)) && in_time
+        // In another length it may be told apart.
+        let is_passing = is_passing(&error.failure) || (error.failure == Failure::OthersAsk && error.sent.is_some());
+        !is_over && self.requests > 0 && (to_ask_again || is_passing) && in_time
     }
 }
 
