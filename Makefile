@@ -177,7 +177,6 @@ matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(BIN)/python -m pytest -q tests/python/test_cli_screens.py
 
-
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)
 
