@@ -168,8 +168,8 @@ bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 	$(BENCH_PEERS)/bin/python tools/bench_report.py $(ONLY)
 
 # The tests of which `make test` runs a sample, whole; any test may go to any core.
-MATRIX := test_halts_of_other_families test_unconfirmed_writes test_halts_refused test_hal_refused test_panel_refused \
-          test_ends_beside_others test_ends_refused
+MATRIX := test_halts_of_other_families test_halts_awaited test_unconfirmed_writes test_halts_refused test_hal_refused \
+          test_panel_refused test_ends_beside_others test_ends_refused
 
 matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 	DRIVEBUS_MATRIX=all $(BIN)/python -m pytest -q -n $(TEST_JOBS) -p no:benchmark $(MATRIX:%=tests/python/%.py)

@@ -1,128 +1,32 @@
 """No halt of a family starts, reverses or sets anything in a drive of another: every pair, by the drives' own logs.
 
-`matrix` says what a case is and who judges; here it is told, as programs and people tell it. `make test` runs a sample
-of all cases, `make matrix` all of them, in some minutes.
+`matrix` says what a case is and who judges, `matrix_ways` how it is told. `make test` runs a sample of all cases, `make
+matrix` all of them, in some minutes. What is awaited has a file of its own, so that they run side by side.
 """
 
 from __future__ import annotations
 
-import asyncio
 import os
-from collections import Counter
 from contextlib import suppress
-from typing import Any
-from unittest.mock import patch
 
 import pytest
 from click.testing import CliRunner
 
-import drivebus
-import drivebus.aio
 from drivebus import Bus, DrivebusError, Profile, Simulator
 from drivebus.cli import cli
-from drivebus.site import forget, remember
+from drivebus.site import remember
 
-from .matrix import FAMILIES, WAYS, Case, Judge, Machine, cases, own_halts, sample, set_going
+from .matrix import FAMILIES, WAYS, Case, Machine, cases, own_halts, sample, set_going
+from .matrix_ways import blocks_begun, told, tried
 
 NO_SETPOINT = ("chf100a", "saj8000m")
 """No document prints where they take one."""
 
-PORT = "/dev/matrix"
-"""What the command line opens; the simulated line stands behind it."""
 
-COMMANDS = {
-    "stop": ["stop"],
-    "coast": ["coast"],
-    "reset_fault": ["reset", "--yes"],
-    "stop_all": ["stop", "--all"],
-    "jog block": ["jog", "--yes", "--force"],
-}
-
-
-def by_python(simulator: Simulator, case: Case, judge: Judge) -> str:
-    with Bus(simulator) as bus:
-        if case.known == "identified":
-            with suppress(DrivebusError):
-                bus.identify(1)
-        drive = bus.drive(1, case.named, unverified=True, trust_profile=case.known == "trusted")
-        if case.known == "identified":
-            with suppress(DrivebusError):
-                drive.contradiction()
-        try:
-            if case.is_block:
-                block = drive.jogging if case.halt == "jog block" else drive.running
-                with block(force=True, confirm=0.0):
-                    judge.begin()
-            else:
-                (bus.stop_all if case.halt == "stop_all" else getattr(drive, case.halt))()
-        except DrivebusError as error:
-            return f"{type(error).__name__}: {error}"
-    return ""
-
-
-async def by_asyncio(simulator: Simulator, case: Case, judge: Judge) -> str:
-    async with drivebus.aio.Bus(simulator) as bus:
-        if case.known == "identified":
-            with suppress(DrivebusError):
-                await bus.identify(1)
-        drive = await bus.drive(1, case.named, unverified=True, trust_profile=case.known == "trusted")
-        if case.known == "identified":
-            with suppress(DrivebusError):
-                await drive.contradiction()
-        try:
-            if case.is_block:
-                block = drive.jogging if case.halt == "jog block" else drive.running
-                async with block(force=True, confirm=0.0):
-                    judge.begin()
-            else:
-                await (bus.stop_all if case.halt == "stop_all" else getattr(drive, case.halt))()
-        except DrivebusError as error:
-            return f"{type(error).__name__}: {error}"
-    return ""
-
-
-def by_command_line(simulator: Simulator, case: Case) -> str:
-    def opened(_: object, **settings: Any) -> Bus:
-        return Bus(simulator, **settings)
-
-    options = ["--port", PORT, "--unverified"]
-    if case.known in ("named", "trusted"):
-        options += ["--profile", case.named]
-    if case.known == "trusted":
-        options += ["--trust-profile"]
-    if case.known == "remembered" or case.halt == "stop_all":
-        # `stop --all` knows no unit that is neither in drivebus.toml nor remembered.
-        remember(PORT, 1, case.named)
-    with patch.object(drivebus, "Bus", opened):
-        done = CliRunner().invoke(cli, [*options, *COMMANDS[case.halt]])
-    forget(PORT, 1)
-    assert done.exception is None or isinstance(done.exception, SystemExit), (case, done.exception)
-    return "" if done.exit_code == 0 else f"exit code {done.exit_code}: {done.output}"
-
-
-def told(simulator: Simulator, case: Case) -> tuple[Judge, list[str]]:
-    """The judge of *case*, which was told, and whatever was wrong."""
-    judge = Judge(simulator, case)
-    if case.by == "python":
-        failure = by_python(simulator, case, judge)
-    elif case.by == "asyncio":
-        failure = asyncio.run(by_asyncio(simulator, case, judge))
-    else:
-        failure = by_command_line(simulator, case)
-    return judge, list(judge.verdict(failure))
-
-
-@pytest.mark.parametrize("by", WAYS)
+@pytest.mark.parametrize("by", ["python", "command line"])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_halt_starts_reverses_or_sets_anything(family: str, by: str) -> None:
-    tried: Counter[str] = Counter()
-    wrong: list[str] = []
-    with Machine(family) as machine:
-        for case in sample(family, by):
-            wrong += told(machine.put(case.before), case)[1]
-            tried[case.motion] += 1
-    assert {*tried} == {case.motion for case in cases(family, by)}
-    assert not wrong, f"{len(wrong)} are wrong, of {sum(tried.values())} cases:\n" + "\n".join(wrong[:20])
+    tried(family, by)
 
 
 def test_the_sample_has_every_pair_and_every_kind_of_case() -> None:
@@ -132,20 +36,9 @@ def test_the_sample_has_every_pair_and_every_kind_of_case() -> None:
     assert {case[2:] for case in run} == {case[2:] for case in every}
 
 
-@pytest.mark.parametrize("by", ["python", "asyncio"])
-def test_blocks_do_begin_by_another_name(by: str) -> None:
+def test_blocks_do_begin_by_another_name() -> None:
     """Most are refused. Of the others the matrix judges the end, and so there must be some; each pair is tried here."""
-    begun: Counter[str] = Counter()
-    wrong: list[str] = []
-    for family in FAMILIES:
-        with Machine(family) as machine:
-            for case in cases(family, by):
-                if case[2:] == ("block", by, "trusted", "at rest") and case.named != family:
-                    judge, said = told(machine.put(case.before), case)
-                    begun[family] += judge.has_begun
-                    wrong += said
-    assert begun.total() >= 50, begun
-    assert not wrong, "\n".join(wrong)
+    assert blocks_begun("python").total() >= 50
 
 
 @pytest.mark.parametrize("named", ["gd600", "gd3000"])
