@@ -100,3 +100,19 @@ def test_ctrl_c_again_while_it_stops_leaves_no_motor_running(simulator: Simulato
     done = run(simulator, inside, "asyncio")
     assert done.returncode == -signal.SIGINT
     assert commands(simulator)[:2] == [FORWARD, STOP]
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_signal_that_does_not_wake_the_loop_is_heard_all_the_same(simulator: Simulator, loop: str) -> None:
+    """It came just before the loop began to wait, or to another thread. Nothing else wakes this one."""
+    inside = """
+        import subprocess, threading, time
+        threading.Thread(target=time.sleep, args=(1000,), daemon=True).start()
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])
+        sending = "import os, signal, sys; os.kill(int(sys.argv[1]), signal.SIGTERM)"
+        subprocess.Popen([sys.executable, "-c", sending, str(os.getpid())])
+        await asyncio.Event().wait()
+"""
+    ended = run(simulator, inside.strip(), loop)
+    assert ended.returncode == 128 + signal.SIGTERM, ended.stderr
+    assert [value for _, address, value in simulator.drive(1).writes() if address == CONTROL] == [FORWARD, STOP]

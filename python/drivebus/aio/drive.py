@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Any, overload
 
 from drivebus import checks
+from drivebus.aio.awake import Awake
 from drivebus.aio.watchdog import Watchdog
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
@@ -225,10 +226,14 @@ class Drive(DriveFace):
 @asynccontextmanager
 async def _block(block: MotorBlock) -> AsyncIterator[None]:
     """Starts, and ends by all means."""
+    awake = Awake()
     try:
         await block.begin()
         yield
     except BaseException as reason:
         await block.fail(reason)
         raise
-    await block.finish()
+    else:
+        await block.finish()
+    finally:
+        awake.end()

@@ -124,7 +124,7 @@ impl Tty {
         options: &TtyOptions,
         places: &Places,
     ) -> Result<Self, PortError> {
-        let port = system::open(path).map(Kept::new).map_err(|error| open_error(path, &error))?;
+        let port = Kept::opened(|| system::open(path)).map_err(|error| open_error(path, &error))?;
         let pseudo_terminal = system::is_pseudo_terminal(&port, path);
         if options.exclusive {
             system::lock(&port, pseudo_terminal).map_err(|error| open_error(path, &error))?;

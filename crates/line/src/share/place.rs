@@ -107,7 +107,7 @@ impl Place {
     /// Waits until no other program opens this port or knocks. `None` where one takes too long: then it is gone on without.
     pub(crate) fn turn(&self) -> io::Result<Option<Turn>> {
         let options = OpenOptions::new().create(true).append(true).mode(0o600).clone();
-        let file = Kept::new(options.open(self.path("lock"))?);
+        let file = Kept::opened(|| options.open(self.path("lock")))?;
         let end = monotonic() + PATIENCE;
         while flock(&*file, FlockOperation::NonBlockingLockExclusive).is_err() {
             if monotonic() >= end {

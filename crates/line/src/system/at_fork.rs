@@ -10,21 +10,59 @@
 
 use std::os::fd::RawFd;
 use std::sync::Once;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::system::inherited;
 
 static ASKED: Once = Once::new();
+/// How many forks were begun, and are over, in this process.
+static BEGUN: AtomicU64 = AtomicU64::new(0);
+static OVER: AtomicU64 = AtomicU64::new(0);
 
 /// Has every child that this process forks from here on give up what is listed then.
 pub(super) fn give_up_in_children() {
     ASKED.call_once(|| {
-        // SAFETY: `in_child` is there for as long as the process: glibc forgets it when a library is unloaded, and programs are not.
-        // It does only what a signal handler may. Where the system has no room for it, a child keeps what it has.
-        let _ = unsafe { libc::pthread_atfork(None, None, Some(in_child)) };
+        // SAFETY: they are there for as long as the process: glibc forgets them when a library is unloaded. They do only what a
+        // signal handler may. Where the system has no room for them, a child keeps what it has.
+        let _ = unsafe { libc::pthread_atfork(Some(begins), Some(is_over), Some(in_child)) };
     });
 }
 
+/// A moment of this process, by its forks.
+#[cfg(any(feature = "serial", feature = "share"))]
+pub(super) struct Forks(u64);
+
+#[cfg(any(feature = "serial", feature = "share"))]
+impl Forks {
+    /// Now, once none is under way.
+    pub(super) fn now() -> Self {
+        give_up_in_children();
+        loop {
+            let begun = BEGUN.load(Ordering::SeqCst);
+            if OVER.load(Ordering::SeqCst) == begun {
+                return Self(begun);
+            }
+            std::thread::yield_now();
+        }
+    }
+
+    /// Whether one was begun since.
+    pub(super) fn has_one_begun(&self) -> bool {
+        BEGUN.load(Ordering::SeqCst) != self.0
+    }
+}
+
+extern "C" fn begins() {
+    BEGUN.fetch_add(1, Ordering::SeqCst);
+}
+
+extern "C" fn is_over() {
+    OVER.fetch_add(1, Ordering::SeqCst);
+}
+
 extern "C" fn in_child() {
+    // Of its parent's, those of other threads may be under way for ever.
+    OVER.store(BEGUN.load(Ordering::SeqCst), Ordering::SeqCst);
     inherited::each(|nothing, number| {
         put(nothing, number);
     });
@@ -55,6 +93,28 @@ mod tests {
     use rustix::fs::{FileType, fstat};
 
     use crate::system::inherited::Kept;
+
+    #[test]
+    #[cfg(any(feature = "serial", feature = "share"))]
+    fn what_a_child_may_have_is_opened_again() {
+        let mut opened = Vec::new();
+        let kept = Kept::opened(|| {
+            let file = File::open("/dev/null")?;
+            opened.push(file.as_raw_fd());
+            if opened.len() < 3 {
+                // SAFETY: the child ends at once; who waits for it is this process, at its end.
+                unsafe {
+                    if libc::fork() == 0 {
+                        libc::_exit(0);
+                    }
+                }
+            }
+            Ok(file)
+        });
+        assert!(kept.is_ok());
+        // Other tests of this process fork, too.
+        assert!(opened.len() >= 3);
+    }
 
     #[test]
     fn a_child_has_nothing_of_what_is_kept_and_all_of_the_rest() {

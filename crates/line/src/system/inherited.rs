@@ -26,12 +26,29 @@ impl<T: std::os::fd::AsFd> Kept<T> {
     pub(crate) fn new(kept: T) -> Self {
         Self { _listed: list::Listed::new(&kept), kept }
     }
+
+    /// What `open` opens, which no child has: one that was forked before it was listed would keep the lock that it is to get.
+    #[cfg(any(feature = "serial", feature = "share"))]
+    pub(crate) fn opened(mut open: impl FnMut() -> std::io::Result<T>) -> std::io::Result<Self> {
+        loop {
+            let forks = crate::system::at_fork::Forks::now();
+            let kept = Self::new(open()?);
+            if !forks.has_one_begun() {
+                return Ok(kept);
+            }
+        }
+    }
 }
 
 #[cfg(not(unix))]
 impl<T> Kept<T> {
     pub(crate) fn new(kept: T) -> Self {
         Self { kept }
+    }
+
+    #[cfg(any(feature = "serial", feature = "share"))]
+    pub(crate) fn opened(mut open: impl FnMut() -> std::io::Result<T>) -> std::io::Result<Self> {
+        open().map(Self::new)
     }
 }
 
