@@ -8,6 +8,7 @@
 
 mod beside;
 mod judge;
+mod overheard;
 mod remnant;
 mod torn;
 
@@ -346,29 +347,6 @@ impl Master {
         if let Ok(frame) = Frame::parse(frame) {
             self.doubts.seen(now, &frame, Duration::ZERO);
         }
-    }
-
-    /// Says whether another master may ask on this line, so that its answers are heard here, too: some serial servers copy
-    /// every byte to all who are connected. Not so at first.
-    ///
-    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
-    /// [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
-    pub const fn expect_others(&mut self, may_be: bool) {
-        self.others.expect(may_be);
-    }
-
-    /// Takes down what others say, while nothing is in flight on a line that may have others: what was held behind the
-    /// latest answer, too.
-    pub fn overhear(&mut self, now: Instant) {
-        if self.others.may_be() && matches!(self.state, State::Idle) {
-            self.framer.listen();
-            self.count_strays(now);
-        }
-    }
-
-    /// Whether another master was heard that asks `unit`.
-    pub fn has_others(&self, now: Instant, unit: UnitAddress) -> bool {
-        self.others.are_at(now, unit)
     }
 
     /// Whether `unit` may still answer something else than what it is asked next, so that only an echo is sent to it, or

@@ -4,28 +4,14 @@ use core::ops::Range;
 use core::time::Duration;
 
 use super::beside::Why;
+use super::overheard::passed_over;
 use super::torn::{Open, is_left_of_answer};
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
 use crate::expected::Expected;
-use crate::frame::Frame;
 use crate::framer::Step;
 use crate::{Instant, UnitAddress};
-
-/// What is told of `frame` at the end of the wait, which may be another's and came in the place of the answer to `expected`.
-/// `doubted`: its unit owes others.
-fn passed_over(expected: Expected, frame: Frame<'_>, doubted: bool) -> Event<'_> {
-    match expected.judge(frame.pdu()) {
-        Ok(answer) if expected.is_read() && !doubted => Event::Answer(answer),
-        // Had a write been refused, it would not have been done; that is not known.
-        Ok(Answer::Exception { code, .. }) => {
-            Event::Wrong { error: AnswerError::Refusal { code }, frame: frame.as_bytes() }
-        }
-        Ok(_) => Event::Wrong { error: AnswerError::Others, frame: frame.as_bytes() },
-        Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
-    }
-}
 
 impl Master {
     /// What came of the request in flight by `now`, if anything did.
@@ -206,29 +192,15 @@ impl Master {
     }
 
     /// A frame came that answers nothing in flight.
-    fn see(&mut self, now: Instant, range: Range<usize>) {
+    pub(super) fn see(&mut self, now: Instant, range: Range<usize>) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
         self.torn.see(&frame);
-        let is_nobodys = self.doubts.seen(now, &frame, at_once);
-        if is_nobodys && self.others.may_be() && frame.as_bytes() != self.request.as_bytes() {
-            let strange = UnitAddress::new(frame.address()).ok();
-            let strange_until = strange.and_then(|unit| self.doubts.first_contact_ends(now, unit));
+        if self.doubts.seen(now, &frame, at_once) && self.others.may_be() && frame.as_bytes() != self.request.as_bytes()
+        {
+            let first_contact = UnitAddress::new(frame.address()).ok();
+            let strange_until = first_contact.and_then(|unit| self.doubts.first_contact_ends(now, unit));
             self.others.hear(now, &frame, strange_until);
         }
-    }
-
-    /// A frame came in the place of the answer that is not it.
-    fn see_if_others(&mut self, now: Instant, range: Range<usize>) {
-        if self.others.may_be() {
-            self.see(now, range);
-        }
-    }
-
-    /// A frame came in the place of the answer that may be theirs.
-    fn pass(&mut self, now: Instant, range: Range<usize>) {
-        self.others.pass(&self.framer.frame(range.clone()));
-        self.see(now, range);
-        self.tally.add_foreign();
     }
 
     /// A frame came that answers what is in flight.

@@ -1,0 +1,64 @@
+//! A line that another master may ask on: when there can be one, what is taken down of it, and what came in the place of an
+//! answer that may be the other's.
+
+use core::ops::Range;
+
+use super::{Master, State};
+use crate::answer::{Answer, AnswerError};
+use crate::event::Event;
+use crate::expected::Expected;
+use crate::frame::Frame;
+use crate::{Instant, UnitAddress};
+
+impl Master {
+    /// Says whether another master may ask on this line, so that its answers are heard here, too: some serial servers copy
+    /// every byte to all who are connected. Not so at first.
+    ///
+    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
+    /// [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
+    pub const fn expect_others(&mut self, may_be: bool) {
+        self.others.expect(may_be);
+    }
+
+    /// Takes down what others say, while nothing is in flight on a line that may have others: what was held behind the
+    /// latest answer, too.
+    pub fn overhear(&mut self, now: Instant) {
+        if self.others.may_be() && matches!(self.state, State::Idle) {
+            self.framer.listen();
+            self.count_strays(now);
+        }
+    }
+
+    /// Whether another master was heard that asks `unit`.
+    pub fn has_others(&self, now: Instant, unit: UnitAddress) -> bool {
+        self.others.are_at(now, unit)
+    }
+
+    /// A frame came in the place of the answer that is not it.
+    pub(super) fn see_if_others(&mut self, now: Instant, range: Range<usize>) {
+        if self.others.may_be() {
+            self.see(now, range);
+        }
+    }
+
+    /// A frame came in the place of the answer that may be theirs.
+    pub(super) fn pass(&mut self, now: Instant, range: Range<usize>) {
+        self.others.pass(&self.framer.frame(range.clone()));
+        self.see(now, range);
+        self.tally.add_foreign();
+    }
+}
+
+/// What is told of `frame` at the end of the wait, which may be another's and came in the place of the answer to `expected`.
+/// `doubted`: its unit owes others.
+pub(super) fn passed_over(expected: Expected, frame: Frame<'_>, doubted: bool) -> Event<'_> {
+    match expected.judge(frame.pdu()) {
+        Ok(answer) if expected.is_read() && !doubted => Event::Answer(answer),
+        // Had a write been refused, it would not have been done; that is not known.
+        Ok(Answer::Exception { code, .. }) => {
+            Event::Wrong { error: AnswerError::Refusal { code }, frame: frame.as_bytes() }
+        }
+        Ok(_) => Event::Wrong { error: AnswerError::Others, frame: frame.as_bytes() },
+        Err(error) => Event::Wrong { error, frame: frame.as_bytes() },
+    }
+}
