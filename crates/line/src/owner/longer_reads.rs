@@ -33,16 +33,21 @@ impl Longer {
     /// where nothing helps.
     pub(crate) fn form(&self, master: &Master, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
         let Request::Read { table, address, count, .. } = *request else { return None };
-        let refused = self.0.get(&(unit, (table, address))).map_or(u16::MAX, |limit| limit.refused);
         let find = |tells_apart: &dyn Fn(&Request<'_>) -> bool| {
-            let mut given = (count..=count.max(MAX_WORDS)).take_while(|&words| words < refused);
-            given.find(|&words| Request::read_of(table, address, words).is_ok_and(|read| tells_apart(&read)))
+            self.given_from(unit, (table, address), count)
+                .find(|&words| Request::read_of(table, address, words).is_ok_and(|read| tells_apart(&read)))
         };
         // More words than anything open has, so that not even an answer that is cut short could pass; else another number.
         find(&|read| master.tells_apart(now, unit, read)).or_else(|| {
             let is_sure = |read: &Request<'_>| !master.attribution(now, unit, read).may_be_mistaken();
             find(&is_sure).filter(|_| !master.in_quarantine(now, unit))
         })
+    }
+
+    /// How many words `unit` may give from `place`, `count` of them or more, in the order of their number.
+    pub(crate) fn given_from(&self, unit: UnitAddress, place: Place, count: u16) -> impl Iterator<Item = u16> + use<> {
+        let refused = self.0.get(&(unit, place)).map_or(u16::MAX, |limit| limit.refused);
+        (count..=count.max(MAX_WORDS)).take_while(move |&words| words < refused)
     }
 
     /// `unit` refused to give `count` words from `place`.
