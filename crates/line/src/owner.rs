@@ -5,6 +5,7 @@ pub(crate) mod dead_units;
 pub(crate) mod delays;
 pub(crate) mod echo;
 pub(crate) mod exchange;
+pub(crate) mod first_contact;
 mod longer_reads;
 pub(crate) mod meanings;
 pub(crate) mod opener;
@@ -29,6 +30,7 @@ use crate::owner::arrival_pauses::Lumps;
 use crate::owner::dead_units::DeadUnits;
 use crate::owner::delays::Delays;
 use crate::owner::exchange::exchange;
+use crate::owner::first_contact::{Met, Put};
 use crate::owner::longer_reads::Longer;
 use crate::owner::meanings::UnitMeanings;
 use crate::owner::opener::LineOpener;
@@ -74,6 +76,8 @@ pub(crate) struct Owner {
     /// Which reads can be asked in a longer form.
     pub(crate) longer: Longer,
     others: Others,
+    /// What its units were asked and have answered since it was opened.
+    pub(crate) met: Met,
     /// What its units say by their exceptions.
     pub(crate) meanings: Arc<UnitMeanings>,
     links: Arc<Mutex<Links>>,
@@ -115,6 +119,7 @@ impl Owner {
             resync: Resync::default(),
             longer: Longer::default(),
             others: Others::default(),
+            met: Met::default(),
             meanings: Arc::default(),
             links: Arc::default(),
             heard: [false; 256],
@@ -213,6 +218,7 @@ impl Owner {
         }
         self.others = Others::of_line(line.may_have_others());
         self.master.expect_others(self.others.may_be());
+        self.met.forget();
         self.clock = line.clock();
         self.lumps = Lumps::of(line.as_ref());
         self.line = Some(match &self.trace {
@@ -284,6 +290,30 @@ impl Owner {
         }
     }
 
+    /// How to put `ask`, a stop's, to a unit that may still answer another program and returns no echo; `None` where that is
+    /// not so, and where only time tells.
+    pub(crate) fn at_first_contact(&self, ask: &Ask<'_>) -> Option<Put> {
+        let Destination::Unit(unit) = ask.destination else { return None };
+        let now = self.now();
+        // Where another master's answers come as well, their order proves nothing.
+        let may_be_mistaken =
+            !ask.in_doubt && !self.others.may_be() && self.master.first_contact_ends(now, unit).is_some();
+        if !may_be_mistaken || !self.resync.knows_no_echo(unit) {
+            return None;
+        }
+        self.met.put(&self.master, &self.longer, now, unit, ask.request)
+    }
+
+    /// `unit` gave at `now` what could only be the answer.
+    pub(crate) fn is_sure(&mut self, now: Instant, unit: UnitAddress) {
+        self.met.is_sure(&mut self.master, now, unit);
+    }
+
+    /// What `unit` gave for `ask` by `now` may have been another program's.
+    pub(crate) fn leaves_unproven(&mut self, now: Instant, unit: UnitAddress, ask: &Ask<'_>) {
+        self.met.is_unproven(&mut self.master, now, unit, ask.request, ask.timeout);
+    }
+
     /// Sends `probe` to `unit`; what it brought, `tried` and the master know.
     ///
     /// # Errors
@@ -313,6 +343,9 @@ impl Owner {
                 if !is_line_trouble(&error.failure) {
                     return Err(error);
                 }
+                if matches!(error.failure, Failure::Refused { .. }) {
+                    self.met.answered(unit);
+                }
                 if probe == Probe::Echo && matches!(error.failure, Failure::NoAnswer { .. }) {
                     self.resync.silent_on_echo(unit);
                 }
@@ -333,6 +366,11 @@ impl Owner {
             Destination::Unit(unit) => Some(unit),
             Destination::Broadcast => None,
         };
+        let is_met =
+            ask.in_doubt && unit.is_some_and(|unit| self.master.first_contact_ends(self.now(), unit).is_some());
+        if let (true, Some(unit)) = (is_met, unit) {
+            self.met.asked(unit, ask.request);
+        }
         let is_silent = unit.is_some_and(|unit| !self.heard[usize::from(unit.get())]);
         let ask = &Ask { timeout: self.patience(ask), yields: ask.yields.filter(|_| is_silent), ..*ask };
         let result = match self.line.as_deref_mut() {
@@ -357,11 +395,16 @@ impl Owner {
         if result.is_ok() && unit.is_some() {
             self.opener.answered();
         }
+        let refused = matches!(&result, Err(error) if matches!(error.failure, Failure::Refused { .. }));
         if self.others.may_be()
             && let Some(unit) = unit
         {
-            let refused = matches!(&result, Err(error) if matches!(error.failure, Failure::Refused { .. }));
             self.others.asked(self.now(), unit, ask, refused);
+        }
+        if let (true, Some(unit)) = (is_met, unit)
+            && (result.is_ok() || refused)
+        {
+            self.met.answered(unit);
         }
         let tally = self.master.take_tally();
         self.learn(ask, &result, tally);

@@ -272,10 +272,21 @@ impl Doubts {
             Some(open) if open.count > 1 => open.count -= 1,
             other => *other = None,
         }
+        self.ends_unless_open(now, unit);
+        is_nobodys
+    }
+
+    /// At `now` it is known by other means that `unit` owes no answer to `expected`.
+    pub(crate) fn owes_no(&mut self, now: Instant, unit: UnitAddress, expected: Expected) {
+        self.forget(unit, |open| open.expected == expected);
+        self.ends_unless_open(now, unit);
+    }
+
+    /// Ends the doubt about requests of our own to `unit` where none of them is open.
+    fn ends_unless_open(&mut self, now: Instant, unit: UnitAddress) {
         if !self.has_forgotten(now, unit) && self.of(unit).all(|open| open.expected.is_echo()) {
             self.open.remove(unit);
         }
-        is_nobodys
     }
 
     /// Whether `frame` is, as it stands, the answer to something that `unit` left open.

@@ -341,6 +341,12 @@ impl Master {
         self.doubts.left_open(now, unit, request.expected(), timeout);
     }
 
+    /// Takes back what [`still_owed`](Self::still_owed) said of `request` and all like it: by `now` `unit` has shown that it
+    /// owes none of them.
+    pub fn owed_no_more(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>) {
+        self.doubts.owes_no(now, unit, request.expected());
+    }
+
     /// Says that `frame` came by `now`, and is known by other means than its bytes to answer a request before the one in flight.
     /// What it answers is owed no more. Bytes that are no frame change nothing.
     pub fn saw_late(&mut self, now: Instant, frame: &[u8]) {

@@ -8,14 +8,15 @@ use drivebus_rtu::{Destination, Request, Table, Tally};
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
 use crate::options::AdapterEcho;
-use crate::owner::resync::Tried;
+use crate::owner::resync::{MAX_WORDS, Tried};
 use crate::owner::{Owner, is_line_trouble};
 
 /// How often one attempt looks whether the adapter echoes, where noise hides it.
 const LOOKS: u32 = 3;
 
 impl Owner {
-    /// Reads one word to see whether the request comes back; what is answered does not matter.
+    /// Reads a word to see whether the request comes back; what is answered does not matter. Before a read whose answer is
+    /// to be told `apart`, one word more than that asks for.
     ///
     /// # Errors
     ///
@@ -25,14 +26,18 @@ impl Owner {
         &mut self,
         ask: &Ask<'_>,
         tried: &mut Tried,
+        apart: bool,
         give_up: &mut dyn FnMut() -> bool,
     ) -> Result<(), Box<CallError>> {
-        let address = match *ask.request {
-            Request::Read { table: Table::Holding, address, .. } => address,
-            _ => 0,
+        let (address, count) = match *ask.request {
+            Request::Read { table: Table::Holding, address, count, .. } if apart && count < MAX_WORDS => {
+                (address, count + 1)
+            }
+            Request::Read { table: Table::Holding, address, .. } => (address, 1),
+            _ => (0, 1),
         };
-        let count = self.free_length(ask.destination, address);
-        let Ok(read) = Request::read(address, count) else {
+        let count = self.free_length(ask.destination, address, count);
+        let Ok(read) = Request::read(address, count).or_else(|_| Request::read(address, 1)) else {
             return Ok(());
         };
         tried.looks += 1;
@@ -79,7 +84,7 @@ impl Owner {
             return Ok(done);
         }
         // Whatever becomes of it: what counts is whether the line has shown by then that it does not echo.
-        let _ = self.look_for_echo(ask, &mut Tried::default(), give_up);
+        let _ = self.look_for_echo(ask, &mut Tried::default(), false, give_up);
         if self.echo == AdapterEcho::Absent {
             return Ok(done);
         }

@@ -185,16 +185,16 @@ impl Owner {
         if self.master.has_others(now, unit) { by_chance(&free).copied() } else { free.first().copied() }
     }
 
-    /// How many words to read from `address` of `destination` where only what the adapter makes of it matters: one, or as
-    /// many as no other asks for.
-    pub(crate) fn free_length(&self, destination: Destination, address: u16) -> u16 {
-        let (Destination::Unit(unit), true) = (destination, self.others.may_be()) else { return 1 };
+    /// How many words to read from `address` of `destination` where only what the adapter makes of it matters: `count`, or
+    /// as many as no other asks for.
+    pub(crate) fn free_length(&self, destination: Destination, address: u16, count: u16) -> u16 {
+        let (Destination::Unit(unit), true) = (destination, self.others.may_be()) else { return count };
         let now = self.now();
         let is_free = |words: &u16| {
             let read = Request::read(address, *words);
             read.is_ok_and(|read| !matches!(self.master.attribution(now, unit, &read), Attribution::Others(_)))
         };
-        (1..=MAX_WORDS).find(is_free).unwrap_or(1)
+        (count..=MAX_WORDS).find(is_free).unwrap_or(count)
     }
 
     /// Whether nobody knows yet whether somebody else asks `unit` for what `request` does: where somebody is there, and of a

@@ -5,6 +5,7 @@
 mod broken;
 mod doubts;
 mod echoing;
+mod first_contact;
 mod hints;
 mod masters_table;
 mod odd;

@@ -60,6 +60,8 @@ pub(crate) struct Wire {
     coming: Vec<(Instant, Vec<u8>)>,
     /// The requests, in the order they were sent.
     pub(crate) sent: Vec<Vec<u8>>,
+    /// When each of them was.
+    pub(crate) times: Vec<Instant>,
     /// When the latest byte of either side was on the wire.
     busy: Instant,
     script: Script,
@@ -69,6 +71,8 @@ pub(crate) struct Wire {
     /// The same, before the next request is out.
     pub(crate) vanish_before_sending: bool,
     pub(crate) opened: u32,
+    /// What the script has arrive may be on the wire together with a request.
+    pub(crate) collides: bool,
 }
 
 impl std::fmt::Debug for Wire {
@@ -100,11 +104,13 @@ impl Line for Scripted {
         let mut wire = self.0.lock().unwrap();
         let arrived = wire.coming.iter().map(|(at, _)| *at).take_while(|at| *at <= wire.now).last();
         let busy = arrived.map_or(wire.busy, |arrived| arrived.max(wire.busy));
-        assert!(wire.now >= busy + FORMAT.t35(), "silence was broken at {:?}", wire.now);
+        assert!(wire.collides || wire.now >= busy + FORMAT.t35(), "silence was broken at {:?}", wire.now);
         let end = wire.now + FORMAT.chars(u32::try_from(bytes.len()).unwrap());
         wire.busy = end;
         let number = wire.sent.len();
         wire.sent.push(bytes.to_vec());
+        let now = wire.now;
+        wire.times.push(now);
         let pieces = (wire.echo)(number, bytes);
         wire.put(end, pieces);
         let pieces = (wire.script)(number, bytes);
@@ -192,12 +198,14 @@ impl Rig {
             now: Instant::ZERO,
             coming: Vec::new(),
             sent: Vec::new(),
+            times: Vec::new(),
             busy: Instant::ZERO,
             script: Box::new(script),
             echo: Box::new(echo),
             vanish_after_sending: false,
             vanish_before_sending: false,
             opened: 0,
+            collides: false,
         }));
         let line = Scripted(Arc::clone(&wire));
         let opening = Arc::default();

@@ -3,15 +3,16 @@
 
 use std::sync::MutexGuard;
 
-use drivebus_rtu::{Adu, Agreement, Answer, AnswerError, Attribution, Frame, Request};
+use drivebus_rtu::{Adu, Agreement, Answer, AnswerError, Attribution, Frame, Request, Table};
 
 use crate::ask::{Ask, Done};
 use crate::bus::call::course::{Course, Form, Hearing};
 use crate::bus::call::{Call, is_silence};
 use crate::bus::errand::Errand;
 use crate::error::{CallError, Failure};
+use crate::owner::first_contact::Put;
 use crate::owner::resync::Tried;
-use crate::owner::{Next, Owner};
+use crate::owner::{Next, Owner, is_line_trouble};
 use crate::turns::order::Priority;
 use crate::turns::queue::Turn;
 
@@ -27,6 +28,8 @@ enum Question {
     Unproven,
     /// The same, and nothing can be looked up.
     Untold,
+    /// On a line that was just opened, to a unit that returns no echo.
+    AtFirstContact(Put),
 }
 
 impl<'b> Call<'b, '_> {
@@ -80,6 +83,12 @@ impl<'b> Call<'b, '_> {
                 Question::Untold => {
                     let done = put(course, &mut owner, &self.ask, Form::Plain, give_up, &mut |_| ())?;
                     return Err(self.ask.failed(Failure::OthersAsk, Some(done.sent), done.ended, &[]));
+                }
+                Question::AtFirstContact(put) => {
+                    match self.ask_at_first_contact(course, &mut owner, put, give_up, take)? {
+                        Some(done) => return Ok(done),
+                        None => continue,
+                    }
                 }
                 // What was heard goes on.
                 Question::Same(Form::Repeated) => Attribution::Certain,
@@ -145,13 +154,21 @@ impl<'b> Call<'b, '_> {
             if let Some(form) = self.unit.and_then(|unit| course.owes_only_this(|| owner.asked(unit))) {
                 return Ok((owner, Question::Same(form)));
             }
+            if self.priority == Priority::Stop
+                && !self.verify
+                && let Some(put) = owner.at_first_contact(&self.ask)
+            {
+                return Ok((owner, Question::AtFirstContact(put)));
+            }
             match owner.next(&self.ask, tried, in_time, apart) {
                 Next::Ask(attribution) => return Ok((owner, Question::New(attribution))),
                 Next::AskApart(count) => return Ok((owner, Question::Apart(count))),
                 Next::OthersAsk => {
                     return Err(self.ask.failed(Failure::OthersAsk, None, self.bus.now_of(&owner), &[]));
                 }
-                Next::LookForEcho => owner.look_for_echo(&self.ask, tried, give_up)?,
+                Next::LookForEcho => {
+                    owner.look_for_echo(&self.ask, tried, self.priority == Priority::Stop, give_up)?;
+                }
                 Next::Probe(unit, probe) => {
                     owner.probe(unit, probe, &self.ask, tried, give_up)?;
                     // Who polls comes again: the others wait for one time-out at a time.
@@ -242,6 +259,69 @@ impl<'b> Call<'b, '_> {
             }
         }
         result
+    }
+
+    /// Asks as `form` says, and gives to `take` what can only be the answer; `None` where it has to be asked once more.
+    fn ask_at_first_contact(
+        &self,
+        course: &mut Course,
+        owner: &mut Owner,
+        form: Put,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Option<Done>, Box<CallError>> {
+        let (&Request::Read { table, address, count, .. }, Some(unit)) = (self.ask.request, self.unit) else {
+            return Ok(None);
+        };
+        let read = match form {
+            Put::Plain => Ok(*self.ask.request),
+            Put::Apart(words) | Put::First(words) => Request::read_of(table, address, words),
+            Put::BehindInput => Request::read_of(Table::Input, address, 1),
+        };
+        let Ok(request) = read else { return Ok(None) };
+        if form != Put::BehindInput {
+            course.asks(owner.now());
+        }
+        if form != Put::Plain {
+            owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
+        }
+        let is_behind_all = owner.met.is_behind_all(unit);
+        let is_the_answer = matches!(form, Put::Plain | Put::Apart(_));
+        let ask = Ask { request: &request, in_doubt: true, ..self.ask };
+        let result = owner.exchange(&ask, give_up, &mut |answer| {
+            if is_the_answer {
+                take(answer.shortened(count));
+            }
+        });
+        let refused = result.as_ref().is_err_and(|error| is_refusal(&error.failure) && !self.is_to_ask_again(error));
+        let proves = match form {
+            Put::Plain => return result.map(Some),
+            Put::Apart(_) => result.is_ok(),
+            Put::First(_) => false,
+            Put::BehindInput => is_behind_all && (result.is_ok() || refused),
+        };
+        let now = owner.now();
+        if proves {
+            owner.is_sure(now, unit);
+        } else if result.is_ok() || refused {
+            owner.leaves_unproven(now, unit, &ask);
+        }
+        match (form, result) {
+            (Put::Apart(_), Ok(done)) => Ok(Some(done)),
+            (Put::Apart(words) | Put::First(words), Err(_)) if refused => {
+                // Where none is given, no more are.
+                owner.longer.refused(unit, (table, address), words.max(count + 1));
+                Ok(None)
+            }
+            (Put::Apart(words) | Put::First(words), Err(error)) => {
+                if words > count && is_silence(&error.failure) {
+                    owner.longer.silent(unit, (table, address), words);
+                }
+                Err(error)
+            }
+            (Put::BehindInput, Err(error)) if !is_line_trouble(&error.failure) => Err(error),
+            _ => Ok(None),
+        }
     }
 
     /// Whether the question has to be repeated until the answers agree. What was heard so far counts, unless somebody else

@@ -1,0 +1,42 @@
+"""How soon a stop is on a line that was just opened, to a unit that the line has not identified.
+
+Each family is named rightly. What is looked at first costs some 15 ms a question at 19200; none of it waits for a
+second, whatever the drive makes of the loop-back (08H).
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import drivebus
+from drivebus import Bus, Profile, Simulator
+
+QUESTIONS = {
+    **dict.fromkeys(("vfd500", "wj200"), (0, 4)),
+    **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
+    **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
+    **dict.fromkeys(("ms300", "eds300", "sunfar-e300", "fc51", "a1000"), (5, 90)),
+    **dict.fromkeys(("chf100a", "saj8000m"), (6, 103)),
+    **dict.fromkeys(("atv312", "v20"), (8, 140)),
+    "acs355": (9, 155),
+}
+"""Requests before the first frame that halts, and milliseconds of the line's time until it goes out, at most."""
+
+
+@pytest.mark.parametrize("family", sorted(QUESTIONS))
+def test_a_stop_of_a_family_on_a_line_just_opened(family: str) -> None:
+    with Simulator({1: family}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        bus.drive(1, family, unverified=True).stop()
+        sent = [(time, frame) for time, who, frame in simulator.line.trace() if who == "master"]
+    profile = Profile.builtin(family)
+    halts = {profile.command("stop"), profile.command_first("stop")}
+    places = {place & 0xFFFF for place, _ in filter(None, halts)}
+    is_halt = [frame[1] in (5, 6, 16) and int.from_bytes(frame[2:4], "big") in places for _, frame in sent]
+    before = is_halt.index(True)
+    requests, milliseconds = QUESTIONS[family]
+    assert before <= requests
+    assert sent[before][0] * 1e3 <= milliseconds
+
+
+def test_the_table_has_every_family_that_halts() -> None:
+    assert set(QUESTIONS) == {name for name in drivebus.profiles() if "stop" in Profile.builtin(name).commands()}
