@@ -14,8 +14,8 @@ impl Master {
     /// Says whether another master may ask on this line, so that its answers are heard here, too: some serial servers copy
     /// every byte to all who are connected. Not so at first.
     ///
-    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`]), for
-    /// [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
+    /// Then what nobody asked for casts doubt on each answer that looks like it ([`Attribution::Others`](crate::Attribution::Others)),
+    /// for [`OTHERS`](crate::OTHERS) at least. Before each request hand over what came in, and [`overhear`](Self::overhear).
     pub const fn expect_others(&mut self, may_be: bool) {
         self.others.expect(may_be);
     }
