@@ -381,10 +381,10 @@ print(guest.recv(200))
 
     def test_one_of_another_version_is_told_so(self, line: Simulator, folder: Path) -> None:
         with open_bus(line), self.knock(folder) as guest:
-            self.say(guest, b"drivebus share \x04 whatever that says")
+            self.say(guest, b"drivebus share \x05 whatever that says")
             answer = self.hear(guest)
             assert answer[0] == 1
-            assert b"speaks version 3 where this program speaks 4" in answer
+            assert b"speaks version 4 where this program speaks 5" in answer
             assert self.hear(guest) == b""
 
     @pytest.mark.parametrize(

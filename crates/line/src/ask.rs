@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Destination, Instant, Request};
+use drivebus_rtu::{Adu, Destination, Instant, Meanings, Request};
 
 use crate::error::{CallError, Failure};
 use crate::turns::queue::Stops;
@@ -22,6 +22,8 @@ pub(crate) struct Ask<'a> {
     pub(crate) in_doubt: bool,
     /// Where stops wait that go before it, even when it is on its way: its unit was silent the last time.
     pub(crate) yields: Option<&'a dyn Stops>,
+    /// What the exceptions of its unit mean to another program that asks; `None` where what is set here holds.
+    pub(crate) meanings: Option<&'a Meanings>,
 }
 
 /// When an exchange happened, on the line's clock.

@@ -268,7 +268,7 @@ impl Bus {
 
     /// Whether `unit` could not take a request, as it says by `failure`, and may the next time.
     pub(crate) fn asks_again(&self, unit: UnitAddress, failure: &Failure) -> bool {
-        self.shared.is_of_this_process() && self.shared.meanings.asks_again(unit, failure)
+        self.shared.is_of_this_process() && self.shared.meanings.asks_again(unit, None, failure)
     }
 
     /// The least silence before a request to `unit`.

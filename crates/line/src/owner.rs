@@ -415,7 +415,7 @@ impl Owner {
             }
             match &result {
                 Ok(_) => self.resync.answered(unit, ask.request, false),
-                Err(error) => match self.meanings.of(unit, &error.failure) {
+                Err(error) => match self.meanings.of(unit, ask.meanings, &error.failure) {
                     Some(Meaning::AskAgain) => self.resync.was_busy(unit, ask.request),
                     Some(_) => self.resync.answered(unit, ask.request, true),
                     None => {}

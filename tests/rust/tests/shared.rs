@@ -14,8 +14,10 @@ use drivebus_line::url::{Known, PortOptions, PortUrl};
 use drivebus_line::{
     AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Errand, Failure, Poll, PollTarget, PortErrorKind, Share,
 };
-use drivebus_rtu::{Answer, AnswerLength, Destination, Request, SerialFormat, UnitAddress};
-use drivebus_sim::{Options, PtyServer, Simulator};
+use drivebus_rtu::{
+    Answer, AnswerLength, Destination, ExceptionCode, Meaning, Meanings, Request, SerialFormat, UnitAddress,
+};
+use drivebus_sim::{Options, PtyServer, Refusals, Simulator};
 
 const IDENTIFICATION: u16 = 0x2103;
 const GD350: u16 = 0x01A0;
@@ -277,6 +279,38 @@ fn who_shares_nothing_is_alone() {
     let busy = open_as(&served, options().share(Share::Never)).map(drop).unwrap_err();
     assert!(matches!(busy, Failure::Port(error) if error.kind == PortErrorKind::Busy));
     assert_eq!(identify(&owner).unwrap(), [GD350]);
+}
+
+/// Two refusals by 01H, by which an EDS300 says that the request came damaged; the owner of the port was told of no family.
+#[test]
+fn what_a_programs_profile_says_of_exceptions_holds_for_what_it_asks_through_another() {
+    let (simulator, served) = line();
+    let (owner, guest) =
+        (open_as(&served, options().retries(1)).unwrap(), open_as(&served, options().retries(1)).unwrap());
+    let damaged = Meanings::STANDARD.with(ExceptionCode::ILLEGAL_FUNCTION, Meaning::AskAgain);
+    guest.set_meanings(unit(1), damaged);
+    assert_eq!((identify(&owner).unwrap(), identify(&guest).unwrap()), (vec![GD350], vec![GD350]));
+    let refuse = |count| {
+        let refusals = Refusals::new(ExceptionCode::ILLEGAL_FUNCTION.0).count(count);
+        simulator.drive(1).unwrap().refuse(refusals).unwrap();
+    };
+    for bus in [&guest, &owner] {
+        refuse(2);
+        let asked = bus.stats().total.requests;
+        let result = identify(bus);
+        if Arc::ptr_eq(bus, &guest) {
+            assert_eq!(result.map_err(|error| error.failure), Ok(vec![GD350]));
+            assert_eq!(bus.stats().total.requests - asked, 3);
+        } else {
+            assert!(matches!(result.unwrap_err().failure, Failure::Refused { .. }), "each by its own profile");
+        }
+    }
+    // What the owner was told holds for who knows nothing.
+    simulator.drive(1).unwrap().refuse_no_more();
+    owner.set_meanings(unit(1), damaged);
+    let third = open_as(&served, options().retries(1)).unwrap();
+    refuse(1);
+    assert_eq!(identify(&third).unwrap(), [GD350]);
 }
 
 #[test]

@@ -297,12 +297,12 @@ impl<'b, 'r> Call<'b, 'r> {
 
     /// Whether the unit could not take the request, as it says itself by `error`, and may the next time.
     fn is_to_ask_again(&self, error: &CallError) -> bool {
-        self.unit.is_some_and(|unit| self.bus.meanings.asks_again(unit, &error.failure))
+        self.unit.is_some_and(|unit| self.bus.meanings.asks_again(unit, self.ask.meanings, &error.failure))
     }
 
     /// What the unit says by `error`, if that is a refusal.
     fn means(&self, error: &CallError) -> Option<Meaning> {
-        self.unit.and_then(|unit| self.bus.meanings.of(unit, &error.failure))
+        self.unit.and_then(|unit| self.bus.meanings.of(unit, self.ask.meanings, &error.failure))
     }
 }
 

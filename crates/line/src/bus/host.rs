@@ -18,6 +18,7 @@ use drivebus_rtu::{Instant, UnitAddress};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Resource, getrlimit};
 
+use crate::ask::Ask;
 use crate::bus::call::{Call, Wanted};
 use crate::bus::shared::Shared;
 use crate::bus::workers::pdu_of;
@@ -437,7 +438,9 @@ impl Wanted for Here<'_> {
 /// Carries out `order`; `None` where it is none.
 fn call(channel: &RefCell<Channel>, shared: &Shared, order: &Order, program: Program) -> Option<Told> {
     let (destination, request, options) = (order.destination()?, order.request()?, order.options()?);
-    let ask = order.times(shared.ask_as(UnitOptions::default(), destination, &request, &options));
+    let meanings = order.meanings();
+    let ask = shared.ask_as(UnitOptions::default(), destination, &request, &options);
+    let ask = Ask { meanings: meanings.as_ref(), ..order.times(ask) };
     let here = Here(channel);
     let mut pdu = Vec::new();
     let mut words = Words { channel, said: monotonic() };

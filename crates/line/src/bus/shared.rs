@@ -245,6 +245,7 @@ impl Shared {
             gap,
             in_doubt: options.in_doubt,
             yields: (options.priority != Some(Priority::Stop)).then_some(&*self.queue as &dyn Stops),
+            meanings: None,
         }
     }
 

@@ -140,7 +140,12 @@ impl Shared {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         let priority = options.priority.unwrap_or(kind);
         let retries = options.retries.unwrap_or(self.options.retries);
-        let order = Order::new(ask, priority, retries, &options).over(|here| guest.as_counted_there(here));
+        let meanings = match ask.destination {
+            Destination::Unit(unit) => self.meanings.set_of(unit),
+            Destination::Broadcast => None,
+        };
+        let order =
+            Order::new(ask, priority, retries, &options).meaning(meanings).over(|here| guest.as_counted_there(here));
         let mut result = Err(Lost::Unknown);
         guest.ask(&Wish::Call(order), priority == Priority::Stop, give_up, &mut |told| {
             result = self.told(guest, ask, told, take);

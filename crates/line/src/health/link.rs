@@ -99,6 +99,7 @@ mod tests {
             gap: Duration::ZERO,
             in_doubt: false,
             yields: None,
+            meanings: None,
         };
         Err(ask.failed(failure, None, None, &[]))
     }

@@ -280,6 +280,7 @@ mod tests {
             gap: Duration::ZERO,
             in_doubt: true,
             yields: yields.map(|queue| queue as &dyn Stops),
+            meanings: None,
         };
         let mut master = Master::new(&SerialFormat::DEFAULT);
         let known = (None, &mut Lumps::of(line));

@@ -7,7 +7,7 @@ use drivebus_rtu::{AnswerError, ExceptionCode, Meaning, Meanings, UnitAddress};
 
 use crate::error::Failure;
 
-/// The meanings by unit; of others those of the specification hold.
+/// The meanings by unit; of others those of the specification hold. What another program asks comes with its own.
 #[derive(Debug, Default)]
 pub(crate) struct UnitMeanings(Mutex<BTreeMap<UnitAddress, Meanings>>);
 
@@ -17,23 +17,32 @@ impl UnitMeanings {
         self.lock().insert(unit, meanings);
     }
 
-    /// What `unit` says by `failure`, if that is a refusal.
-    pub(crate) fn of(&self, unit: UnitAddress, failure: &Failure) -> Option<Meaning> {
+    /// What was set of `unit`, if anything was.
+    #[cfg(all(unix, feature = "share"))]
+    pub(crate) fn set_of(&self, unit: UnitAddress) -> Option<Meanings> {
+        self.lock().get(&unit).copied()
+    }
+
+    /// What `unit` says by `failure`, if that is a refusal; `own`: what its exceptions mean to who asks.
+    pub(crate) fn of(&self, unit: UnitAddress, own: Option<&Meanings>, failure: &Failure) -> Option<Meaning> {
         let Failure::Refused { code, .. } = *failure else { return None };
-        Some(self.code(unit, code))
+        Some(self.code(unit, own, code))
     }
 
     /// Whether `unit` says by `failure` that it could not take a request, this one or one before it, and may the next time.
-    pub(crate) fn asks_again(&self, unit: UnitAddress, failure: &Failure) -> bool {
+    pub(crate) fn asks_again(&self, unit: UnitAddress, own: Option<&Meanings>, failure: &Failure) -> bool {
         match *failure {
             Failure::Refused { code, .. } | Failure::Wrong(AnswerError::Refusal { code }) => {
-                self.code(unit, code) == Meaning::AskAgain
+                self.code(unit, own, code) == Meaning::AskAgain
             }
             _ => false,
         }
     }
 
-    fn code(&self, unit: UnitAddress, code: ExceptionCode) -> Meaning {
+    fn code(&self, unit: UnitAddress, own: Option<&Meanings>, code: ExceptionCode) -> Meaning {
+        if let Some(own) = own {
+            return own.of(code);
+        }
         self.lock().get(&unit).unwrap_or(&Meanings::STANDARD).of(code)
     }
 

@@ -6,7 +6,8 @@
 use std::time::Duration;
 
 use drivebus_rtu::{
-    Adu, AnswerLength, DataBits, Destination, Instant, Parity, Request, SerialFormat, StopBits, UnitAddress,
+    Adu, AnswerLength, DataBits, Destination, ExceptionCode, Instant, Meaning, Meanings, Parity, Request, SerialFormat,
+    StopBits, UnitAddress,
 };
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 3;
+pub(crate) const VERSION: u8 = 4;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -181,6 +182,9 @@ pub(crate) struct Order {
     verify: bool,
     read_back: Option<u16>,
     connection: Option<u64>,
+    /// The exceptions by which its unit means something else than the specification has, and the places of that in
+    /// [`Meaning::ALL`]; `None` where its program does not know the unit.
+    meanings: Option<Vec<(u8, u8)>>,
 }
 
 const PRIORITIES: [Priority; 4] = [Priority::Stop, Priority::Write, Priority::Read, Priority::Poll];
@@ -207,7 +211,13 @@ impl Order {
             verify: options.verify,
             read_back: options.read_back,
             connection: options.connection,
+            meanings: None,
         }
+    }
+
+    /// With what the exceptions of its unit mean.
+    pub(crate) fn meaning(self, meanings: Option<Meanings>) -> Self {
+        Self { meanings: meanings.map(|meanings| others(&meanings)), ..self }
     }
 
     /// With the connection as `translate` says it.
@@ -253,6 +263,15 @@ impl Order {
         )
     }
 
+    /// What the exceptions of its unit mean to its program, if that knows the unit.
+    pub(crate) fn meanings(&self) -> Option<Meanings> {
+        let said = self.meanings.as_ref()?;
+        Some(said.iter().fold(Meanings::STANDARD, |meanings, &(code, place)| {
+            let meaning = Meaning::ALL.get(usize::from(place));
+            meaning.map_or(meanings, |&meaning| meanings.with(ExceptionCode(code), meaning))
+        }))
+    }
+
     /// As the owner of the line is asked. `None` where the request is none.
     pub(crate) fn times<'a>(&self, ask: Ask<'a>) -> Ask<'a> {
         Ask {
@@ -262,6 +281,17 @@ impl Order {
             ..ask
         }
     }
+}
+
+/// The codes by which `meanings` differ from the specification, and the place of each in [`Meaning::ALL`].
+fn others(meanings: &Meanings) -> Vec<(u8, u8)> {
+    let codes = (0..=u8::MAX).filter(|&code| meanings.of(ExceptionCode(code)) != ExceptionCode(code).meaning());
+    codes
+        .filter_map(|code| {
+            let place = Meaning::ALL.iter().position(|&meaning| meaning == meanings.of(ExceptionCode(code)))?;
+            Some((code, u8::try_from(place).ok()?))
+        })
+        .collect()
 }
 
 impl Told {

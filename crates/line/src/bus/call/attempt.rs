@@ -252,7 +252,7 @@ impl<'b> Call<'b, '_> {
         if count > asked {
             match &result {
                 Ok(_) => owner.longer.given(unit, (table, address)),
-                Err(error) if owner.meanings.asks_again(unit, &error.failure) => {}
+                Err(error) if self.is_to_ask_again(error) => {}
                 Err(error) if is_refusal(&error.failure) => owner.longer.refused(unit, (table, address), count),
                 Err(error) if is_silence(&error.failure) => owner.longer.silent(unit, (table, address), count),
                 Err(_) => {}
@@ -384,7 +384,7 @@ impl<'b> Call<'b, '_> {
                     course.leaves_open(&self.ask, Form::Repeated, &result, |unit| owner.asked(unit));
                     return result.map(|_: Done| None);
                 };
-                if owner.meanings.asks_again(unit, &error.failure) {
+                if self.is_to_ask_again(&error) {
                     return Err(error);
                 }
                 if agreement.hear(unit, &Answer::exception(function, code)) {

@@ -245,6 +245,7 @@ fn after(
         gap: Duration::ZERO,
         in_doubt: false,
         yields: None,
+        meanings: None,
     };
     let mut course = Course::new(TIMEOUT, 1);
     let result = result.map_err(|failure| Box::new(failed(failure, at(0))));
