@@ -63,7 +63,7 @@ def test_one_that_comes_later_is_noticed_with_its_first_answer(server: SerialSer
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_two_of_this_kind_read_their_own_values(server: SerialServer, count: int) -> None:
+def test_two_of_this_kind_find_lengths_of_their_own(server: SerialServer, count: int) -> None:
     wrong: dict[int, int] = {}
 
     def read(bus: Bus, first: int) -> None:
@@ -75,7 +75,8 @@ def test_two_of_this_kind_read_their_own_values(server: SerialServer, count: int
             thread.start()
         for thread in threads:
             thread.join()
-    assert wrong == {OURS: 0, THEIRS: 0}
+    # Both may choose one length at once: again the very first answer of that length.
+    assert max(wrong.values()) <= 1, wrong
 
 
 def test_where_no_other_length_is_left_the_call_ends_and_says_why(server: SerialServer) -> None:

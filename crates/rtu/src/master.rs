@@ -382,10 +382,11 @@ impl Master {
     /// How sure the answer to `request` can be that `unit` is asked at `now`. Certain while nothing that it owes could
     /// overtake.
     pub fn attribution(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Attribution {
-        match self.others.ask(now, unit, request.expected()) {
-            Some(until) => Attribution::Others(until),
-            None => self.doubts.attribution(now, unit, request.expected()),
+        let expected = request.expected();
+        if let Some(until) = self.others.ask(now, unit, expected) {
+            return Attribution::Others(until);
         }
+        self.doubts.attribution(now, unit, expected)
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.

@@ -125,8 +125,14 @@ impl Others {
     }
 
     /// Until when the answer of `unit` to `expected` may be that to another's question; `None`: it is not.
+    #[inline]
     pub(crate) fn ask(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
-        if !self.may_be || expected.is_echo() || expected.repeats_value() {
+        if self.may_be { self.look_up(now, unit, expected) } else { None }
+    }
+
+    #[cold]
+    fn look_up(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
+        if expected.is_echo() || expected.repeats_value() {
             return None;
         }
         let fits = |shape: &Shape| {
@@ -150,6 +156,7 @@ impl Others {
     }
 
     /// A request goes out: nothing came in its answer's place yet.
+    #[inline]
     pub(crate) const fn goes_out(&mut self) {
         self.passed.clear();
     }

@@ -24,7 +24,7 @@ use crate::owner::resync::{MAX_WORDS, Probe};
 use crate::owner::{Next, Owner};
 
 /// Of so many lengths, the shortest that are free, one is chosen by chance: two that do the same must not do it in step.
-const CHOICE: usize = 4;
+const CHOICE: usize = 8;
 
 /// What answers to it look like: function and bytes on the wire.
 type Look = (u8, Option<usize>);
@@ -63,6 +63,7 @@ impl Others {
     }
 
     /// At `now` `ask` of `unit` is over; whether it was refused.
+    #[cold]
     pub(crate) fn asked(&mut self, now: Instant, unit: UnitAddress, ask: &Ask<'_>, refused: bool) {
         let known = self.units.of(unit);
         known.last = Some((look(ask.request), now + ask.timeout));
@@ -88,11 +89,15 @@ impl Owner {
     }
 
     /// Takes down what came in since the last request, where it may be others'.
+    #[inline]
     pub(crate) fn overhear(&mut self) -> Result<(), Failure> {
+        if self.others.may_be() { self.take_down() } else { Ok(()) }
+    }
+
+    #[cold]
+    fn take_down(&mut self) -> Result<(), Failure> {
         let mut buffer = [0; 256];
-        while self.others.may_be()
-            && let Some(line) = self.line.as_deref_mut()
-        {
+        while let Some(line) = self.line.as_deref_mut() {
             let now = line.now();
             let count = line.receive(&mut buffer, now).map_err(Failure::Port)?;
             if count == 0 {
@@ -106,6 +111,7 @@ impl Owner {
 
     /// What comes before `ask` where others may ask `unit`, or how it is put; `None`: as everywhere. `apart`: the caller
     /// takes a longer read for its own.
+    #[cold]
     pub(crate) fn next_among_others(
         &self,
         now: Instant,

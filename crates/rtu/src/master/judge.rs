@@ -10,6 +10,7 @@ use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
 use crate::expected::Expected;
+use crate::frame::Frame;
 use crate::framer::Step;
 use crate::{Instant, UnitAddress};
 
@@ -133,7 +134,17 @@ impl Master {
     fn end_in_vain(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Event<'_> {
         self.give_account(false);
         self.state = State::Idle;
-        let doubted = self.others.passed().is_some() && self.in_quarantine(now, unit);
+        let passed = self.others.passed().filter(|_| !self.beside.is_spoilt());
+        let doubted = passed.is_some() && self.in_quarantine(now, unit);
+        let is_refusal = |frame: Frame<'_>| matches!(expected.judge(frame.pdu()), Ok(Answer::Exception { .. }));
+        if expected.is_read() && !doubted && passed.is_some_and(is_refusal) {
+            // It counts as the own one; where it is not, that one is nobody's when it comes.
+            self.doubts.taken(now, unit, expected, timeout, true);
+            return match self.others.passed() {
+                Some(frame) => passed_over(expected, frame, doubted),
+                None => Event::NoAnswer { bytes: &[] },
+            };
+        }
         match self.is_still_open(now, unit, expected) {
             Open::No => self.doubts.taken(now, unit, expected, timeout, false),
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),

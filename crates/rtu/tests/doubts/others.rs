@@ -135,6 +135,7 @@ fn a_refusal_that_may_be_theirs_decides_only_where_nothing_else_comes() {
     assert_eq!(asker.hears(NOW + 1, &words(unit(1), 2, 8)), Came::Answer);
     assert_eq!(asker.asks(NOW + 100, unit(1), &read(2), &refused), Came::Nothing);
     assert_eq!(ends(&mut asker, NOW + 100), Came::Refusal);
+    assert!(!asker.in_quarantine(ms(NOW + 200)), "it is answered");
     // Of a function that they were not heard to use it is the own one.
     let write = Request::write(0x2000, 1);
     assert_eq!(asker.asks(NOW + 200, unit(2), &read(2), &refuses(unit(2), &read(2))), Came::Refusal);
