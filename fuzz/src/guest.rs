@@ -28,7 +28,7 @@ const SOON: Duration = Duration::from_millis(200);
 /// More messages than this in one input show nothing new.
 const MESSAGES: usize = 16;
 /// How every greeting begins, and the version.
-const GREETING: &[u8] = b"drivebus share \x03";
+const GREETING: &[u8] = b"drivebus share \x04";
 /// The first byte of a wish that takes back what is under way, and of what is told of a line that is heard.
 const CANCEL: u8 = 6;
 const HEARD: u8 = 2;

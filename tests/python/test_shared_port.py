@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pty")
 
 CONTROL, FREE, STOP = 0x2000, 0x8000 | 0x000B, 5
 READ_STATE = bytes.fromhex("01 03 21 00")
-HELLO = b"drivebus share \x03"
+HELLO = b"drivebus share \x04"
 
 
 @pytest.fixture
