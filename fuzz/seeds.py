@@ -195,13 +195,13 @@ def guests() -> dict[str, bytes]:
     def say(*messages: bytes) -> bytes:
         return b"\1" + b"".join(bytes([len(message)]) + message for message in messages)
 
-    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0") -> bytes:
+    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0\0") -> bytes:
         request = bytes([calls, unit, len(pdu)]) + pdu
         return request + b"\0" + timeout + b"\0\0\0" + bytes([priority, 2]) + more
 
     read, write, echo = bytes([3, 0x21, 3, 0, 1]), bytes([6, 0x80, 11, 0, 5]), bytes([8, 0, 0, 0x12, 0xAB])
     many = bytes([16, 0x80, 11, 0, 2, 4, 0, 1, 0, 2])
-    hello = b"drivebus share \2\1f\x80\x96\1\x08E\1"
+    hello = b"drivebus share \4\1f\x80\x96\1\x08E\1"
     greet = b"\0" + bytes([len(hello)]) + hello
     return {
         "read": say(call(read)),
@@ -209,9 +209,10 @@ def guests() -> dict[str, bytes]:
         "stop": say(call(bytes([6, 0x20, 0, 0, 5]), priority=0)),
         "write-many": say(call(many, priority=1)),
         "echo": say(call(echo)),
-        "read-back": say(call(write, priority=1, more=b"\0\1\x8b\x80\2\0")),
-        "on-a-connection": say(call(write, priority=1, more=b"\0\0\1\0")),
-        "verified": say(call(read, more=b"\1\0\0")),
+        "read-back": say(call(write, priority=1, more=b"\0\1\x8b\x80\2\0\0")),
+        "on-a-connection": say(call(write, priority=1, more=b"\0\0\1\0\0")),
+        "verified": say(call(read, more=b"\1\0\0\0")),
+        "says-meanings": say(call(read, more=b"\0\0\0\1\2\1\2\6\xff")),
         "nobody": say(call(read, unit=9)),
         "broadcast": say(call(write, unit=0, priority=1)),
         "no-unit": say(call(read, unit=250)),
@@ -222,7 +223,7 @@ def guests() -> dict[str, bytes]:
         "listens-for-ever": say(bytes([listening]) + for_ever),
         "cancels": say(bytes([cancel]), bytes([listening]) + second + bytes([cancel])),
         "greets-itself": greet + bytes([1, word]),
-        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \2", b" \3"),
+        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \4", b" \3"),
         "other-characters": b"\0" + bytes([len(hello)]) + hello.replace(b"E", b"N"),
         "no-greeting": b"\0" + b"\5hello",
         "too-long": b"\1\xff\4\xff\xff\0\0",

@@ -17,7 +17,8 @@ QUESTIONS = {
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
     **dict.fromkeys(("ms300", "eds300", "sunfar-e300", "fc51", "a1000"), (5, 90)),
     **dict.fromkeys(("chf100a", "saj8000m"), (6, 103)),
-    **dict.fromkeys(("atv312", "v20"), (8, 140)),
+    "atv312": (6, 105),
+    "v20": (8, 140),
     "acs355": (9, 155),
 }
 """Requests before the first frame that halts, and milliseconds of the line's time until it goes out, at most."""

@@ -82,6 +82,8 @@ class Apart:
         live = [profile for profile in self._families if self._is_live(profile)]
         if self.shows_named:
             return self._between(named, self._rivals(named, live, what))
+        if isinstance(what, str) and named in live and (verdict := self._by_harm(live, what)) is not None:
+            return verdict
         if named in live and (place := self._next_of(named)) is not None:
             return Verdict(ask=place)
         shown = [profile for profile in live if profile is not named and self._is_shown(profile)]
@@ -96,6 +98,34 @@ class Apart:
         if self._trusted or (named in live and (isinstance(what, str) or self._has_words)):
             return Verdict(take=named)
         return Verdict(others=tuple(profile for profile in live if profile.commands()))
+
+    def _by_harm(self, live: list[Profile], command: str) -> Verdict | None:
+        """The verdict where it takes fewer questions to rule out whom *command* would harm than to see what it is.
+
+        Nothing has to show the named family then: a halt that harms nobody is no risk, and what the unit is is asked
+        behind it.
+        """
+        named = self._named
+        in_danger = [
+            each for each in live if each is not named and _telling_places(each) and harms(each, named, command)
+        ]
+        places = dict.fromkeys(place for each in (named, *in_danger) for place in _telling_places(each))
+        ask: list[int] = []
+        while in_danger:
+            # Of two that rule out as many the one that tells more of the named family, which stands first.
+            left = {
+                place: [each for each in in_danger if not _rules_out(named, each, place)]
+                for place in places
+                if place not in self._answers
+            }
+            best = min(left, key=lambda place: len(left[place]), default=None)
+            if best is None or len(left[best]) == len(in_danger):
+                return None
+            ask.append(best)
+            in_danger = left[best]
+        if len(ask) + 2 > sum(place not in self._answers for place in _telling_places(named)):
+            return None
+        return Verdict(ask=ask[0]) if ask else Verdict(take=named) if self._answers else None
 
     def _between(self, taken: Profile, rivals: list[Profile]) -> Verdict:
         """The verdict on a unit that shows *taken*, where *rivals* could say the same and would take harm."""
@@ -218,6 +248,13 @@ def _apart(one: Profile, other: Profile, place: int) -> int:
         elif has.name_at(place) is not None:
             best = max(best, 3 if place in _refused(lacks) else 1 if lacks.name_at(place) is None else 0)
     return best
+
+
+def _rules_out(named: Profile, other: Profile, place: int) -> bool:
+    """Whether what a unit of *named* most likely says to the question for *place* speaks against *other*."""
+    if place in _answered(named):
+        return place in _refused(other)
+    return place in _answered(other) and (place in _refused(named) or named.name_at(place) is None)
 
 
 def _halts_alike(one: Profile, other: Profile) -> bool:
