@@ -87,7 +87,10 @@ impl<'b> Call<'b, '_> {
                 Question::AtFirstContact(put) => {
                     match self.ask_at_first_contact(course, &mut owner, put, give_up, take)? {
                         Some(done) => return Ok(done),
-                        None => continue,
+                        None => {
+                            course.prepared();
+                            continue;
+                        }
                     }
                 }
                 // What was heard goes on.
@@ -281,14 +284,15 @@ impl<'b> Call<'b, '_> {
             Put::BehindInput => Request::read_of(Table::Input, address, 1),
         };
         let Ok(request) = read else { return Ok(None) };
-        if form != Put::BehindInput {
+        let is_the_answer = matches!(form, Put::Plain | Put::Apart(_));
+        // What only prepares the question takes none of the time and of the attempts that it has.
+        if is_the_answer {
             course.asks(owner.now());
         }
         if form != Put::Plain {
             owner.stats().count(Some(unit), |counters| counters.resyncs += 1);
         }
         let is_behind_all = owner.met.is_behind_all(unit);
-        let is_the_answer = matches!(form, Put::Plain | Put::Apart(_));
         let ask = Ask { request: &request, in_doubt: true, ..self.ask };
         let result = owner.exchange(&ask, give_up, &mut |answer| {
             if is_the_answer {

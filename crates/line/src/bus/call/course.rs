@@ -97,6 +97,11 @@ impl Course {
         may
     }
 
+    /// What was sent last was no try: it only prepares the question, and there is an end to such.
+    pub(crate) fn prepared(&mut self) {
+        self.requests = self.requests.saturating_add(1);
+    }
+
     /// What confirmed the write may have been meant for another one.
     pub(crate) fn is_unproven(&mut self) {
         self.unproven = true;
