@@ -83,7 +83,7 @@ class TestWords:
         assert bus.read(1, 0x2103) == [0x01A0]
 
     def test_a_drive_knows_what_its_refusals_mean(self, simulator: Simulator, drive: Drive) -> None:
-        simulator.line.answer_with(bytes.fromhex("01 83 09 81 36"))
+        simulator.drive(drive.unit).refuse(0x09)
         with pytest.raises(drivebus.Refused, match="locked") as refused:
             drive.read("P00.11")
         assert (refused.value.code, refused.value.name) == (9, "password_protected")

@@ -45,8 +45,9 @@ def test_a_script_says_the_bytes_too(virtual: Simulator) -> None:
         assert bus.read(1, IDENTIFICATION) == [GD350]
 
 
-@pytest.mark.parametrize("transport", TRANSPORTS)
+@pytest.mark.parametrize("transport", [each for each in TRANSPORTS if each != "tcp"])
 def test_later_answers_pass_one_that_is_overtaken(transport: str) -> None:
+    """Not over TCP, where others may be: there a read has the length that tells it apart."""
     clock = "virtual" if transport == "process" else "real"
     with Simulator({1: "gd350"}, transport=transport, clock=clock) as simulator:
         line = simulator.line

@@ -99,7 +99,13 @@ impl Owner {
         let mut buffer = [0; 256];
         while let Some(line) = self.line.as_deref_mut() {
             let now = line.now();
-            let count = line.receive(&mut buffer, now).map_err(Failure::Port)?;
+            let count = match line.receive(&mut buffer, now) {
+                Ok(count) => count,
+                Err(error) => {
+                    self.close();
+                    return Err(Failure::Port(error));
+                }
+            };
             if count == 0 {
                 self.master.overhear(now);
                 break;

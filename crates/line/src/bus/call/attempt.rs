@@ -66,8 +66,12 @@ impl<'b> Call<'b, '_> {
                             course.asks_otherwise();
                             continue;
                         }
-                        Err(error) if is_refusal(&error.failure) && !self.is_to_ask_again(&error) => {
-                            // It may be meant for something else that was asked, or for the words that nobody asked for.
+                        Err(error)
+                            if is_refusal(&error.failure)
+                                && (!self.is_to_ask_again(&error) || owner.may_have_others()) =>
+                        {
+                            // It may be meant for something else that was asked, or for the words that nobody asked for:
+                            // by whatever code, where the name is wrong in which it is read.
                             apart = false;
                             course.asks_otherwise();
                             continue;
