@@ -89,13 +89,11 @@ impl<'b> Call<'b, '_> {
                     return Err(self.ask.failed(Failure::OthersAsk, Some(done.sent), done.ended, &[]));
                 }
                 Question::AtFirstContact(put) => {
-                    match self.ask_at_first_contact(course, &mut owner, put, give_up, take)? {
-                        Some(done) => return Ok(done),
-                        None => {
-                            course.prepared();
-                            continue;
-                        }
+                    if let Some(done) = self.ask_at_first_contact(course, &mut owner, put, give_up, take)? {
+                        return Ok(done);
                     }
+                    course.prepared();
+                    continue;
                 }
                 // What was heard goes on.
                 Question::Same(Form::Repeated) => Attribution::Certain,
