@@ -78,8 +78,11 @@ def start(simulator: Simulator, body: str, program: str = PROGRAM) -> subprocess
     )
     children.append(child)
     assert child.stdout is not None
-    line = child.stdout.readline()
-    assert line == "running\n", (line, child.communicate(timeout=60))
+    # A byte at a time: what was read beyond the line would be lost to `communicate`.
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(child.stdout.fileno(), 1)):
+        line += byte
+    assert line == b"running\n", (line, child.communicate(timeout=60))
     return child
 
 
