@@ -15,6 +15,7 @@ import pytest
 
 import drivebus
 from drivebus import DrivebusWarning, Recorder, Simulator
+from drivebus.capture.standing import Standing
 from drivebus.record import read
 from drivebus.record.series import Series
 from drivebus.record.table import Table
@@ -235,3 +236,21 @@ def test_the_command_says_so_at_once_and_in_its_exit_code(as_json: bool, tmp_pat
     else:
         assert f"{rows} rows in {path}" in out
         assert "no gap" in out
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_new_file_that_has_the_number_of_the_old_one_is_kept(
+    ending: str, drive: drivebus.Drive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """File systems give a number again as soon as it is free: then both are taken for one."""
+    path = tmp_path / f"run.{ending}"
+    gone = Standing.gone
+    monkeypatch.setattr(Standing, "gone", lambda standing: "" if path.exists() else gone(standing))
+    with Recorder(path, {drive: NAMES}, interval=0.1) as recorder:
+        recorder.wait(2.0)
+        path.unlink()
+        with pytest.warns(DrivebusWarning, match="it was removed"):
+            recorder.wait(1.5)
+        assert path.exists()
+        recorder.wait(3.0)
+    assert len(recorder.told) == 1

@@ -86,7 +86,8 @@ class _Parquet:
             self.path = before
             path.unlink(missing_ok=True)
             raise
-        if self._part.standing is not None and not self._part.gone():
+        # The new file may have the number of the one that is gone: at the same place nothing is taken away.
+        if self._part.path != path and self._part.standing is not None and not self._part.gone():
             self._part.path.unlink(missing_ok=True)
         self._done, self._part = left, new
         return lost
