@@ -5,6 +5,7 @@ HAL's memory is one for the whole machine, so one test at a time has it, whoever
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import shutil
@@ -118,7 +119,9 @@ class Session:
 
     def is_up(self) -> bool:
         """Whether the prompt is there."""
-        return any(Path(f"/proc/{each}/comm").read_text() == "halcmd\n" for each in self.processes()[1:])
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # one of them has ended meanwhile
+            return any(Path(f"/proc/{each}/comm").read_text() == "halcmd\n" for each in self.processes()[1:])
+        return False
 
     def end(self) -> None:
         """Ends the prompt, as `exit` does: `halrun` unloads what is there."""

@@ -152,7 +152,9 @@ class TestOnATerminal:
     def test_every_register_is_there_and_nothing_is_cut(self, size: tuple[int, int]) -> None:
         shown = self.watch(size, "--port", "sim://gd350", "monitor", "--interval", "0.1")
         head, *rest = shown
-        assert re.fullmatch(r"INVT Goodrive350 on sim://gd350, unit 1  stopped(  [\d.]+/s)?  0:00:0\d", head)
+        assert re.fullmatch(
+            r"INVT Goodrive350 on sim://gd350, unit 1  stopped(  [\d.]+/s)?  0:00:0\d(  [\d.]+/s)?", head
+        )
         text = "\n".join(rest)
         known = drivebus.Profile.builtin("gd350").monitor_names()
         assert {name for name in known if name not in text} == {"identification_code_compat"}
