@@ -100,6 +100,12 @@ pub trait Line: Send + fmt::Debug {
         None
     }
 
+    /// Where chance comes from that is to be the same each time: a simulation's. `None` where nobody must be able to tell,
+    /// as two masters on one line must not do the same in step.
+    fn chance(&self) -> Option<u64> {
+        None
+    }
+
     /// What the user should know about this line, such as a setting that did not reach the wire.
     fn notes(&self) -> Vec<String> {
         Vec::new()

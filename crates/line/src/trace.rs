@@ -223,6 +223,10 @@ impl Line for Watched {
         self.line.may_have_others()
     }
 
+    fn chance(&self) -> Option<u64> {
+        self.line.chance()
+    }
+
     fn may_echo(&self) -> bool {
         self.line.may_echo()
     }

@@ -16,14 +16,17 @@ pub struct SimLine {
     listener: Listener,
     /// How often the adapter had been pulled out when this was opened.
     pulls: u64,
+    /// Its own, as two masters on one line must not do the same in step.
+    chance: u64,
 }
 
 impl SimLine {
     pub(crate) fn new(shared: Arc<Shared>) -> Self {
         let mut world = shared.present();
         let (listener, pulls) = (world.attach(), world.pulls());
+        let chance = listener.chance(world.seed());
         drop(world);
-        Self { shared, listener, pulls }
+        Self { shared, listener, pulls, chance }
     }
 
     /// Whether the adapter that this was opened on is still plugged in.
@@ -97,6 +100,11 @@ impl Line for SimLine {
 
     fn is_virtual(&self) -> bool {
         !self.shared.clock.is_real()
+    }
+
+    /// From the simulation's seed: the same simulation is asked the same.
+    fn chance(&self) -> Option<u64> {
+        Some(self.chance)
     }
 
     /// The simulation's, which goes on while the adapter is pulled out.

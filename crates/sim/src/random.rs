@@ -19,6 +19,11 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
+    /// Any number, of the one who is number `place` among those who draw from the same seed.
+    pub(crate) fn of(seed: u64, place: u64) -> u64 {
+        Self::new(seed ^ place.rotate_left(32)).next()
+    }
+
     /// 1..=255, nearly evenly.
     pub(crate) fn next_nonzero(&mut self) -> u8 {
         let byte = self.next() % 255 + 1;

@@ -10,6 +10,7 @@ use drivebus_rtu::{Destination, Frame, Instant, SerialFormat, UnitAddress};
 
 use crate::drive::{Drive, Drives};
 use crate::faults::FaultKind;
+use crate::random::Random;
 use crate::wire::{Step, Wakeup, Wire};
 
 /// Bytes kept for a master that does not read; older ones are lost, as in a serial port.
@@ -18,6 +19,13 @@ const INBOX: usize = 65_536;
 /// Names one of the masters on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Listener(u64);
+
+impl Listener {
+    /// Chance of its own, from the seed of the world.
+    pub(crate) fn chance(self, seed: u64) -> u64 {
+        Random::of(seed, self.0)
+    }
+}
 
 /// The simulated world.
 #[derive(Debug)]

@@ -81,6 +81,9 @@ impl Shared {
             Err(failure) if !sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) => return Err(failure),
             _ => {}
         }
+        if let Some(chance) = owner.line().and_then(|line| line.chance()) {
+            words.begin_by(chance);
+        }
         let (name, clock) = owner.line().map_or_else(|| (given, Clock::real()), |line| (line.name(), Clock::of(line)));
         let notes = owner.line().map(|line| line.notes()).unwrap_or_default();
         let gapless = owner.line().is_some_and(|line| line.gapless());

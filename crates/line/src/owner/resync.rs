@@ -37,9 +37,16 @@ impl FreshWords {
     const STEP: u16 = 0x9E35;
 
     pub(crate) fn new() -> Self {
+        let words = Self(AtomicU16::new(0));
         // Where the words begin is random: another program on this line must not use the same ones.
-        let [a, b, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
-        Self(AtomicU16::new(u16::from_le_bytes([a, b])))
+        words.begin_by(RandomState::new().build_hasher().finish());
+        words
+    }
+
+    /// Begins where `chance` says. Nothing was asked yet.
+    pub(crate) fn begin_by(&self, chance: u64) {
+        let [a, b, ..] = chance.to_le_bytes();
+        self.0.store(u16::from_le_bytes([a, b]), Ordering::Relaxed);
     }
 
     /// Whether `word` is the one that was given out last, so that only the echo that it was meant for carries it.
