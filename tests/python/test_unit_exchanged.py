@@ -18,6 +18,7 @@ import pytest
 
 from drivebus import Bus, Drive, DrivebusError, NotStopped, Simulator, Unconfirmed
 from drivebus.identify import same_unit
+from drivebus.operations.aim import Aim, Target
 
 
 class Cable:
@@ -117,6 +118,32 @@ def test_what_shows_no_halt_is_asked_what_it_is(line: Line) -> None:
     line.cable.move()
     with suppress(DrivebusError):
         line.drive.coast(confirm=0.3)
+    assert not runs(line.comes)
+
+
+@pytest.mark.parametrize("line", [("gd350", "ms300")], indirect=True)
+def test_an_answer_that_is_lost_leaves_it_not_running(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is asked what it is until it says so: the line lost the first two answers."""
+    take, doubt = Aim.take, Aim.doubt
+    lost: list[str] = []
+    doubted: list[Aim] = []
+
+    async def lost_twice(aim: Aim, command: str) -> Target | None:
+        if aim in doubted and len(lost) < 2:
+            lost.append(command)
+            return None
+        return await take(aim, command)
+
+    def remembered(aim: Aim) -> bool:
+        doubted.append(aim)
+        return doubt(aim)
+
+    monkeypatch.setattr(Aim, "take", lost_twice)
+    monkeypatch.setattr(Aim, "doubt", remembered)
+    line.cable.move()
+    with suppress(DrivebusError):
+        line.drive.coast(confirm=0.3)
+    assert len(lost) == 2
     assert not runs(line.comes)
 
 

@@ -24,6 +24,10 @@ _PAUSE = 0.04
 """Seconds of the line's clock between a frame that came to nothing at once, and the next."""
 
 
+_ASKED_FOR = 1.0
+"""Seconds of the line's clock for which a unit that does not show a halt is asked what it is, while it is not heard."""
+
+
 class Halt:
     """One unit that is to be halted.
 
@@ -132,8 +136,8 @@ class Halt:
     async def vouch_anew(self) -> bool:
         """Whether it was halted once more, as another family: it does not show the halt, and shows that family now.
 
-        A port that stayed open may have another drive behind it, whatever the line knew of the one before. It is asked
-        once, and waits for nothing.
+        A port that stayed open may have another drive behind it, whatever the line knew of the one before. Where no
+        answer comes it is asked again, for a second: an answer that was lost is no reason to let it run.
 
         Raises:
             Unconfirmed: What it is now cannot be told, but that it is not what was halted: the motor may still turn.
@@ -141,8 +145,11 @@ class Halt:
         """
         if not self._aim.doubt():
             return False
+        bus = self.unit.bus
+        until = bus.now() + _ASKED_FOR
         try:
-            target = await self._aim.take(self.command)
+            while (target := await self._aim.take(self.command)) is None and bus.now() < until:
+                await bus.sleep(_PAUSE)
         except PortError:
             return False
         except NotAllowed as error:
