@@ -235,6 +235,8 @@ impl Rig {
             // Nothing takes time while the adapter is out.
             self.bus.sleep(Duration::from_millis(self.chance.one_of(&[2, 40])), &mut || false);
         }
+        // What was taken before a call failed counts for nothing.
+        let came = if result.is_ok() { came } else { String::new() };
         writeln!(text, "{result:?} {came}").unwrap();
         let stats = self.bus.stats().total;
         writeln!(
