@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Destination, Instant, Meanings, Request};
+use drivebus_rtu::{Adu, Destination, Instant, Meanings, Request, UnitAddress};
 
 use crate::error::{CallError, Failure};
 use crate::turns::queue::Stops;
@@ -37,6 +37,14 @@ pub struct Done {
 }
 
 impl Ask<'_> {
+    /// Who is asked, if it is one unit.
+    pub(crate) fn unit(&self) -> Option<UnitAddress> {
+        match self.destination {
+            Destination::Unit(unit) => Some(unit),
+            Destination::Broadcast => None,
+        }
+    }
+
     /// The whole request frame.
     pub(crate) fn frame(&self) -> Vec<u8> {
         Adu::request(self.destination, self.request).as_bytes().to_vec()

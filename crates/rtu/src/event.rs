@@ -55,6 +55,15 @@ pub struct Tally {
 impl Tally {
     pub(crate) const EMPTY: Self = Self { late: 0, foreign: 0, noise: 0, noise_idle: 0, own_echo: 0, own_remnant: 0 };
 
+    pub(crate) const fn add(&mut self, more: &Self) {
+        self.late = self.late.saturating_add(more.late);
+        self.foreign = self.foreign.saturating_add(more.foreign);
+        self.noise = self.noise.saturating_add(more.noise);
+        self.noise_idle = self.noise_idle.saturating_add(more.noise_idle);
+        self.own_echo = self.own_echo.saturating_add(more.own_echo);
+        self.own_remnant = self.own_remnant.saturating_add(more.own_remnant);
+    }
+
     pub(crate) fn add_noise(&mut self, bytes: &[u8]) {
         let idle = bytes.iter().filter(|&&byte| byte == 0x00 || byte == 0xFF).count();
         self.noise = self.noise.saturating_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));

@@ -5,6 +5,7 @@
 mod address;
 mod agreement;
 mod answer;
+mod conversation;
 pub mod crc;
 mod doubt;
 mod event;
@@ -30,6 +31,10 @@ pub use core::time::Duration;
 pub use address::{AddressError, Destination, UnitAddress};
 pub use agreement::Agreement;
 pub use answer::{Answer, AnswerError, Head};
+pub use conversation::{
+    AdapterEcho, Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, Question, Step, Times,
+    Unanswered, Urgency,
+};
 pub use crc::crc16;
 pub use doubt::{Attribution, FIRST_CONTACT, OVERTAKING, PATIENCE};
 pub use event::{BeginError, Event, Tally};

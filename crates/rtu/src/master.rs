@@ -302,6 +302,11 @@ impl Master {
         }
     }
 
+    /// The request that was begun last, as it goes on the wire.
+    pub(crate) fn frame(&self) -> &[u8] {
+        self.request.as_bytes()
+    }
+
     /// Gives the request up at `now`. Returns whether the unit may have received it; then it is in quarantine.
     pub fn abort(&mut self, now: Instant) -> bool {
         let sent = match self.state {

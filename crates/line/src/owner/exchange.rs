@@ -1,15 +1,14 @@
-//! One request and what becomes of it, on an open line.
-//!
-//! Drives the state machine of `drivebus-rtu` with a real line: bytes, the clock, and the wish to give up.
+//! Carries a conversation out on an open line: bytes, the clock, and the wish to give up.
 
 use std::time::Duration;
 
-use drivebus_rtu::{Adu, Answer, AnswerError, Destination, Event, ExceptionCode, Instant, Master};
+use drivebus_rtu::{Answer, Conversation, Cut, Exchange, Instant, Outcome, Step, Unanswered};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
-use crate::line::Line;
-use crate::owner::arrival_pauses::{Arrivals, Ended, Lumps};
+use crate::line::{PortError, PortErrorKind};
+use crate::owner::Owner;
+use crate::owner::arrival_pauses::{Arrivals, Ended};
 use crate::system::clock::LOOK_UP;
 use crate::turns::queue::Stops;
 
@@ -21,128 +20,219 @@ const EARLY: (u32, Duration) = (2, Duration::from_micros(150));
 /// some ten milliseconds; what it says later than this may meet the stop on the wire.
 const STOP_WAITS: Duration = Duration::from_millis(100);
 
-/// Sends one request over `line` and gives its answer to `take`. `usual`: how long the unit takes at most until it begins to
-/// answer, where that is known; `lumps`: how answers come over this line.
-pub(crate) fn exchange(
-    line: &mut dyn Line,
-    master: &mut Master,
-    ask: &Ask<'_>,
-    (usual, lumps): (Option<Duration>, &mut Lumps),
-    give_up: &mut dyn FnMut() -> bool,
-    take: &mut dyn FnMut(Answer<'_>),
-) -> Result<Done, Box<CallError>> {
-    master.be_patient(lumps.patience(usual));
-    let mut arrivals = Arrivals::new();
-    let result = follow(line, master, ask, &mut arrivals, give_up, take);
-    let ended = match &result {
-        Ok(_) => Ended::Whole,
-        Err(error) if matches!(error.failure, Failure::Corrupt(_)) => Ended::Damaged { bytes: error.raw.len() },
-        Err(_) => Ended::Otherwise,
-    };
-    lumps.learn(&arrivals, ask.request.expected().adu_len(), ended);
-    result
+/// What comes next for a call that does not use the line now.
+pub(crate) enum Then {
+    /// Whoever is more urgent may use it first.
+    LetPass,
+    /// Others may use it until then.
+    StandBy(Instant),
+    /// It is over.
+    Done(Result<Done, Box<CallError>>),
 }
 
-/// Sends the request, and waits for what becomes of it.
-fn follow(
-    line: &mut dyn Line,
-    master: &mut Master,
-    ask: &Ask<'_>,
-    arrivals: &mut Arrivals,
-    give_up: &mut dyn FnMut() -> bool,
-    take: &mut dyn FnMut(Answer<'_>),
-) -> Result<Done, Box<CallError>> {
-    let mut sent = None;
-    let mut now = line.now();
-    let mut looked_up = now;
-    master.keep_gap(ask.gap);
-    let begin = if ask.in_doubt { Master::begin_in_doubt } else { Master::begin };
-    begin(master, now, ask.destination, ask.request, ask.timeout)
-        .map_err(|error| ask.failed(Failure::NotBegun(error), sent, now, &[]))?;
+/// A call on this line, and why it was cut short, if it was.
+pub(crate) struct Talk<'a, 'r> {
+    pub(crate) call: Conversation<'r>,
+    pub(crate) ask: &'a Ask<'r>,
+    /// The last time, and the one before.
+    cuts: [Option<Failure>; 2],
+}
 
-    let mut pace = line.char_time().map(Pace::new);
-    let mut buffer = [0; 256];
-    // The end of the request.
-    let mut out = None;
-    // What is queued already is no answer, and the line was not silent while it came: read without waiting.
-    let mut until = now;
-    // The end of the time-out, when the request is out; whether nobody was looking since the last bytes came.
-    let (mut limit, mut slept) = (now, false);
-    loop {
-        let received = line.receive(&mut buffer, until);
-        now = line.now();
-        let mut rest = match received {
-            Ok(count) => &buffer[..count],
-            Err(error) => {
-                master.abort(now);
-                return Err(ask.failed(Failure::Port(error), sent, now, &[]));
-            }
+impl<'a, 'r> Talk<'a, 'r> {
+    pub(crate) fn new(call: Conversation<'r>, ask: &'a Ask<'r>) -> Self {
+        Self { call, ask, cuts: [None, None] }
+    }
+
+    /// It is cut short at `now` by `failure`.
+    pub(crate) fn cut_short(&mut self, owner: &mut Owner, now: Instant, failure: Failure) {
+        let cut = match &failure {
+            Failure::Port(PortError { kind: PortErrorKind::Lost, .. }) => Cut::Lost,
+            Failure::Port(_) => Cut::Unusable,
+            _ => Cut::GivenUp,
         };
-        let came = rest.len();
-        if came > 0 {
-            arrivals.came(now, came, || !slept && master.lacks() > 0);
+        self.cuts = [Some(failure), self.cuts[0].take()];
+        self.call.cut_short(now, &mut owner.known, cut);
+    }
+
+    /// What it came to; its answer goes to `take`.
+    fn result(
+        cuts: &mut [Option<Failure>; 2],
+        ask: &Ask<'_>,
+        outcome: Outcome<'_>,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<Done, Box<CallError>> {
+        match outcome {
+            Outcome::Answered { times, answer, .. } => {
+                if let Some(answer) = answer {
+                    take(answer);
+                }
+                Ok(Done { sent: times.sent, ended: times.ended })
+            }
+            Outcome::Failed { why, sent, ended, raw, shows, before, .. } => {
+                let cut = cuts[usize::from(before)].take();
+                let shows = shows.map(|words| words.iter().collect()).unwrap_or_default();
+                let failure = Failure::of(why, shows, cut);
+                Err(ask.failed(failure, sent, ended, raw))
+            }
+            // An outcome that this line does not know.
+            _ => Err(ask.failed(Failure::Interrupted, None, None, &[])),
         }
-        slept = false;
+    }
+}
+
+/// What is known of the request on the wire by who carries it out.
+struct Carried {
+    arrivals: Arrivals,
+    pace: Option<Pace>,
+    /// The end of the request.
+    out: Option<Instant>,
+    /// The end of the time-out, when the request is out; whether nobody was looking since the last bytes came.
+    limit: Instant,
+    slept: bool,
+    looked_up: Instant,
+    came: usize,
+}
+
+impl Owner {
+    /// Carries `talk` out until it leaves the line to others, or is over. `now`: on the line's clock.
+    pub(crate) fn go_on(
+        &mut self,
+        talk: &mut Talk<'_, '_>,
+        now: Instant,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Then {
+        let mut now = now;
+        let mut carried: Option<Carried> = None;
+        let mut buffer = [0; 256];
+        // What of it was not taken yet.
+        let mut rest = 0..0;
+        self.prepare_next(talk);
         loop {
-            // Whatever there is no room for now, there is after polling.
-            rest = &rest[master.receive(now, rest)..];
-            match master.poll(now) {
-                Some(Event::Transmit(frame)) => {
-                    sent = Some(now);
+            match talk.call.next(now, &mut self.known) {
+                Step::LetPass => return Then::LetPass,
+                Step::StandBy(until) => return Then::StandBy(until),
+                Step::Done(outcome) => return Then::Done(Talk::result(&mut talk.cuts, talk.ask, outcome, take)),
+                Step::Send(frame) => {
+                    let Some(line) = self.line.as_deref_mut() else {
+                        talk.cut_short(self, now, Failure::Closed);
+                        continue;
+                    };
                     match line.send(frame) {
                         Ok(end) => {
-                            out = Some(end);
-                            master.sent(end);
-                            limit = end + ask.timeout;
+                            let limit = talk.call.sent(&mut self.known, end).unwrap_or(end);
+                            if let Some(carried) = &mut carried {
+                                (carried.out, carried.limit) = (Some(end), limit);
+                            }
                         }
                         Err(error) => {
-                            master.abort(now);
-                            return Err(ask.failed(Failure::Port(error), sent, line.now(), &[]));
+                            now = line.now();
+                            talk.cut_short(self, now, Failure::Port(error));
                         }
                     }
                 }
-                Some(event) => {
-                    return conclude(ask, event, sent, now, take).map_err(|error| unless_given_up(error, give_up));
+                // Whatever there was no room for, there is after polling.
+                Step::Listen(_) if !rest.is_empty() => {
+                    let taken = talk.call.heard(now, &mut self.known, &buffer[rest.clone()]).unwrap_or(rest.len());
+                    rest.start += taken;
                 }
-                None if rest.is_empty() => break,
-                None => {}
+                Step::Listen(deadline) => {
+                    let Some(line) = self.line.as_deref_mut() else {
+                        talk.cut_short(self, now, Failure::Closed);
+                        continue;
+                    };
+                    let mut until = deadline;
+                    if talk.call.is_in_flight() {
+                        let carried = carried.get_or_insert_with(|| Carried {
+                            arrivals: Arrivals::new(),
+                            pace: line.char_time().map(Pace::new),
+                            out: None,
+                            limit: now,
+                            slept: false,
+                            looked_up: now,
+                            came: 0,
+                        });
+                        if now.saturating_duration_since(carried.looked_up) >= LOOK_UP {
+                            carried.looked_up = now;
+                            let last = |out| now.saturating_duration_since(carried.arrivals.last().max(out));
+                            let quiet = carried.out.map_or(Duration::ZERO, last);
+                            if give_up() {
+                                talk.cut_short(self, now, Failure::Interrupted);
+                                continue;
+                            }
+                            if quiet >= STOP_WAITS && self.yields(talk.ask).is_some_and(Stops::has_stop) {
+                                talk.call.give_way(now, &mut self.known, quiet);
+                                continue;
+                            }
+                        }
+                        let wake = now + LOOK_UP;
+                        until = deadline.min(wake);
+                        let (came, lacks) = (carried.came, self.known.master().lacks());
+                        let nearly = carried.pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, lacks));
+                        if let Some(nearly) = nearly {
+                            line.sleep(nearly.min(carried.limit).min(wake));
+                            carried.slept = true;
+                            // What has come by then is taken without waiting for more.
+                            until = now;
+                        }
+                    }
+                    let received = line.receive(&mut buffer, until);
+                    now = line.now();
+                    let count = match received {
+                        Ok(count) => count,
+                        Err(error) => {
+                            talk.cut_short(self, now, Failure::Port(error));
+                            continue;
+                        }
+                    };
+                    if let Some(carried) = &mut carried {
+                        if count > 0 {
+                            let (master, slept) = (self.known.master(), carried.slept);
+                            carried.arrivals.came(now, count, || !slept && master.lacks() > 0);
+                        }
+                        (carried.slept, carried.came) = (false, count);
+                    }
+                    // Whatever there is no room for now, there is after polling.
+                    let taken = talk.call.heard(now, &mut self.known, &buffer[..count]).unwrap_or(count);
+                    rest = taken..count;
+                }
+                Step::Heard(exchange) => {
+                    rest = 0..0;
+                    let arrivals = carried.take().map_or_else(Arrivals::new, |carried| carried.arrivals);
+                    self.lumps.learn(&arrivals, exchange.request.expected().adu_len(), ended(&exchange));
+                    let cut = talk.cuts[0].clone();
+                    let mut failure = exchange.failure.map(|why| Failure::of(why, Vec::new(), cut));
+                    // Time-outs may be shorter than the time between two looks, and retries many.
+                    let is_given_up = failure.as_ref().is_some_and(may_be_given_up) && give_up();
+                    if is_given_up {
+                        failure = Some(Failure::Interrupted);
+                    }
+                    self.keep(talk.ask, &exchange, failure.as_ref());
+                    if is_given_up {
+                        talk.cut_short(self, now, Failure::Interrupted);
+                    }
+                    self.prepare_next(talk);
+                    let counts = talk.call.take_counts();
+                    self.count(talk.ask, counts);
+                }
+                _ => {}
             }
-        }
-        if now.saturating_duration_since(looked_up) >= LOOK_UP {
-            looked_up = now;
-            let quiet = out.map_or(Duration::ZERO, |out| now.saturating_duration_since(arrivals.last().max(out)));
-            if let Some(failure) = ends_early(ask, quiet, give_up) {
-                master.abort(now);
-                return Err(ask.failed(failure, sent, now, &[]));
-            }
-        }
-        let wake = now + LOOK_UP;
-        until = master.deadline().map_or(wake, |deadline| deadline.min(wake));
-        if let Some(nearly) = pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, master.lacks())) {
-            line.sleep(nearly.min(limit).min(wake));
-            slept = true;
-            // What has come by then is taken without waiting for more.
-            until = now;
         }
     }
 }
 
-/// Why the wait ends before its time, if it does: its caller gave up, or a stop waits and it was `quiet` for so long.
-#[cold]
-fn ends_early(ask: &Ask<'_>, quiet: Duration, give_up: &mut dyn FnMut() -> bool) -> Option<Failure> {
-    if give_up() {
-        return Some(Failure::Interrupted);
+/// How `exchange` ended, for who learns how answers come.
+fn ended(exchange: &Exchange<'_>) -> Ended {
+    match exchange.failure {
+        None => Ended::Whole,
+        Some(Unanswered::Corrupt(_)) => Ended::Damaged { bytes: exchange.bytes },
+        Some(_) => Ended::Otherwise,
     }
-    let gives_way = quiet >= STOP_WAITS && ask.yields.is_some_and(Stops::has_stop);
-    gives_way.then_some(Failure::NoAnswer { timeout: quiet, attempts: 1 })
 }
 
-/// Asks `give_up` where no answer came: time-outs may be shorter than the time between two looks, and retries many.
-fn unless_given_up(mut error: Box<CallError>, give_up: &mut dyn FnMut() -> bool) -> Box<CallError> {
-    if !matches!(error.failure, Failure::Refused { .. }) && give_up() {
-        error.failure = Failure::Interrupted;
-    }
-    error
+/// Whether whoever waits for a request that came to `failure` is asked once more whether he does.
+fn may_be_given_up(failure: &Failure) -> bool {
+    !matches!(failure, Failure::Refused { .. } | Failure::NotBegun(_) | Failure::Port(_) | Failure::Interrupted)
 }
 
 /// Bytes that come one by one, so that nobody need wake up for each.
@@ -176,162 +266,5 @@ impl Pace {
     }
 }
 
-/// What `event`, which ends the request, means to its caller.
-fn conclude(
-    ask: &Ask<'_>,
-    event: Event<'_>,
-    sent: Option<Instant>,
-    ended: Instant,
-    take: &mut dyn FnMut(Answer<'_>),
-) -> Result<Done, Box<CallError>> {
-    let timeout = ask.timeout;
-    let (failure, raw) = match (event, sent) {
-        (Event::Answer(answer @ Answer::Exception { function, code, .. }), _) => {
-            // An exception is known by its two bytes: the frame that came is the one that is made here.
-            let came = match ask.destination {
-                Destination::Unit(unit) => Some(Adu::answer(unit, &answer)),
-                Destination::Broadcast => None,
-            };
-            let raw = came.as_ref().map_or(&[][..], Adu::as_bytes);
-            let failure = match code {
-                ExceptionCode::GATEWAY_TARGET_SILENT => Failure::Unreached,
-                _ => Failure::Refused { function, code },
-            };
-            return Err(ask.failed(failure, sent, ended, raw));
-        }
-        (Event::Answer(answer), Some(sent)) => {
-            take(answer);
-            return Ok(Done { sent, ended });
-        }
-        (Event::BroadcastDone, Some(sent)) => return Ok(Done { sent, ended }),
-        (Event::Wrong { error: AnswerError::Others, frame }, _) => (Failure::OthersAsk, frame),
-        (Event::Wrong { error, frame }, _) => (Failure::Wrong(error), frame),
-        (Event::Corrupt { error, bytes }, _) => (Failure::Corrupt(error), bytes),
-        (Event::NoAnswer { bytes }, _) => (Failure::NoAnswer { timeout, attempts: 1 }, bytes),
-        (Event::Busy, _) => (Failure::Busy { timeout }, &[][..]),
-        // The master says neither of a request that it did not hand out.
-        (Event::Transmit(_) | Event::Answer(_) | Event::BroadcastDone, _) => {
-            (Failure::NoAnswer { timeout, attempts: 1 }, &[][..])
-        }
-    };
-    Err(ask.failed(failure, sent, ended, raw))
-}
-
 #[cfg(test)]
-mod tests {
-    use std::thread;
-
-    use drivebus_rtu::{Request, SerialFormat, UnitAddress};
-
-    use super::*;
-    use crate::line::PortError;
-    use crate::turns::order::Priority;
-    use crate::turns::queue::Waiter;
-
-    /// A queue in which no work is left.
-    type Queue = crate::turns::queue::Queue<()>;
-
-    /// A line on which nobody answers, or somebody says a byte now and then. Time passes only while it is waited on.
-    #[derive(Debug, Default)]
-    struct Silent {
-        now: Instant,
-        noise: Option<Duration>,
-        sent: bool,
-    }
-
-    impl Line for Silent {
-        fn now(&self) -> Instant {
-            self.now
-        }
-
-        fn send(&mut self, _: &[u8]) -> Result<Instant, PortError> {
-            self.sent = true;
-            Ok(self.now)
-        }
-
-        fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
-            let before = self.now;
-            self.now = self.now.max(until);
-            match self.noise {
-                Some(each) if self.sent && before + each <= until => {
-                    (self.now, buffer[0]) = (before + each, 0x55);
-                    Ok(1)
-                }
-                _ => Ok(0),
-            }
-        }
-
-        fn sleep(&mut self, until: Instant) {
-            self.now = self.now.max(until);
-        }
-
-        fn name(&self) -> String {
-            "silent".to_owned()
-        }
-    }
-
-    fn read(line: &mut Silent, timeout: u64, yields: Option<&Queue>, give_up: &mut dyn FnMut() -> bool) -> Failure {
-        let request = Request::read(0x2100, 1).unwrap();
-        let ask = Ask {
-            destination: UnitAddress::new(9).unwrap().into(),
-            request: &request,
-            timeout: Duration::from_millis(timeout),
-            learns: false,
-            gap: Duration::ZERO,
-            in_doubt: true,
-            yields: yields.map(|queue| queue as &dyn Stops),
-            meanings: None,
-        };
-        let mut master = Master::new(&SerialFormat::DEFAULT);
-        let known = (None, &mut Lumps::of(line));
-        exchange(line, &mut master, &ask, known, give_up, &mut |_| ()).unwrap_err().failure
-    }
-
-    fn queue_with(priority: Priority) -> Queue {
-        let queue = Queue::default();
-        let mut state = queue.lock();
-        let ticket = state.order.ticket((priority, None).into());
-        state.order.wait(ticket, Waiter::Thread(thread::current()));
-        drop(state);
-        queue
-    }
-
-    fn waited(failure: &Failure) -> Duration {
-        match failure {
-            Failure::NoAnswer { timeout, .. } => *timeout,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn a_stop_that_waits_waits_no_longer_for_a_silent_unit_than_that_might_take() {
-        let cut_short = waited(&read(&mut Silent::default(), 2_000, Some(&queue_with(Priority::Stop)), &mut || false));
-        assert!((STOP_WAITS..STOP_WAITS + LOOK_UP).contains(&cut_short), "{cut_short:?}");
-    }
-
-    #[test]
-    fn nothing_else_cuts_a_wait_short() {
-        for yields in [None, Some(&queue_with(Priority::Write)), Some(&Queue::default())] {
-            let failure = read(&mut Silent::default(), 2_000, yields, &mut || false);
-            assert_eq!(waited(&failure), Duration::from_secs(2));
-        }
-    }
-
-    #[test]
-    fn what_still_comes_is_waited_for() {
-        let mut line = Silent { noise: Some(Duration::from_millis(40)), ..Silent::default() };
-        read(&mut line, 2_000, Some(&queue_with(Priority::Stop)), &mut || false);
-        assert!(line.now >= Instant::ZERO + Duration::from_secs(2), "{:?}", line.now);
-    }
-
-    #[test]
-    fn who_gives_up_is_heard_after_the_shortest_time_out() {
-        let mut asked = 0;
-        let mut give_up = || {
-            asked += 1;
-            true
-        };
-        assert_eq!(read(&mut Silent::default(), 5, None, &mut give_up), Failure::Interrupted);
-        assert_eq!(asked, 1);
-    }
-}
+mod tests;

@@ -1,0 +1,552 @@
+//! One call, from the first thought of it to its end: whether the unit may be asked, what has to come before, how the question
+//! is put, whether what came can be believed, and whether it is asked again.
+//!
+//! | room | what is decided there |
+//! | --- | --- |
+//! | `known` | what is known of the line, and what comes before a request |
+//! | `attempt` | one attempt: what comes before the question, the question, and how often it takes to be sure of the answer |
+//! | `came_to` | what follows from what a request came to |
+//! | `exchange` | one request on the wire, and what is learned of it |
+//! | `course` | how long a call may go on, how often, and after what there is another attempt |
+//! | `write_back` | a write of words that can be read back |
+//! | `probes` | which request shows that a unit owes nothing |
+//! | `longer_reads` | how many words a read asks for, so that its answer is told apart |
+//! | `among_others` | the same where other masters' answers come, too |
+//! | `first_contact` | a stop's reads on a line that was just opened |
+//! | `echo` | adapters that send our own bytes back |
+//! | `dead_units` | units that do not answer |
+
+mod among_others;
+mod attempt;
+mod came_to;
+mod course;
+mod dead_units;
+mod echo;
+mod exchange;
+mod first_contact;
+mod fresh_words;
+mod known;
+mod longer_reads;
+mod outcome;
+mod probes;
+mod question;
+mod units;
+mod write_back;
+
+use core::time::Duration;
+
+use crate::{Destination, Instant, Request, UnitAddress};
+
+use course::Course;
+use dead_units::Verdict;
+use exchange::Flight;
+use known::Ask;
+use outcome::{Bytes, Kept, Slip};
+use probes::Tried;
+use write_back::Write;
+
+pub use echo::AdapterEcho;
+pub use fresh_words::FreshWords;
+pub use known::{Known, Opened};
+pub use outcome::{Cut, Exchange, Outcome, Times, Unanswered};
+pub use question::{Question, Urgency};
+
+/// What whoever has the line does next for a call.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Step<'a, 'r> {
+    /// Nothing of it is on the wire: whoever is more urgent may ask now. Where the line is lost, it is opened again.
+    LetPass,
+    /// Leave the line to others until this moment. Earlier is harmless.
+    StandBy(Instant),
+    /// Send these bytes in one piece, and say when the last will have left by [`Conversation::sent`].
+    Send(&'a [u8]),
+    /// Wait for bytes, no longer than until this moment, and give them to [`Conversation::heard`]: none, too.
+    Listen(Instant),
+    /// A request is over. For whoever keeps figures; the call goes on.
+    Heard(Exchange<'r>),
+    /// The call is over. It says the same again to who asks again.
+    Done(Outcome<'a>),
+}
+
+/// Something was said to a [`Conversation`] that it did not wait for. It changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutOfTurn;
+
+impl core::fmt::Display for OutOfTurn {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("nothing was asked that this could be the answer to")
+    }
+}
+
+impl core::error::Error for OutOfTurn {}
+
+/// How often something happened on behalf of one call, since [`Conversation::take_counts`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Counts {
+    /// Requests sent once more.
+    pub retries: u32,
+    /// Reads asked twice, because the answer to another one might have been taken for theirs.
+    pub verified: u32,
+    /// Requests that found the way back after one was left open, and reads that were put so that their answer is told apart.
+    pub resyncs: u32,
+}
+
+/// One call, as a value that is given time.
+///
+/// It has no clock, no port and no thread. Whoever has those asks it by [`next`](Self::next) what to do, does that, and says
+/// what came of it; what the line has taught is in [`Known`], which all calls on one line share. One call at a time uses a
+/// `Known`: between two steps another may where the step is [`LetPass`](Step::LetPass) or [`StandBy`](Step::StandBy).
+///
+/// ```
+/// use drivebus_rtu::{
+///     AdapterEcho, Answer, Conversation, Duration, FreshWords, Instant, Known, Opened, Outcome, Question, Request, SerialFormat,
+///     Step, UnitAddress,
+/// };
+///
+/// let mut known: Known<4, 16> = Known::new(SerialFormat::DEFAULT, AdapterEcho::Absent, 1);
+/// let words = FreshWords::beginning_at(0x1234);
+/// let mut now = Instant::ZERO;
+/// known.opened(now, &Opened::new().gapless(true)); // nobody else asks on it
+///
+/// let read = Request::read(0x2100, 1)?;
+/// let question = Question::new(UnitAddress::MIN.into(), read, Duration::from_millis(500)).retries(2);
+/// let mut call = Conversation::new(question, &words);
+/// let mut wire: &[u8] = &[];
+/// let word = loop {
+///     match call.next(now, &mut known) {
+///         Step::LetPass | Step::Heard(_) => {}
+///         Step::StandBy(until) => now = until,
+///         Step::Send(frame) => {
+///             assert_eq!(frame, [0x01, 0x03, 0x21, 0x00, 0x00, 0x01, 0x8E, 0x36]);
+///             wire = &[0x01, 0x03, 0x02, 0x00, 0x07, 0xF9, 0x86];
+///             call.sent(&mut known, now)?;
+///         }
+///         Step::Listen(until) => {
+///             now = if wire.is_empty() { until } else { now };
+///             let count = call.heard(now, &mut known, wire)?;
+///             wire = &wire[count..];
+///         }
+///         Step::Done(Outcome::Answered { answer: Some(Answer::Read { words, .. }), .. }) => break words.get(0),
+///         other => panic!("{other:?}"),
+///     }
+/// };
+/// assert_eq!(word, Some(7));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Conversation<'r> {
+    question: Question<'r>,
+    words: &'r FreshWords,
+    /// How often it may be asked once more; never where its unit was silent the last times.
+    retries: u32,
+    /// The connection that it must go over.
+    connection: Option<u64>,
+    /// How long its unit takes at most until its answer begins, as its answers have taught.
+    learned: Option<Duration>,
+    is_wanted: bool,
+    write: Option<Write<'r>>,
+    course: Course,
+    tried: Tried,
+    /// Whether the question may be put in another length, in this attempt.
+    apart: bool,
+    /// Whether the next question of this attempt counts: one that is repeated until the answers agree counts once.
+    asks: bool,
+    /// How often it was asked before this attempt.
+    asked_before: u32,
+    /// How the attempt before this one ended, if that was with the port.
+    port_failed: Option<Slip>,
+    /// Whether that is how the call ended.
+    ended_before: bool,
+    state: State<'r>,
+    answer: Kept,
+    came: Bytes,
+    counts: Counts,
+    latest: Instant,
+}
+
+/// Where a call stands.
+#[derive(Debug, Clone)]
+enum State<'r> {
+    /// Its unit may have been silent: it waits off the line, until then at most.
+    Sparing { patience: Option<Instant> },
+    /// Nothing of it is on the wire, and others may go first.
+    Passing,
+    /// They have.
+    Passed,
+    /// What came in meanwhile is taken down.
+    Overhearing,
+    /// The next request is chosen.
+    Deciding,
+    /// Its request is on the wire.
+    InFlight(Flight<'r>),
+    /// What came behind an answer is taken down.
+    Proving { ask: Ask<'r>, count: u16, times: Times },
+    /// The request is over.
+    Heard(Flight<'r>, Result<Times, Slip>),
+    /// The unit is at work: it is looked at again then.
+    Pausing(Instant),
+    /// All is over.
+    Done(Result<Times, Slip>),
+}
+
+impl<'r> Conversation<'r> {
+    /// One that has not begun. Probes take their words from `words`, as all on this line do.
+    pub fn new(question: Question<'r>, words: &'r FreshWords) -> Self {
+        Self {
+            retries: question.retries,
+            connection: question.connection,
+            learned: None,
+            is_wanted: true,
+            write: None,
+            course: Course::new(question.timeout, question.retries),
+            tried: Tried::default(),
+            apart: !question.verify,
+            asks: true,
+            asked_before: 0,
+            port_failed: None,
+            ended_before: false,
+            state: State::Sparing { patience: None },
+            answer: Kept::NONE,
+            came: Bytes::NONE,
+            counts: Counts::default(),
+            latest: Instant::ZERO,
+            words,
+            question,
+        }
+    }
+
+    /// From the next request on a read waits no longer for the first character of its answer than `longest`, and the time that
+    /// its characters take on top: what the unit's answers have taught.
+    pub const fn expect_within(&mut self, longest: Option<Duration>) {
+        self.learned = longest;
+    }
+
+    /// Whether somebody still waits for it. What nobody waits for is not asked once more.
+    pub const fn is_wanted(&mut self, is_wanted: bool) {
+        self.is_wanted = is_wanted;
+    }
+
+    /// How often something happened since the last time.
+    pub const fn take_counts(&mut self) -> Counts {
+        core::mem::replace(&mut self.counts, Counts { retries: 0, verified: 0, resyncs: 0 })
+    }
+
+    /// What to do at `now`.
+    pub fn next<'a, const U: usize, const P: usize>(
+        &'a mut self,
+        now: Instant,
+        known: &'a mut Known<U, P>,
+    ) -> Step<'a, 'r> {
+        if now < self.latest {
+            self.misused(known);
+        }
+        self.latest = self.latest.max(now);
+        loop {
+            match self.state {
+                State::Sparing { patience } => {
+                    if let Some(until) = self.spare_the_others(now, known, patience) {
+                        return Step::StandBy(until);
+                    }
+                }
+                State::Passing => {
+                    self.state = State::Passed;
+                    return Step::LetPass;
+                }
+                State::Passed => self.passed(now, known),
+                State::Overhearing | State::Proving { .. } => return Step::Listen(now),
+                State::Deciding => {
+                    self.decide(now, known);
+                }
+                State::InFlight(_) => match self.poll(now, known) {
+                    Polled::Send => return Step::Send(known.master.frame()),
+                    Polled::Listen(until) => return Step::Listen(until),
+                    Polled::Over => return self.tell(),
+                },
+                State::Heard(flight, result) => self.conclude(now, known, flight, result),
+                State::Pausing(until) => {
+                    self.state = State::Passing;
+                    return Step::StandBy(until);
+                }
+                State::Done(result) => return Step::Done(self.outcome(result)),
+            }
+        }
+    }
+
+    /// Says that the bytes of [`Step::Send`] are on their way, and that the last will have left at `end`. Returns until when
+    /// it is waited for the answer at most.
+    ///
+    /// # Errors
+    ///
+    /// [`OutOfTurn`]: nothing was to be sent.
+    pub fn sent<const U: usize, const P: usize>(
+        &mut self,
+        known: &mut Known<U, P>,
+        end: Instant,
+    ) -> Result<Instant, OutOfTurn> {
+        match &self.state {
+            State::InFlight(flight) if flight.sent.is_some() => {
+                known.master.sent(end);
+                Ok(end + flight.timeout)
+            }
+            _ => Err(OutOfTurn),
+        }
+    }
+
+    /// Takes bytes that had come by `now`, as many as there is room for, and returns how many. None say that none came.
+    ///
+    /// # Errors
+    ///
+    /// [`OutOfTurn`]: it does not listen.
+    pub fn heard<const U: usize, const P: usize>(
+        &mut self,
+        now: Instant,
+        known: &mut Known<U, P>,
+        bytes: &[u8],
+    ) -> Result<usize, OutOfTurn> {
+        match &mut self.state {
+            State::InFlight(flight) => {
+                flight.listened = true;
+                Ok(known.master.receive(now, bytes))
+            }
+            State::Overhearing | State::Proving { .. } if !bytes.is_empty() => {
+                known.stray(now, bytes);
+                Ok(bytes.len())
+            }
+            State::Overhearing => {
+                known.master.overhear(now);
+                self.state = State::Deciding;
+                Ok(0)
+            }
+            &mut State::Proving { ask, count, times } => {
+                known.master.overhear(now);
+                self.proved(now, known, ask, count, times);
+                Ok(0)
+            }
+            _ => Err(OutOfTurn),
+        }
+    }
+
+    /// Cuts it short at `now`: the port was lost, or nobody waits for it any more. A request on the wire is given up. What
+    /// becomes of the call [`next`](Self::next) tells: where the port was lost it may go on.
+    pub fn cut_short<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, why: Cut) {
+        let why = Unanswered::CutShort(why);
+        match self.state {
+            State::Done(_) => {}
+            State::InFlight(flight) => {
+                known.master.abort(now);
+                self.came.clear();
+                self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
+            }
+            State::Heard(flight, Err(slip)) => {
+                if !slip.why.is_refused() {
+                    self.state = State::Heard(flight, Err(Slip { why, ..slip }));
+                }
+            }
+            State::Heard(_, Ok(_)) => {}
+            _ => {
+                let slip = self.slip(why, None, now);
+                self.end_attempt(now, known, Err(slip));
+            }
+        }
+    }
+
+    /// The unit has been quiet for so long at `now`, and whoever is more urgent waits: it is waited for no longer.
+    pub fn give_way<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, quiet: Duration) {
+        if let State::InFlight(flight) = self.state {
+            known.master.abort(now);
+            self.came.clear();
+            let why = Unanswered::NoAnswer { timeout: quiet, attempts: 1 };
+            self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
+        }
+    }
+
+    /// Whether a request of it was begun and is not over.
+    pub const fn is_in_flight(&self) -> bool {
+        matches!(self.state, State::InFlight(_))
+    }
+
+    /// Who is asked.
+    fn unit(&self) -> Option<UnitAddress> {
+        match self.question.destination {
+            Destination::Unit(unit) => Some(unit),
+            Destination::Broadcast => None,
+        }
+    }
+
+    /// What is asked now: what the caller asks, or what was written.
+    fn ask(&self) -> Ask<'r> {
+        let Question { destination, request, timeout, in_doubt, .. } = self.question;
+        match &self.write {
+            // What is read back decides: it is never asked in doubt, not even for a write that was.
+            Some(write) if write.is_reading() => Ask { destination, request: write.read, timeout, in_doubt: false },
+            _ => Ask { destination, request, timeout, in_doubt },
+        }
+    }
+
+    /// An error, with nothing that came instead of an answer.
+    fn slip(&mut self, why: Unanswered, sent: Option<Instant>, ended: Instant) -> Slip {
+        self.came.clear();
+        Slip { why, sent, ended }
+    }
+
+    #[cold]
+    fn misused<const U: usize, const P: usize>(&mut self, known: &mut Known<U, P>) {
+        if !matches!(self.state, State::Done(_)) {
+            known.master.abort(self.latest);
+            let slip = self.slip(Unanswered::Misused, None, self.latest);
+            self.state = State::Done(Err(slip));
+        }
+    }
+
+    /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who
+    /// polls has others to ask meanwhile.
+    fn patience(&self) -> Duration {
+        if self.question.urgency == Urgency::Poll {
+            return Duration::ZERO;
+        }
+        self.question.timeout.saturating_mul(self.retries.saturating_add(1))
+    }
+
+    /// A unit that was silent lately waits off the line, while others use it, for as long as it would have been silent: until
+    /// then, or the call begins.
+    fn spare_the_others<const U: usize, const P: usize>(
+        &mut self,
+        now: Instant,
+        known: &mut Known<U, P>,
+        patience: Option<Instant>,
+    ) -> Option<Instant> {
+        if let Some(unit) = self.unit() {
+            if !known.units.enter(unit) {
+                let slip = self.slip(Unanswered::NoRoom { units: U }, None, now);
+                self.state = State::Done(Err(slip));
+                return None;
+            }
+            if self.question.urgency != Urgency::Stop {
+                match known.units.verdict(unit, now) {
+                    Verdict::AskOnce => self.retries = 0,
+                    Verdict::Wait(until) if known.is_open() => {
+                        let patience = patience.unwrap_or(now + self.patience());
+                        if now < patience {
+                            self.state = State::Sparing { patience: Some(patience) };
+                            return Some(until.min(patience));
+                        }
+                        let left = until.saturating_duration_since(now);
+                        let slip = self.slip(Unanswered::NotAsked { left }, None, now);
+                        self.finish(known, Err(slip));
+                        return None;
+                    }
+                    Verdict::Ask | Verdict::Wait(_) => {}
+                }
+            }
+        }
+        self.begin();
+        None
+    }
+
+    /// The first attempt.
+    fn begin(&mut self) {
+        self.course = Course::new(self.question.timeout, self.retries);
+        match self.question.request {
+            Request::Read { .. } => {}
+            _ => {
+                self.write = Write::of(&self.question, self.retries);
+                self.course.go_on_with(self.question.timeout, 0);
+            }
+        }
+        self.begin_attempt();
+    }
+
+    fn begin_attempt(&mut self) {
+        self.tried = Tried::default();
+        // Whatever else is repeated would be done twice, and what is verified is asked as it is.
+        self.apart = !self.question.verify;
+        self.asks = true;
+        self.asked_before = self.course.asked();
+        self.state = State::Passing;
+    }
+
+    /// An attempt is over: there is another one, or that is what came of it.
+    fn end_attempt<const U: usize, const P: usize>(
+        &mut self,
+        now: Instant,
+        known: &mut Known<U, P>,
+        result: Result<Times, Slip>,
+    ) {
+        let Err(slip) = result else { return self.settle(now, known, result) };
+        let is_port = slip.why.is_of_the_port();
+        let to_ask_again = self.unit().is_some() && slip.why.asks_again(&self.question.meanings);
+        if !self.course.goes_on(&slip, self.asked_before, to_ask_again) || !self.is_wanted {
+            let why = match slip.why {
+                // It came when it was asked for the last of so many times.
+                Unanswered::NoAnswer { timeout, .. } => {
+                    Unanswered::NoAnswer { timeout, attempts: self.course.asked().max(1) }
+                }
+                other => other,
+            };
+            // How the port was lost tells more than that it is still not there. But where the request went out only the second
+            // time, that has to be said.
+            let before = self.port_failed.filter(|_| is_port && slip.sent.is_none());
+            self.ended_before = before.is_some();
+            return self.settle(now, known, Err(before.unwrap_or(Slip { why, ..slip })));
+        }
+        self.port_failed = is_port.then_some(slip);
+        self.counts.retries += u32::from(self.unit().is_some());
+        self.begin_attempt();
+    }
+
+    /// What was asked came to this: the end, where nothing was written that is read back.
+    fn settle<const U: usize, const P: usize>(
+        &mut self,
+        now: Instant,
+        known: &mut Known<U, P>,
+        result: Result<Times, Slip>,
+    ) {
+        match self.write.take() {
+            Some(write) => self.write_goes_on(now, known, write, result),
+            None => self.finish(known, result),
+        }
+    }
+
+    fn finish<const U: usize, const P: usize>(&mut self, known: &mut Known<U, P>, result: Result<Times, Slip>) {
+        if let Some(unit) = self.unit() {
+            match &result {
+                Ok(times) => known.units.answered(unit, times.ended),
+                Err(slip) if slip.why.is_silence() => known.units.silent(unit, slip.ended),
+                Err(slip) if slip.sent.is_some() && !self.came.as_slice().is_empty() => {
+                    known.units.answered(unit, slip.ended);
+                }
+                Err(_) => {}
+            }
+        }
+        self.state = State::Done(result);
+    }
+
+    fn outcome(&self, result: Result<Times, Slip>) -> Outcome<'_> {
+        match result {
+            Ok(times) => {
+                let answer = match self.question.request {
+                    Request::Read { count, .. } => self.answer.answer().map(|answer| answer.shortened(count)),
+                    _ => self.answer.answer(),
+                };
+                Outcome::Answered { times, answer }
+            }
+            Err(Slip { why, sent, ended }) => {
+                let is_shown = matches!(
+                    why,
+                    Unanswered::NotTaken { .. } | Unanswered::Limited { .. } | Unanswered::Acknowledged { .. }
+                );
+                let shows = self.answer.words().filter(|_| is_shown);
+                Outcome::Failed { why, sent, ended, raw: self.came.as_slice(), shows, before: self.ended_before }
+            }
+        }
+    }
+}
+
+/// What the request on the wire needs.
+enum Polled {
+    Send,
+    Listen(Instant),
+    Over,
+}

@@ -1,0 +1,59 @@
+//! Adapters that send our own bytes back: how that is found out.
+//!
+//! A write and an echo are confirmed by the very bytes of the request, so an adapter that echoes would confirm what no
+//! unit has heard.
+
+use super::known::{Ask, Known};
+use super::outcome::Unanswered;
+use crate::{Destination, Tally};
+
+/// How often one attempt looks whether the adapter echoes, where noise hides it.
+pub(super) const LOOKS: u32 = 3;
+
+/// What is known about the adapter sending our own bytes back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum AdapterEcho {
+    /// Find out.
+    Auto,
+    /// It does: the request is taken off before every answer.
+    Present,
+    /// It does not.
+    Absent,
+}
+
+impl<const U: usize, const P: usize> Known<U, P> {
+    /// Keeps what an exchange has shown about the adapter and the line: why `ask` was not answered, if it was not, so many
+    /// `bytes` that came in the place of the answer, and what was seen beside it.
+    pub(super) fn learn(&mut self, ask: &Ask<'_>, failure: Option<Unanswered>, bytes: usize, tally: Tally) {
+        if self.given_echo != AdapterEcho::Auto {
+            return;
+        }
+        let is_broadcast = ask.destination == Destination::Broadcast;
+        if tally.own_echo > 0 && (self.echo == AdapterEcho::Auto || !is_broadcast) {
+            self.echo = AdapterEcho::Present;
+            self.master.strip_echo(true);
+            return;
+        }
+        if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
+            return;
+        }
+        let silent = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= ask.request.adu_len());
+        // Bytes that may be what is left of the request may be left of an echo. Others are noise, however many, as long as
+        // an answer shows that the line carries more than noise.
+        let clean = tally.own_remnant == 0
+            && match failure {
+                None | Some(Unanswered::Refused { .. } | Unanswered::Unreached) => true,
+                Some(Unanswered::NoAnswer { .. }) => silent && bytes == 0,
+                Some(_) => false,
+            };
+        match self.echo {
+            AdapterEcho::Auto if clean => self.echo = AdapterEcho::Absent,
+            // It did not echo this time: to be looked at again before anything depends on it.
+            AdapterEcho::Present if clean && failure.is_none() => {
+                self.echo = AdapterEcho::Auto;
+                self.master.strip_echo(false);
+            }
+            _ => {}
+        }
+    }
+}
