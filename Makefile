@@ -87,6 +87,8 @@ wheel: dist/.wheel ## the wheel, in dist/
 layers: $(VENV)/.created
 	$(BIN)/python tools/check_layers.py
 	$(BIN)/python tools/check_layers.py --self-test
+	$(BIN)/python tools/check_rings.py
+	$(BIN)/python tools/check_rings.py --self-test
 	$(BIN)/python tools/check_links.py
 
 rust-lint: $(VENV)/.created

@@ -39,6 +39,22 @@ pub struct Builder {
     tty: drivebus_line::tty::TtyOptions,
 }
 
+impl Bus {
+    /// Opens `port` with the usual settings: a path, or one of the URLs in the [crate's documentation](crate#ports).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Builder::open`].
+    pub fn open(port: &str) -> Result<Self, Error> {
+        Self::builder().open(port)
+    }
+
+    /// A builder for a bus with other settings than the usual ones. It opens nothing by itself.
+    pub fn builder() -> Builder {
+        Builder::default()
+    }
+}
+
 impl Default for Builder {
     fn default() -> Self {
         let format = SerialFormat::DEFAULT;

@@ -7,7 +7,6 @@ use drivebus_drives::Place;
 use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
 use drivebus_rtu::{Answer, Destination, Instant, Request};
 
-use crate::builder::Builder;
 use crate::checks;
 use crate::error::Error;
 use crate::options::CallOptions;
@@ -28,20 +27,6 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Opens `port` with the usual settings: a path, or one of the URLs in the [crate's documentation](crate#ports).
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Builder::open`].
-    pub fn open(port: &str) -> Result<Self, Error> {
-        Self::builder().open(port)
-    }
-
-    /// A builder for a bus with other settings than the usual ones. It opens nothing by itself.
-    pub fn builder() -> Builder {
-        Builder::default()
-    }
-
     pub(crate) fn around(core: Core) -> Self {
         Self {
             core: Arc::new(core),

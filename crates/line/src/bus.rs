@@ -3,27 +3,33 @@
 //! | room | what is in it |
 //! | --- | --- |
 //! | `errand` | a request whose caller does not wait in a thread of its own |
-//! | `shared` | what all have in common who work on one line |
+//! | `clock`, `openings`, `figures` | the line's time, how often it was opened, and what happened at it |
+//! | `wills` | what programs leave to be done when they are gone |
+//! | `port` | one line, and what all have in common who use it |
 //! | `call` | one call from its place in the queue to its end |
-//! | `workers` | the threads that carry out errands |
 //! | `listen` | hearing the line without asking |
-//! | `openings` | how often the line was opened again |
-//! | `sharing` | whether the port is this program's, or another's through which it is used |
 //! | `host` | serving other programs |
-//! | `through` | being served by one |
-//! | `wills` | halting what a program ran that is gone |
+//! | `sharing` | whether the port is this program's, or another's through which it is used |
+//! | `shared` | a port, and with whom it is shared |
+//! | `through` | being served by another program |
+//! | `halts` | halting what a program ran that is gone |
+//! | `workers` | the threads that carry out errands |
 
 pub(crate) mod call;
 mod clock;
 pub(crate) mod errand;
+mod figures;
+#[cfg(all(unix, feature = "share"))]
+mod halts;
 #[cfg(all(unix, feature = "share"))]
 mod host;
 mod listen;
 mod openings;
+mod port;
 mod shared;
-#[cfg_attr(not(all(unix, feature = "share")), path = "bus/unshared.rs")]
+#[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_sharing.rs")]
 mod sharing;
-#[cfg(all(unix, feature = "share"))]
+#[cfg_attr(not(all(unix, feature = "share")), path = "bus/unshared.rs")]
 mod through;
 #[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_wills.rs")]
 mod wills;
@@ -36,12 +42,13 @@ use drivebus_rtu::{Answer, Destination, Instant, Meanings, Request, UnitAddress}
 
 use crate::ask::Done;
 use crate::bus::call::Call;
+use crate::bus::port::Port;
 use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
 use crate::line::Opener;
-use crate::options::{BusOptions, CallOptions, UnitOptions};
+use crate::options::{BusOptions, CallOptions, LastWill, UnitOptions};
 use crate::ports::key::PortKey;
 use crate::trace::Watch;
 
@@ -85,29 +92,33 @@ impl Bus {
         Shared::open(opener, key, options, give_up).map(|shared| Self { shared })
     }
 
+    fn port(&self) -> &Arc<Port> {
+        &self.shared.port
+    }
+
     /// The name of the port, for messages.
     pub fn name(&self) -> &str {
-        &self.shared.name
+        &self.port().name
     }
 
     /// How the bus behaves.
     pub fn options(&self) -> &BusOptions {
-        &self.shared.options
+        &self.port().options
     }
 
     /// Whether the bus was closed, or was opened by another process: by the parent of this forked child.
     pub fn is_closed(&self) -> bool {
-        self.shared.is_closed()
+        self.port().is_closed()
     }
 
     /// As [`is_closed`](Self::is_closed), for who is in the process that opened it.
     pub(crate) fn is_shut(&self) -> bool {
-        self.shared.is_shut()
+        self.port().is_shut()
     }
 
     /// Whether the line's clock is a simulation's.
     pub fn is_virtual(&self) -> bool {
-        self.shared.is_virtual()
+        self.port().is_virtual()
     }
 
     /// Closes the line, after the exchange that is under way at most 50 ms later. Closing again does nothing.
@@ -115,10 +126,10 @@ impl Bus {
     /// A unit that is being halted for a program that is gone is waited for, a second at most. From inside a `give_up`, the
     /// call that asks it closes the line when it ends.
     pub fn close(&self) {
-        if !self.is_closed() && !self.shared.queue.has_this_thread() {
-            self.shared.wills.let_out();
+        if !self.is_closed() && !self.port().queue.has_this_thread() {
+            self.port().wills.let_out();
         }
-        self.shared.close();
+        self.port().close();
     }
 
     /// Gives the port up for as long as `meanwhile` takes: another program of this port may have it. It is opened again, or
@@ -151,24 +162,24 @@ impl Bus {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        if !self.shared.is_of_this_process() {
+        if !self.port().is_of_this_process() {
             // What a thread of the parent held when this child was forked, nobody here lets go: nothing is looked up.
-            let ask = self.shared.ask_as(UnitOptions::default(), destination, request, &options);
+            let ask = self.port().ask_as(UnitOptions::default(), destination, request, &options);
             return Err(ask.failed(Failure::Forked, None, None, &[]));
         }
-        let ask = self.shared.ask(destination, request, &options);
-        if self.shared.options.read_only && request.is_write() {
+        let ask = self.port().ask(destination, request, &options);
+        if self.port().options.read_only && request.is_write() {
             return Err(ask.failed(
                 Failure::ReadOnly { function: request.function() },
                 None,
-                self.shared.now_if_known(),
+                self.port().now_if_known(),
                 &[],
             ));
         }
         let mut give_up = || self.is_shut() || give_up();
         let result = match &self.shared.sharing {
             Some(_) => self.shared.call_shared(destination, request, options, &mut give_up, take),
-            None => Call::new(&self.shared, ask, options).run(&mut give_up, take),
+            None => Call::new(self.port(), ask, options).run(&mut give_up, take),
         };
         if self.is_shut() {
             self.close();
@@ -180,8 +191,8 @@ impl Bus {
     ///
     /// In a forked child nothing is set: it makes no calls.
     pub fn configure(&self, unit: UnitAddress, options: UnitOptions) {
-        if self.shared.is_of_this_process() {
-            self.shared.units().insert(unit, options);
+        if self.port().is_of_this_process() {
+            self.port().units().insert(unit, options);
         }
     }
 
@@ -190,14 +201,14 @@ impl Bus {
     /// A read that is refused by one that means [`Meaning::AskAgain`](drivebus_rtu::Meaning::AskAgain) is asked again as after
     /// a damaged answer, and so is a write whose words can be read back. In a forked child nothing is set.
     pub fn set_meanings(&self, unit: UnitAddress, meanings: Meanings) {
-        if self.shared.is_of_this_process() {
-            self.shared.meanings.set(unit, meanings);
+        if self.port().is_of_this_process() {
+            self.port().meanings.set(unit, meanings);
         }
     }
 
     /// Of the last ten exchanges with `unit`, how many brought an answer.
     pub fn link(&self, unit: UnitAddress) -> Link {
-        if !self.shared.is_of_this_process() {
+        if !self.port().is_of_this_process() {
             return Link::default(); // a thread of the parent's may have held it
         }
         self.shared.link(unit)
@@ -210,12 +221,12 @@ impl Bus {
 
     /// Now, on the line's clock; its start in a forked child, where only the line of the parent knows.
     pub fn now(&self) -> Instant {
-        self.shared.now()
+        self.port().now()
     }
 
     /// Waits on the line's clock; other callers may use the line meanwhile. Ends early when `give_up` says so.
     pub fn sleep(&self, time: Duration, give_up: &mut dyn FnMut() -> bool) {
-        self.shared.sleep(time, give_up);
+        self.port().sleep(time, give_up);
     }
 
     /// Shows each frame that goes over the line to `watch` from now on, or to nobody any more.
@@ -224,14 +235,14 @@ impl Bus {
     /// another program has the port, it is shown what this bus asks there and what comes of it. A bus that nobody ever
     /// watched does nothing for it.
     pub fn watch(&self, watch: Option<Watch>) {
-        if self.shared.is_of_this_process() {
-            self.shared.watch(watch);
+        if self.port().is_of_this_process() {
+            self.port().watch(watch);
         }
     }
 
     /// What has happened so far; nothing in a forked child, whose parent's it is.
     pub fn stats(&self) -> Stats {
-        if !self.shared.is_of_this_process() {
+        if !self.port().is_of_this_process() {
             return Stats::default(); // a thread of the parent's may have held it
         }
         self.shared.stats()
@@ -239,7 +250,7 @@ impl Bus {
 
     /// How often the port was opened again after it was lost, or was another program's and changed hands.
     pub fn reconnects(&self) -> u64 {
-        if self.shared.is_of_this_process() { self.shared.reconnects() } else { 0 }
+        if self.port().is_of_this_process() { self.shared.reconnects() } else { 0 }
     }
 
     /// What the user should know about the line, such as a setting that did not reach the wire.
@@ -252,29 +263,46 @@ impl Bus {
     /// What this bus did for programs that are gone, and what it could not do, in words: see
     /// [`leave_will`](Self::leave_will).
     pub fn wills(&self) -> Vec<String> {
-        if self.shared.is_of_this_process() { self.shared.wills.notes() } else { Vec::new() }
+        if self.port().is_of_this_process() { self.port().wills.notes() } else { Vec::new() }
+    }
+
+    /// Leaves a last will: what halts a unit, should this program be gone without a word. Whoever has the port then, or
+    /// opens it within five minutes, sends that before anything else to this unit, until the unit takes it. Several of a
+    /// program add up, and the newest counts.
+    ///
+    /// `None` where nobody would find it: the port is of no kind that programs share, or the system gives no place. What
+    /// closes the bus leaves it to be carried out.
+    pub fn leave_will(&self, will: LastWill) -> Option<u64> {
+        (self.port().is_of_this_process() && !self.is_shut()).then(|| self.port().wills.leave(will)).flatten()
+    }
+
+    /// Takes back the will that [`leave_will`](Self::leave_will) gave this number. In a forked child it stays the parent's.
+    pub fn withdraw_will(&self, number: u64) {
+        if self.port().is_of_this_process() {
+            self.port().wills.withdraw(number);
+        }
     }
 
     /// To be called by each thread that works for this bus alone: it goes before the programs around it, where the
     /// system allows that; where it does not, [`notes`](Self::notes) says so. In virtual time nothing is asked for.
     pub fn enter_thread(&self) {
-        self.shared.enter_thread();
+        self.port().enter_thread();
     }
 
     /// Whether frames are told apart by something else than silence.
     pub(crate) fn is_gapless(&self) -> bool {
-        self.shared.gapless
+        self.port().gapless
     }
 
     /// Whether `unit` could not take a request, as it says by `failure`, and may the next time.
     pub(crate) fn asks_again(&self, unit: UnitAddress, failure: &Failure) -> bool {
-        self.shared.is_of_this_process() && self.shared.meanings.asks_again(unit, None, failure)
+        self.port().is_of_this_process() && self.port().meanings.asks_again(unit, None, failure)
     }
 
     /// The least silence before a request to `unit`.
     pub(crate) fn silence_before(&self, unit: UnitAddress) -> Duration {
-        let gap = self.shared.units().get(&unit).and_then(|set| set.gap).unwrap_or_default();
-        self.shared.options.format.t35().max(gap)
+        let gap = self.port().units().get(&unit).and_then(|set| set.gap).unwrap_or_default();
+        self.port().options.format.t35().max(gap)
     }
 
     /// Why a bus that [is closed](Self::is_closed) is.
@@ -286,11 +314,11 @@ impl Bus {
 impl Drop for Bus {
     /// Whoever still waits for an answer is told that none will come.
     fn drop(&mut self) {
-        if self.shared.is_of_this_process() {
-            self.shared.dismiss();
+        if self.port().is_of_this_process() {
+            self.port().dismiss();
             // Others hold the line too, while they use it.
             if self.shared.sharing.is_some() {
-                self.shared.close();
+                self.port().close();
             }
         }
     }
@@ -300,6 +328,6 @@ impl Drop for Bus {
 impl Bus {
     /// How many wait for the line.
     pub(crate) fn waiting(&self) -> usize {
-        self.shared.queue.waiting()
+        self.port().queue.waiting()
     }
 }

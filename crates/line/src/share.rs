@@ -17,3 +17,10 @@ pub(crate) mod guest;
 pub(crate) mod message;
 pub(crate) mod place;
 pub(crate) mod will;
+
+use std::time::Duration;
+
+/// A time as it travels: nanoseconds, and the most that fit where they do not.
+pub(crate) fn nanos(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}

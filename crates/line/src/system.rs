@@ -5,5 +5,7 @@ mod at_fork;
 pub mod clock;
 #[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
 pub(crate) mod inherited;
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+mod listed;
 pub(crate) mod process;
 pub(crate) mod punctual;

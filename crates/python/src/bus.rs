@@ -1,23 +1,25 @@
 //! `Bus` for Python: arguments in, one call of the core without the GIL, exceptions out.
 
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, SystemTime};
+use std::sync::Arc;
+use std::time::Duration;
 
 use drivebus_line::{
     Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, LastWill, PortError, PortErrorKind, UnitOptions,
 };
-use drivebus_rtu::{Adu, Answer, Destination, Frame, Instant, MAX_READ_BITS, Request, Table};
+use drivebus_rtu::{Adu, Answer, Destination, Frame, MAX_READ_BITS, Request, Table};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::arguments::{
     duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
 };
+use crate::clock::{UnixClock, to_seconds, unix_time};
 use crate::convert::{bytes_of, one_word, unit_address, words_of};
-use crate::ending::{Inside, detached};
+use crate::ending::detached;
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
 use crate::profile::Profile;
+use crate::signals::with_signals;
 use crate::{overhear, trace};
 
 /// The table that is meant where nothing is said.
@@ -396,59 +398,6 @@ impl Heard {
     }
 }
 
-/// Runs `work` without the GIL, with a question to ask now and then: has a signal handler of Python raised?
-///
-/// What it raised is what comes back, whatever `work` made of it.
-pub(crate) fn with_signals<T: Send>(
-    py: Python<'_>,
-    work: impl FnOnce(&mut dyn FnMut() -> bool) -> T + Send,
-) -> PyResult<T> {
-    let raised = Mutex::new(None);
-    let result = detached(py, || {
-        work(&mut || {
-            let Ok(mut raised) = raised.lock() else { return true };
-            // The first is the one that counts; what comes after it, the interpreter raises when this has ended.
-            if raised.is_none() {
-                *raised = trace::take_raised();
-            }
-            if raised.is_none() {
-                *raised =
-                    Inside::enter().and_then(|_inside| Python::try_attach(|py| py.check_signals().err()).flatten());
-            }
-            raised.is_some()
-        })
-    });
-    match raised.into_inner().ok().flatten().or_else(trace::take_raised) {
-        Some(error) => Err(error),
-        None => Ok(result),
-    }
-}
-
-/// The line's clock and the calendar's, at one moment.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct UnixClock {
-    ahead: f64,
-}
-
-impl UnixClock {
-    /// `virtual_ahead` is where a simulation's clock stands on the calendar.
-    pub(crate) fn of(core: &CoreBus, virtual_ahead: Option<f64>) -> Self {
-        Self { ahead: virtual_ahead.unwrap_or_else(|| unix_time() - to_seconds(core.now())) }
-    }
-
-    pub(crate) fn at(self, moment: Instant) -> f64 {
-        to_seconds(moment) + self.ahead
-    }
-}
-
-fn unix_time() -> f64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
-}
-
-fn to_seconds(moment: Instant) -> f64 {
-    moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
-}
-
 fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("requests", figures.requests)?;
@@ -474,13 +423,4 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
         all.set_item(name, times)?;
     }
     Ok(all)
-}
-
-/// A port that was handed over open and is gone cannot be opened again by us.
-pub(crate) fn gone(name: &str) -> PortError {
-    PortError::new(
-        PortErrorKind::Lost,
-        name,
-        "it was opened by the program and is gone; open it again and make a new Bus",
-    )
 }

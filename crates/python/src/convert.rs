@@ -1,5 +1,7 @@
 //! Python's numbers and bytes as the core's, or `NotAllowed` that names what was given and what is allowed.
 
+use std::time::Duration;
+
 use drivebus_drives::Place;
 use drivebus_rtu::{Destination, Table, UnitAddress};
 use pyo3::prelude::*;
@@ -38,6 +40,11 @@ pub(crate) fn unit_address(given: &Bound<'_, PyAny>) -> PyResult<UnitAddress> {
 pub(crate) fn destination(given: &Bound<'_, PyAny>) -> PyResult<Destination> {
     let raw = given.extract::<u8>().ok().and_then(|raw| Destination::from_wire(raw).ok());
     raw.ok_or_else(|| not_allowed(format!("unit {} is not a number from 1 to 247, or 0 for broadcast", shown(given))))
+}
+
+/// A number of seconds, as the simulation waits for.
+pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is not a time to wait")))
 }
 
 /// A sequence of words, or else one word.

@@ -1,14 +1,15 @@
 //! Rust's errors as the exceptions of `drivebus.errors`, which are written in Python so that they have docs and two
 //! bases where it helps.
 
-use drivebus_line::{CallError, ErrorKind, Failure, PortError};
+use drivebus_line::{CallError, ErrorKind, Failure, PortError, PortErrorKind};
 use drivebus_rtu::{AnswerError, Destination, ExceptionCode, FrameError, Instant};
+use drivebus_sim::SimError;
 use pyo3::exceptions::PySystemExit;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyDict, PyType};
 
-use crate::bus::UnixClock;
+use crate::clock::UnixClock;
 use crate::ending::Inside;
 
 /// The classes of `drivebus.errors`.
@@ -71,6 +72,14 @@ pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
 /// `PortError`: the port cannot be opened or was lost.
 pub(crate) fn port_error(error: &PortError) -> PyErr {
     Class::Port.raise(error.to_string(), |_| Ok(()))
+}
+
+/// What the system refused is the port's trouble, anything else was asked for wrongly.
+pub(crate) fn sim_error(what: &str, error: SimError) -> PyErr {
+    match error {
+        SimError::Io(error) => port_error(&PortError::new(PortErrorKind::Other, what, error.to_string())),
+        error => refuse(error),
+    }
 }
 
 /// `CrcError` or `BadAnswer` for bytes that are no frame.

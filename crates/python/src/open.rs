@@ -5,12 +5,11 @@ use std::path::PathBuf;
 use drivebus_line::rs485::{MAX_DELAY_MS, Rs485};
 use drivebus_line::tty::TtyOptions;
 use drivebus_line::url::{self, Known, PortOptions, PortUrl, SimulatorUrl};
-use drivebus_line::{AdapterEcho, Line, Opener, Places, PortKey, WordError};
+use drivebus_line::{AdapterEcho, Line, Opener, Places, PortError, PortErrorKind, PortKey, WordError};
 use drivebus_rtu::SerialFormat;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
-use crate::bus::gone;
 use crate::convert::shown;
 use crate::errors::{not_allowed, port_error, refuse};
 use crate::pyserial::PySerialLine;
@@ -174,4 +173,13 @@ pub(crate) fn run_time_folder() -> PyResult<PathBuf> {
     return Ok(drivebus_line::run_time_folder()?);
     #[cfg(not(unix))]
     Err(pyo3::exceptions::PyOSError::new_err("this system has no Unix sockets"))
+}
+
+/// A port that was handed over open and is gone cannot be opened again by us.
+fn gone(name: &str) -> PortError {
+    PortError::new(
+        PortErrorKind::Lost,
+        name,
+        "it was opened by the program and is gone; open it again and make a new Bus",
+    )
 }

@@ -8,9 +8,9 @@ use drivebus_rtu::Instant;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::bus::with_signals;
 use crate::ending::Inside;
 use crate::errors::port_error;
+use crate::signals::with_signals;
 
 /// Longer than any line is heard.
 const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 86_400);

@@ -9,12 +9,14 @@ use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyInt, PyList, PyTuple};
 
 use crate::arguments::duration;
-use crate::bus::{Bus, UnixClock, with_signals};
+use crate::bus::Bus;
+use crate::clock::UnixClock;
 use crate::convert::{one_word, shown, unit_address};
 use crate::errors::{Class, call_error, not_allowed, refuse};
 use crate::mailbox::Mailbox;
 use crate::plan::Plan;
 use crate::requests::{Asked, apart, nothing};
+use crate::signals::with_signals;
 use crate::tables::number;
 
 /// What the words of a target mean.

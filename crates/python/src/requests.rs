@@ -14,7 +14,8 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::arguments::{
     duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
 };
-use crate::bus::{Bus, HOLDING, Heard, UnixClock};
+use crate::bus::{Bus, HOLDING, Heard};
+use crate::clock::UnixClock;
 use crate::convert::{one_word, unit_address, words_of};
 use crate::errors::{call_error, refuse};
 use crate::format::SerialFormat;

@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 use drivebus_drives::{Place, Table};
 use drivebus_line::{Line, PortError, PortErrorKind};
-use drivebus_sim::{self as sim, Asked, Model, Options, Refusals, SimError, WriteRecord};
+use drivebus_sim::{self as sim, Asked, Model, Options, Refusals, WriteRecord};
 use pyo3::prelude::*;
 
-use crate::convert::{one_word, shown, unit_address};
-use crate::errors::{not_allowed, port_error, refuse};
+use crate::clock::seconds;
+use crate::convert::{duration, one_word, shown, unit_address};
+use crate::errors::{not_allowed, refuse, sim_error};
 use crate::format::SerialFormat;
 use crate::profile::Profile;
 use crate::sim_line::SimulatedLine;
@@ -342,14 +342,6 @@ impl SimulatedDrive {
     }
 }
 
-/// What the system refused is the port's trouble, anything else was asked for wrongly.
-pub(crate) fn sim_error(what: &str, error: SimError) -> PyErr {
-    match error {
-        SimError::Io(error) => port_error(&PortError::new(PortErrorKind::Other, what, error.to_string())),
-        error => refuse(error),
-    }
-}
-
 /// What a unit was said to behave like.
 enum BehavesLike {
     Name(String),
@@ -381,16 +373,6 @@ fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, BehavesLike)>> {
             Ok((unit_address(&unit)?.get(), behaves_like))
         })
         .collect()
-}
-
-/// A moment of the simulation in seconds.
-#[expect(clippy::cast_precision_loss, reason = "a float is what Python counts seconds in; 104 days are exact")]
-pub(crate) fn seconds(moment: drivebus_rtu::Instant) -> f64 {
-    moment.as_nanos() as f64 / 1e9
-}
-
-pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| not_allowed(format!("{seconds} s is not a time to wait")))
 }
 
 /// The place of a write, as profiles number it.

@@ -4,10 +4,10 @@ use drivebus_sim::{self as sim, FaultKind, Side, SimError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::convert::{bytes_of, shown};
-use crate::errors::{not_allowed, refuse};
+use crate::clock::seconds;
+use crate::convert::{bytes_of, duration, shown};
+use crate::errors::{not_allowed, refuse, sim_error};
 use crate::format::SerialFormat;
-use crate::sim::{duration, seconds, sim_error};
 
 /// The wire: what it saw, and what it is told to spoil.
 #[pyclass(frozen, module = "drivebus._native")]

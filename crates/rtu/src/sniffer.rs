@@ -7,6 +7,7 @@
 
 mod asked;
 mod lengths;
+mod role;
 mod roles;
 mod stories;
 
@@ -18,7 +19,7 @@ use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::{Instant, SerialFormat, UnitAddress};
 
 use lengths::Length;
-pub use roles::Role;
+pub use role::Role;
 use stories::{Behind, Next};
 
 /// Four of the longest frames: what an adapter hands over at once, and what is looked at before and behind it.

@@ -6,7 +6,7 @@ use drivebus_rtu::{ExceptionCode, UnitAddress};
 
 use crate::drive::{Drive, Refusals, WriteRecord};
 use crate::error::SimError;
-use crate::simulator::Shared;
+use crate::shared::Shared;
 
 /// The heaviest load, as a share of rated torque.
 const MAX_LOAD: f64 = 4.0;

@@ -80,6 +80,8 @@ mod clock;
 mod drive;
 #[cfg(target_os = "linux")]
 mod ear;
+#[cfg(target_os = "linux")]
+mod ears;
 mod error;
 mod faults;
 mod handles;
@@ -100,6 +102,9 @@ mod port;
 mod pty;
 mod ramp;
 mod random;
+#[cfg(target_os = "linux")]
+mod raw_pty;
+mod shared;
 mod simulator;
 mod spoil;
 #[cfg(unix)]

@@ -6,8 +6,9 @@ use std::time::Duration;
 use drivebus_line::{Line, LineClock, PortError, PortErrorKind};
 use drivebus_rtu::Instant;
 
-use crate::simulator::Shared;
-use crate::world::{Listener, World};
+use crate::shared::Shared;
+use crate::wire::Listener;
+use crate::world::World;
 
 /// A master's connection to a simulated line. Waiting on it makes virtual time jump.
 #[derive(Debug)]

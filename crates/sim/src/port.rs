@@ -10,9 +10,9 @@ use drivebus_rtu::{Instant, SerialFormat};
 use rustix::io::Errno;
 
 use crate::pacer::{Due, Next};
-use crate::simulator::Shared;
+use crate::shared::Shared;
 use crate::watch::{Key, Watch};
-use crate::world::Listener;
+use crate::wire::{Listener, at_speed};
 
 /// A master behind a descriptor.
 #[derive(Debug)]
@@ -109,11 +109,6 @@ impl Port {
             Err(_) => Err(Disconnected),
         }
     }
-}
-
-/// What a port of that speed is set to: for the rest, what the units are.
-pub(crate) fn at_speed(speed: u32, units: &SerialFormat) -> Option<SerialFormat> {
-    SerialFormat::new(speed, units.data_bits(), units.parity(), units.stop_bits(), units.silence()).ok()
 }
 
 impl Drop for Port {

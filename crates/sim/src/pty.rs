@@ -1,21 +1,16 @@
 //! The simulated line behind a pseudo-terminal: what opens it takes it for a serial port. Linux only.
 
-use std::ffi::OsStr;
 use std::io;
 use std::os::fd::OwnedFd;
-use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use rustix::fs::{Mode, OFlags};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use crate::link::Link;
 use crate::outlet::Outlet;
 use crate::pacer::{Next, Served, Serving};
 use crate::port::Port;
-use crate::simulator::Shared;
+use crate::raw_pty::{open_raw, speed};
+use crate::shared::Shared;
 use crate::watch::{Key, Watch};
 
 /// A pseudo-terminal that is served until this is dropped.
@@ -93,29 +88,6 @@ impl Pty {
             Serving::start(move |watch, key| Ok(Box::new(Ours(Port::new(shared, ours, Some(speed), watch, key)?))))?;
         Ok(Self { path, serving: Some(serving), _held: held })
     }
-}
-
-/// A new pseudo-terminal at `baud_rate`: our side, which does not block, the programs' side, and its name.
-pub(crate) fn open_raw(baud_rate: u32) -> io::Result<(OwnedFd, OwnedFd, PathBuf)> {
-    let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
-    grantpt(&ours)?;
-    unlockpt(&ours)?;
-    let path = PathBuf::from(OsStr::from_bytes(ptsname(&ours, Vec::new())?.as_bytes()));
-
-    let held = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
-    // Without this the terminal would echo requests back as answers and translate line ends.
-    let mut raw = tcgetattr(&held)?;
-    raw.make_raw();
-    // A program that never sets a speed is taken to fit.
-    raw.set_speed(baud_rate)?;
-    tcsetattr(&held, OptionalActions::Now, &raw)?;
-    rustix::fs::fcntl_setfl(&ours, OFlags::NONBLOCK)?;
-    Ok((ours, held, path))
-}
-
-/// The speed that the programs' side is set to. The system tells it at our side too.
-pub(crate) fn speed(ours: &OwnedFd) -> Option<u32> {
-    tcgetattr(ours).ok().map(|settings| settings.output_speed())
 }
 
 /// Our side of a pseudo-terminal. It fails only as a whole; its users then see it closed.

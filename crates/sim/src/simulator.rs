@@ -1,8 +1,7 @@
 //! The simulator as its user holds it: made from units and options, shared by its handles.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use drivebus_line::{PortError, PortErrorKind};
@@ -11,12 +10,13 @@ use drivebus_rtu::{Instant, SerialFormat, UnitAddress};
 use crate::clock::Clock;
 use crate::drive::{Drive, Drives, Map};
 #[cfg(target_os = "linux")]
-use crate::ear::Ears;
+use crate::ears::Ears;
 use crate::error::SimError;
 use crate::handles::SimulatedDrive;
 use crate::line::SimLine;
 use crate::model::Model;
 use crate::outlet::Outlets;
+use crate::shared::Shared;
 use crate::wire_handle::SimulatedLine;
 use crate::world::World;
 
@@ -76,62 +76,6 @@ impl Options {
     #[must_use]
     pub fn fifo(self, characters: usize) -> Self {
         Self { fifo: Fifo(characters.max(1)), ..self }
-    }
-}
-
-/// What every handle shares.
-#[derive(Debug)]
-pub(crate) struct Shared {
-    pub(crate) clock: Clock,
-    /// `sim:1=gd350,2=gd350`.
-    pub(crate) name: String,
-    units: Vec<u8>,
-    world: Mutex<World>,
-    /// How far the world has come, in nanoseconds.
-    shown: Arc<AtomicU64>,
-    /// After how many characters a served port hands them over.
-    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
-    pub(crate) fifo: usize,
-    /// What the units were set to when the simulation began, and ports still are.
-    #[cfg_attr(not(unix), expect(dead_code, reason = "only Unix has ports to serve"))]
-    pub(crate) began_as: SerialFormat,
-    pub(crate) outlets: Outlets,
-    /// What the wire is overheard by.
-    #[cfg(target_os = "linux")]
-    pub(crate) ears: Ears,
-}
-
-impl Shared {
-    /// The world as some thread left it; no thread leaves it half done.
-    pub(crate) fn lock(&self) -> MutexGuard<'_, World> {
-        self.world.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The present. In virtual time it is what the world has come to, and nobody who asks waits for the world.
-    pub(crate) fn now(&self) -> Instant {
-        self.clock.now(Instant::from_nanos(self.shown.load(Ordering::Acquire)))
-    }
-
-    /// The world, come to the present.
-    pub(crate) fn present(&self) -> MutexGuard<'_, World> {
-        let mut world = self.lock();
-        let now = self.clock.now(world.now());
-        #[cfg(target_os = "linux")]
-        if world.wire.ears > 0 {
-            self.ears.advance(&mut world, now, self.fifo);
-            return world;
-        }
-        world.advance(now);
-        world
-    }
-
-    /// Lets time pass until `until` without a line.
-    pub(crate) fn pass(&self, until: Instant) {
-        self.clock.wait(until, true);
-        let mut world = self.present();
-        if !self.clock.is_real() {
-            world.advance(until);
-        }
     }
 }
 

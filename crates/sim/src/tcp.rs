@@ -9,7 +9,7 @@ use std::time::{Duration, Instant as SystemInstant};
 use crate::outlet::Outlet;
 use crate::pacer::{Due, Next, Served, Serving};
 use crate::port::Port;
-use crate::simulator::Shared;
+use crate::shared::Shared;
 use crate::watch::{Key, Watch};
 
 /// How long to wait when a connection cannot be taken.

@@ -13,10 +13,25 @@ use crate::heard::{Heard, Span};
 use crate::random::Random;
 use crate::spoil::Spoil;
 use crate::trace::{Side, Trace};
-use crate::world::Listener;
 
 /// Answers that may overlap one request; older ones are over.
 const SPANS_KEPT: usize = 16;
+
+/// Names one of the masters on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Listener(u64);
+
+impl Listener {
+    /// The one of this number.
+    pub(crate) const fn new(number: u64) -> Self {
+        Self(number)
+    }
+
+    /// Chance of its own, from the seed of the world.
+    pub(crate) fn chance(self, seed: u64) -> u64 {
+        Random::of(seed, self.0)
+    }
+}
 
 /// What happened on the wire.
 #[derive(Debug, PartialEq, Eq)]
@@ -446,6 +461,12 @@ impl Wire {
         let byte = if spoilt { garble(byte, &mut self.random, collisions) } else { byte };
         Some(Step::Passed { from, byte, back })
     }
+}
+
+/// What a port of that speed is set to: for the rest, what the units are.
+#[cfg(unix)]
+pub(crate) fn at_speed(speed: u32, units: &SerialFormat) -> Option<SerialFormat> {
+    SerialFormat::new(speed, units.data_bits(), units.parity(), units.stop_bits(), units.silence()).ok()
 }
 
 /// Both sides drove the wire: what arrives is neither's.

@@ -7,7 +7,7 @@ use drivebus_rtu::SerialFormat;
 
 use crate::error::SimError;
 use crate::faults::FaultKind;
-use crate::simulator::Shared;
+use crate::shared::Shared;
 use crate::trace::Transmission;
 
 /// The wire: what it saw, and what it is told to spoil.

@@ -10,22 +10,10 @@ use drivebus_rtu::{Destination, Frame, Instant, SerialFormat, UnitAddress};
 
 use crate::drive::{Drive, Drives};
 use crate::faults::FaultKind;
-use crate::random::Random;
-use crate::wire::{Step, Wakeup, Wire};
+use crate::wire::{Listener, Step, Wakeup, Wire};
 
 /// Bytes kept for a master that does not read; older ones are lost, as in a serial port.
 const INBOX: usize = 65_536;
-
-/// Names one of the masters on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Listener(u64);
-
-impl Listener {
-    /// Chance of its own, from the seed of the world.
-    pub(crate) fn chance(self, seed: u64) -> u64 {
-        Random::of(seed, self.0)
-    }
-}
 
 /// The simulated world.
 #[derive(Debug)]
@@ -204,7 +192,7 @@ impl World {
 
     /// A master begins to listen.
     pub(crate) fn attach(&mut self) -> Listener {
-        let listener = Listener(self.next_listener);
+        let listener = Listener::new(self.next_listener);
         self.next_listener += 1;
         self.masters.push(Master { name: listener, inbox: VecDeque::new(), overhears: false, adapter: None });
         listener

@@ -21,7 +21,7 @@ use drivebus_rtu::{Answer, Destination, Instant, Meaning, Request, UnitAddress};
 use crate::ask::{Ask, Done};
 use crate::bus::call::course::Course;
 use crate::bus::errand::Errand;
-use crate::bus::shared::Shared;
+use crate::bus::port::Port;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::owner::dead_units::Verdict;
@@ -33,7 +33,7 @@ const HALTED: Duration = Duration::from_millis(10);
 
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
-    pub(crate) bus: &'b Shared,
+    pub(crate) bus: &'b Port,
     pub(crate) ask: Ask<'r>,
     pub(crate) unit: Option<UnitAddress>,
     pub(crate) priority: Priority,
@@ -64,7 +64,7 @@ impl<'b, 'r> Call<'b, 'r> {
         reason = "it has several callers, and the lone one on the hot path pays for no call"
     )]
     #[inline(always)]
-    pub(crate) fn new(bus: &'b Shared, ask: Ask<'r>, options: CallOptions) -> Self {
+    pub(crate) fn new(bus: &'b Port, ask: Ask<'r>, options: CallOptions) -> Self {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         Self {
             bus,

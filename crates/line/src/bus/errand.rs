@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use drivebus_rtu::{Adu, AnswerLength, Destination, Frame, Instant, Request};
+use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 
 use crate::ask::Done;
 use crate::error::{CallError, Failure};
@@ -111,5 +111,16 @@ impl fmt::Debug for Errand {
             .field("destination", &self.destination)
             .field("frame", &self.frame)
             .finish_non_exhaustive()
+    }
+}
+
+/// The answer as it came.
+pub(super) fn pdu_of(from: Destination, answer: &Answer<'_>) -> Vec<u8> {
+    match from {
+        Destination::Unit(unit) => {
+            let frame = Adu::answer(unit, answer);
+            Frame::parse(frame.as_bytes()).map(|frame| frame.pdu().to_vec()).unwrap_or_default()
+        }
+        Destination::Broadcast => Vec::new(),
     }
 }

@@ -20,16 +20,18 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::ask::Ask;
 use crate::bus::call::{Call, Wanted};
-use crate::bus::shared::Shared;
-use crate::bus::workers::pdu_of;
+use crate::bus::errand::pdu_of;
+use crate::bus::port::Port;
 use crate::error::Failure;
-use crate::health::stats::Program as Counted;
+use crate::health::stats::{Program as Counted, Stats};
 use crate::line::{PortError, PortErrorKind};
 use crate::options::UnitOptions;
 use crate::share::channel::Channel;
 use crate::share::failure::Said;
 use crate::share::guest::readable;
-use crate::share::message::{Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish};
+use crate::share::message::{
+    Characters, Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish,
+};
 use crate::share::place::{Door, Entrance, Place};
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
@@ -92,8 +94,8 @@ struct Entry {
 }
 
 impl Host {
-    /// Lets programs in through `door` to the line that `shared` is.
-    pub(super) fn open(door: Door, guests: Arc<Guests>, shared: Weak<Shared>) -> io::Result<Self> {
+    /// Lets programs in through `door` to the line that `port` is.
+    pub(super) fn open(door: Door, guests: Arc<Guests>, port: Weak<Port>) -> io::Result<Self> {
         let (waker, woken) = UnixStream::pair()?;
         let (waker, woken) = (Kept::new(waker), Kept::new(woken));
         let entrances = Arc::clone(&door.entrances);
@@ -110,11 +112,11 @@ impl Host {
                 for Entrance { listener, is_private } in &*entrances {
                     match listener.accept() {
                         Ok((stream, _)) => {
-                            let (guests, shared, is_private) = (Arc::clone(&guests), Weak::clone(&shared), *is_private);
+                            let (guests, port, is_private) = (Arc::clone(&guests), Weak::clone(&port), *is_private);
                             // Where the system gives no thread, the guest finds its connection ended.
                             let _ = thread::Builder::new()
                                 .name("drivebus-guest".to_owned())
-                                .spawn(move || serve(stream, is_private, &guests, &shared));
+                                .spawn(move || serve(stream, is_private, &guests, &port));
                         }
                         Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                         Err(_) => thread::sleep(BREATHER),
@@ -242,12 +244,12 @@ impl Drop for Visit {
 }
 
 /// Serves one connection to its end.
-fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, shared: &Weak<Shared>) {
+fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, port: &Weak<Port>) {
     let peer = process::peer(&stream);
     let is_this_user = peer.is_this_user.unwrap_or(is_private);
     let Ok(mut channel) = Channel::new(stream, MOST, Arc::new(Life::Unknown)) else { return };
     let let_in = if is_this_user {
-        let_in(&mut channel, peer.process, guests, shared)
+        let_in(&mut channel, peer.process, guests, port)
     } else {
         Err("this port is open in a program of another user".to_owned())
     };
@@ -255,10 +257,10 @@ fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, shared: &We
         Ok(Some(visit)) => {
             let channel = RefCell::new(channel);
             // It ends when either side does, or where what comes is no wish.
-            while next(&channel, &visit, shared).is_some() {}
+            while next(&channel, &visit, port).is_some() {}
             drop(visit);
-            if let Some(shared) = shared.upgrade() {
-                shared.wills.look_soon();
+            if let Some(port) = port.upgrade() {
+                port.wills.look_soon();
             }
         }
         Ok(None) => {}
@@ -274,7 +276,7 @@ fn let_in(
     channel: &mut Channel,
     process: u32,
     guests: &Arc<Guests>,
-    shared: &Weak<Shared>,
+    port: &Weak<Port>,
 ) -> Result<Option<Visit>, String> {
     let no_greeting = || "this is a port of drivebus, and what came is not its greeting".to_owned();
     let Some(greeting) = channel.hear_bytes(monotonic() + HURRY).map_err(|_| no_greeting())? else { return Ok(None) };
@@ -287,8 +289,8 @@ fn let_in(
         ));
     }
     let hello: Hello = postcard::from_bytes(hello).map_err(|_| no_greeting())?;
-    let Some(shared) = shared.upgrade() else { return Ok(None) };
-    let ours = shared.characters();
+    let Some(port) = port.upgrade() else { return Ok(None) };
+    let ours = Characters::of(&port.options.format);
     if hello.characters != ours {
         return Err(format!(
             "{own} has the port open at {ours}, and {} is asked for; ask for the same, or end that program",
@@ -298,21 +300,21 @@ fn let_in(
     let visit = guests.enter(&hello, process, channel.end())?;
     channel.depends_on(Arc::clone(&visit.entry.life));
     let welcome =
-        Welcome { program: process::own_name(), process: std::process::id(), reconnects: shared.reconnects_here() };
+        Welcome { program: process::own_name(), process: std::process::id(), reconnects: port.figures.reconnects() };
     let welcome = postcard::to_extend(&welcome, vec![LET_IN]).map_err(|error| error.to_string())?;
     Ok(channel.say_bytes(&welcome).is_ok().then_some(visit))
 }
 
 /// Hears one wish and fulfils it; `None` ends the connection.
-fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Option<()> {
+fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<()> {
     let wish = hear(&mut channel.borrow_mut())?;
     // A bus that is gone ends its connections; one that is about to be is as good as gone.
-    let shared = shared.upgrade()?;
+    let port = port.upgrade()?;
     let told = match wish {
         Wish::Call(order) if visit.is_for_a_stop && !order.is_stop() => return None,
         Wish::Call(order) => {
             visit.entry.calls.fetch_add(1, Ordering::Relaxed);
-            let told = call(channel, &shared, &order, visit.entry.program)?;
+            let told = call(channel, &port, &order, visit.entry.program)?;
             if matches!(told, Told::Answer { .. }) {
                 visit.entry.answered.fetch_add(1, Ordering::Relaxed);
             }
@@ -326,8 +328,7 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
             let mut hear = |moment: Instant, bytes: &[u8]| {
                 passing.say(&Told::Heard { at: moment.as_nanos(), bytes: bytes.to_vec() });
             };
-            let ended =
-                shared.listen_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            let ended = port.listen(Duration::from_nanos(time), &mut || is_unwanted(channel, &port), &mut hear);
             passing.end();
             Told::Over(ended.err().as_ref().map(Said::from))
         }
@@ -337,25 +338,27 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, shared: &Weak<Shared>) -> Opt
                 let Overheard { at, direction, bytes } = piece;
                 passing.say(&Told::Overheard { at: at.as_nanos(), sent: direction == Direction::Sent, bytes });
             };
-            let ended =
-                shared.overhear_here(Duration::from_nanos(time), &mut || is_unwanted(channel, &shared), &mut hear);
+            let ended = port.overhear(Duration::from_nanos(time), &mut || is_unwanted(channel, &port), &mut hear);
             passing.end();
             Told::Over(ended.err().as_ref().map(Said::from))
         }
-        Wish::Stats => Told::Stats(Box::new(Figures::from(shared.stats()))),
+        Wish::Stats => {
+            let stats = Stats { programs: visit.guests.counted(), ..port.figures.stats() };
+            Told::Stats(Box::new(Figures::from(stats)))
+        }
         Wish::Link(unit) => {
-            let link = shared.link_here(UnitAddress::new(unit).ok()?);
+            let link = port.figures.link(UnitAddress::new(unit).ok()?);
             Told::Link { good: link.good, asked: link.asked }
         }
-        Wish::FreshWord => Told::Word(shared.words.next()),
-        Wish::Reconnects => Told::Reconnects(shared.reconnects_here()),
+        Wish::FreshWord => Told::Word(port.words.next()),
+        Wish::Reconnects => Told::Reconnects(port.figures.reconnects()),
         Wish::Wills => {
-            shared.wills.look_soon();
+            port.wills.look_soon();
             Told::Wills
         }
     };
-    if shared.is_shut() {
-        shared.close();
+    if port.is_shut() {
+        port.close();
     }
     channel.borrow_mut().say(&told).ok()
 }
@@ -374,8 +377,8 @@ fn hear(channel: &mut Channel) -> Option<Wish> {
 }
 
 /// Whether the guest takes back what is under way, or is gone, or says what it may not say now.
-fn is_unwanted(channel: &RefCell<Channel>, shared: &Shared) -> bool {
-    shared.is_shut() || !matches!(channel.borrow_mut().hear::<Wish>(Instant::ZERO), Ok(None))
+fn is_unwanted(channel: &RefCell<Channel>, port: &Port) -> bool {
+    port.is_shut() || !matches!(channel.borrow_mut().hear::<Wish>(Instant::ZERO), Ok(None))
 }
 
 /// What is said to a guest that may read it or not: nobody waits for one that does not, least of all who uses the line.
@@ -436,37 +439,37 @@ impl Wanted for Here<'_> {
 }
 
 /// Carries out `order`; `None` where it is none.
-fn call(channel: &RefCell<Channel>, shared: &Shared, order: &Order, program: Program) -> Option<Told> {
+fn call(channel: &RefCell<Channel>, port: &Port, order: &Order, program: Program) -> Option<Told> {
     let (destination, request, options) = (order.destination()?, order.request()?, order.options()?);
     let meanings = order.meanings();
-    let ask = shared.ask_as(UnitOptions::default(), destination, &request, &options);
+    let ask = port.ask_as(UnitOptions::default(), destination, &request, &options);
     let ask = Ask { meanings: meanings.as_ref(), ..order.times(ask) };
     let here = Here(channel);
     let mut pdu = Vec::new();
     let mut words = Words { channel, said: monotonic() };
-    let mut watch = shared.queue.watch();
+    let mut watch = port.queue.watch();
     let mut holds_on = false;
     let patience = if order.is_stop() { HOLDS_ON_TO_A_STOP } else { HOLDS_ON };
     let mut give_up = || {
         words.say();
         holds_on = watch.sees_nothing_move_for(patience);
-        holds_on || is_unwanted(channel, shared)
+        holds_on || is_unwanted(channel, port)
     };
-    let result = Call::new(shared, ask, options)
+    let result = Call::new(port, ask, options)
         .of_program(program)
         .while_wanted(&here)
         .run(&mut give_up, &mut |answer| pdu = pdu_of(destination, &answer));
-    let reconnects = shared.reconnects_here();
+    let reconnects = port.figures.reconnects();
     Some(match result {
         Ok(done) => Told::Answer { pdu, sent: done.sent.as_nanos(), ended: done.ended.as_nanos(), reconnects },
         Err(mut error) => {
             if error.failure == Failure::Interrupted && holds_on {
                 let own = format!("{} (process {})", process::own_name(), std::process::id());
                 let why = format!("a thread of {own} holds the port and does not go on: it hangs; end that program");
-                error.failure = Failure::Port(PortError::new(PortErrorKind::Busy, &shared.name, why));
+                error.failure = Failure::Port(PortError::new(PortErrorKind::Busy, &port.name, why));
             }
             // What ends here because this program does is not what the guest gave up.
-            if error.failure == Failure::Interrupted && shared.is_shut() {
+            if error.failure == Failure::Interrupted && port.is_shut() {
                 error.failure = Failure::Closed;
             }
             Told::failed(&error, reconnects)

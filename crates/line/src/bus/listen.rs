@@ -5,7 +5,7 @@ use std::time::Duration;
 use drivebus_rtu::Instant;
 
 use crate::bus::Bus;
-use crate::bus::shared::Shared;
+use crate::bus::port::Port;
 use crate::error::Failure;
 use crate::owner::Owner;
 use crate::system::clock::LOOK_UP;
@@ -70,8 +70,8 @@ impl Bus {
     }
 }
 
-impl Shared {
-    pub(super) fn listen_here(
+impl Port {
+    pub(super) fn listen(
         &self,
         time: Duration,
         give_up: &mut dyn FnMut() -> bool,
@@ -101,7 +101,7 @@ impl Shared {
         }
     }
 
-    pub(super) fn overhear_here(
+    pub(super) fn overhear(
         &self,
         time: Duration,
         give_up: &mut dyn FnMut() -> bool,

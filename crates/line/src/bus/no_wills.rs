@@ -4,8 +4,6 @@ use std::sync::Arc;
 
 use drivebus_rtu::UnitAddress;
 
-use crate::bus::Bus;
-use crate::bus::shared::Shared;
 use crate::error::Failure;
 use crate::line::Opener;
 use crate::options::{BusOptions, LastWill};
@@ -24,7 +22,13 @@ impl Wills {
         open
     }
 
-    pub(super) fn serves(self: &Arc<Self>, _bus: &Arc<Shared>) {}
+    pub(super) fn serves<B>(self: &Arc<Self>, _bus: &Arc<B>) {}
+
+    pub(super) fn leave(self: &Arc<Self>, _will: LastWill) -> Option<u64> {
+        None
+    }
+
+    pub(super) fn withdraw(&self, _number: u64) {}
 
     pub(super) fn let_go(&self) {}
 
@@ -39,14 +43,4 @@ impl Wills {
     pub(super) fn notes(&self) -> Vec<String> {
         Vec::new()
     }
-}
-
-impl Bus {
-    /// Leaves a last will; here nobody would find it.
-    pub fn leave_will(&self, _will: LastWill) -> Option<u64> {
-        None
-    }
-
-    /// Takes it back.
-    pub fn withdraw_will(&self, _number: u64) {}
 }

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use crate::bus::host::{Guests, Host};
 use crate::bus::openings::Openings;
-use crate::bus::shared::Shared;
+use crate::bus::port::{Ends, Port};
 use crate::health::stats::{Program, Stats};
 use crate::line::{Line, Opener, PortError, PortErrorKind};
 use crate::options::{BusOptions, Share};
@@ -20,9 +20,11 @@ use crate::ports::key::PortKey;
 use crate::share::guest::{Guest, Knocked, Vigil, Wait};
 use crate::share::message::{Characters, Hello};
 use crate::share::place::Place;
+use crate::share::will::is_any;
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::own_name;
+use crate::turns::order::Priority;
 
 /// How long a port may stay taken whose owner is gone: the system closes what a program that was killed had open, one
 /// after the other.
@@ -41,8 +43,8 @@ pub(super) struct Sharing {
     key: PortKey,
     share: Share,
     hello: Hello,
-    /// The bus, once it is made.
-    bus: OnceLock<Weak<Shared>>,
+    /// The port, once it is made.
+    port: OnceLock<Weak<Port>>,
     stats: Arc<Mutex<Stats>>,
     openings: Arc<Openings>,
     is_guest: AtomicBool,
@@ -93,7 +95,7 @@ impl Sharing {
             key,
             share: options.share,
             hello: Hello { program: own_name(), characters: Characters::of(&options.format), is_for_a_stop: false },
-            bus: OnceLock::new(),
+            port: OnceLock::new(),
             stats: Arc::clone(stats),
             openings: Arc::clone(openings),
             is_guest: AtomicBool::new(false),
@@ -116,7 +118,7 @@ impl Sharing {
     ///
     /// Who serves it is asked for before the port is opened: what keeps others out is not known everywhere. A container has a
     /// node of its own for a device, whose lock is another one; and a serial server may serve one client only, the last.
-    fn open(&self, open: &mut Opener) -> Result<Box<dyn Line>, PortError> {
+    fn open(self: &Arc<Self>, open: &mut Opener) -> Result<Box<dyn Line>, PortError> {
         let places = match Place::all(self.key.names()) {
             Ok(places) if places.is_empty() => return open(), // it says what is wrong with the port
             Ok(places) => places,
@@ -180,7 +182,7 @@ impl Sharing {
         open()
     }
 
-    fn comes_in(&self, guest: Guest) {
+    fn comes_in(self: &Arc<Self>, guest: Guest) {
         self.serves_no_more();
         self.openings.open_elsewhere();
         self.takes_over.store(false, Ordering::Release);
@@ -191,17 +193,16 @@ impl Sharing {
 
     /// Waits for the end of the program that has the port, in a thread of its own: who asks for nothing would not notice it,
     /// and nobody might halt what that program ran.
-    fn begin_to_wait(&self) {
-        let (Some(bus), Some(guest)) = (self.bus.get(), self.guest()) else { return };
-        let bus = Weak::clone(bus);
+    fn begin_to_wait(self: &Arc<Self>) {
+        let (Some(port), Some(guest)) = (self.port.get(), self.guest()) else { return };
+        let (port, sharing) = (Weak::clone(port), Arc::downgrade(self));
+        let both = move || Some((port.upgrade()?, sharing.upgrade()?));
         // Without a thread the next request notices it.
         let _ = thread::Builder::new().name("drivebus-waits".to_owned()).spawn(move || {
             loop {
                 match guest.waits() {
                     Wait::Kept(vigil) => {
-                        let keeps =
-                            |bus: Arc<Shared>| bus.sharing.as_ref().is_some_and(|this| this.keeps(&vigil, &guest));
-                        if !bus.upgrade().is_some_and(keeps) {
+                        if !both().is_some_and(|(_, sharing)| sharing.keeps(&vigil, &guest)) {
                             return;
                         }
                         vigil.keep();
@@ -209,7 +210,7 @@ impl Sharing {
                     Wait::Ended => {}
                     Wait::Impossible => return,
                 }
-                if !bus.upgrade().is_some_and(|bus| bus.inherit(&guest)) {
+                if !both().is_some_and(|(port, sharing)| sharing.inherit(&port, &guest)) {
                     return;
                 }
                 thread::sleep(LOOKS);
@@ -254,17 +255,17 @@ impl Sharing {
         self.begin_to_serve(&mut serving);
     }
 
-    /// The bus is made: others may come in.
-    pub(super) fn serves(&self, bus: &Arc<Shared>) {
-        self.bus.get_or_init(|| Arc::downgrade(bus));
+    /// The port is made: others may come in.
+    pub(super) fn serves(self: &Arc<Self>, port: &Arc<Port>) {
+        self.port.get_or_init(|| Arc::downgrade(port));
         self.begin_to_serve(&mut self.serving());
         self.begin_to_wait();
     }
 
     fn begin_to_serve(&self, serving: &mut Serving) {
-        let Some(bus) = self.bus.get() else { return };
+        let Some(port) = self.port.get() else { return };
         let Some((_, door)) = serving.at.take() else { return };
-        match Host::open(door, Arc::clone(&self.guests), Weak::clone(bus)) {
+        match Host::open(door, Arc::clone(&self.guests), Weak::clone(port)) {
             Ok(host) => serving.host = Some(host),
             Err(error) => {
                 serving.refused = Some(format!("other programs cannot use this port through this one: {error}"));
@@ -297,19 +298,30 @@ impl Sharing {
     }
 
     /// Whether `gone` is the program through which the port was used last, and nobody opened it since.
-    pub(super) fn is_left_by(&self, gone: &Arc<Guest>) -> bool {
+    fn is_left_by(&self, gone: &Arc<Guest>) -> bool {
         match self.guest() {
             Some(guest) => Arc::ptr_eq(&guest, gone),
             None => self.takes_over.load(Ordering::Acquire),
         }
     }
 
-    /// This bus is closed, and its port by now.
-    pub(super) fn end(&self) {
-        self.serves_no_more();
-        self.is_guest.store(false, Ordering::Release);
-        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        end_vigil(self.vigil.lock().unwrap_or_else(PoisonError::into_inner).take());
+    /// Takes the port over from a program that is gone or has closed it, if somebody has left a will: whose program is gone is
+    /// halted, and whose program lives may have to be. Who asks for the port next would do that, and perhaps nobody does.
+    ///
+    /// Whether it is to be tried again later: nobody has left one yet, or the port cannot be opened.
+    fn inherit(&self, port: &Port, gone: &Arc<Guest>) -> bool {
+        if port.is_closed() || !self.is_left_by(gone) {
+            return false;
+        }
+        if !is_any(gone.place()) {
+            return true;
+        }
+        self.lost(gone);
+        let Ok(turn) = port.queue.turn((Priority::Stop, None), &mut || port.is_shut()) else { return false };
+        // Whoever was quicker has the port, and halts it: then this one is its guest.
+        let opened = port.lock().prepare(&mut || port.is_shut());
+        drop(turn);
+        opened.is_err() && !self.is_guest()
     }
 
     /// Nobody is let in any more until the port is opened again, and who is in is told so. The port is closed by now.
@@ -347,5 +359,14 @@ impl Sharing {
 
     fn serving(&self) -> MutexGuard<'_, Serving> {
         self.host.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Ends for Sharing {
+    fn end(&self) {
+        self.serves_no_more();
+        self.is_guest.store(false, Ordering::Release);
+        *self.guest.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        end_vigil(self.vigil.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 }

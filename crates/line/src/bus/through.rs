@@ -1,6 +1,5 @@
 //! What a bus does whose port may be another program's: it asks that one, or the line itself, whichever it is by now.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::{Adu, Answer, Destination, Instant, Request, UnitAddress};
@@ -16,8 +15,8 @@ use crate::line::{PortError, PortErrorKind};
 use crate::options::CallOptions;
 use crate::share::failure::Said;
 use crate::share::guest::{Guest, Lost};
-use crate::share::message::{Order, Told, Wish, nanos};
-use crate::share::will::is_any;
+use crate::share::message::{Order, Told, Wish};
+use crate::share::nanos;
 use crate::system::clock::monotonic;
 use crate::trace::{Direction, Overheard, Traced};
 use crate::turns::order::Priority;
@@ -49,9 +48,9 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        let ask = self.ask(destination, request, &options);
+        let ask = self.port.ask(destination, request, &options);
         let Some(sharing) = &self.sharing else { return self.call_here(ask, options, give_up, take) };
-        let mut retries = options.retries.unwrap_or(self.options.retries);
+        let mut retries = options.retries.unwrap_or(self.port.options.retries);
         for _ in 0..HANDS {
             let Some(guest) = sharing.guest() else {
                 match self.call_here(ask, options, give_up, take) {
@@ -71,7 +70,7 @@ impl Shared {
                     }
                     retries -= 1;
                 }
-                Err(Lost::GivenUp) => return Err(ask.failed(self.given_up(), None, monotonic(), &[])),
+                Err(Lost::GivenUp) => return Err(ask.failed(self.port.given_up(), None, monotonic(), &[])),
                 Err(Lost::Silent(why)) => return Err(self.lost_there(&ask, PortErrorKind::Busy, why, Some(began))),
                 Err(Lost::SentAway(why)) => return Err(self.lost_there(&ask, PortErrorKind::Busy, why, None)),
             }
@@ -87,11 +86,11 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        Call::new(self, ask, options).run(give_up, take)
+        Call::new(&self.port, ask, options).run(give_up, take)
     }
 
     fn lost_there(&self, ask: &Ask<'_>, kind: PortErrorKind, why: String, sent: Option<Instant>) -> Box<CallError> {
-        ask.failed(Failure::Port(PortError::new(kind, &self.name, why)), sent, monotonic(), &[])
+        ask.failed(Failure::Port(PortError::new(kind, &self.port.name, why)), sent, monotonic(), &[])
     }
 
     /// As [`call_through`](Self::call_through); who watches this bus is shown what was asked and what came of it.
@@ -103,7 +102,7 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Result<Done, Box<CallError>>, Lost> {
-        let Some(watch) = self.trace.watch() else { return self.call_through(guest, ask, options, give_up, take) };
+        let Some(watch) = self.port.trace.watch() else { return self.call_through(guest, ask, options, give_up, take) };
         let mut came = None;
         let mut keep = |answer: Answer<'_>| {
             if let Destination::Unit(unit) = ask.destination {
@@ -139,9 +138,9 @@ impl Shared {
     ) -> Result<Result<Done, Box<CallError>>, Lost> {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         let priority = options.priority.unwrap_or(kind);
-        let retries = options.retries.unwrap_or(self.options.retries);
+        let retries = options.retries.unwrap_or(self.port.options.retries);
         let meanings = match ask.destination {
-            Destination::Unit(unit) => self.meanings.set_of(unit),
+            Destination::Unit(unit) => self.port.meanings.set_of(unit),
             Destination::Broadcast => None,
         };
         let order =
@@ -183,7 +182,7 @@ impl Shared {
             Told::Failed { failure, raw, sent, ended, reconnects } => {
                 guest.saw(reconnects);
                 let failure = match Failure::from(failure) {
-                    Failure::Interrupted => self.given_up(),
+                    Failure::Interrupted => self.port.given_up(),
                     failure => failure,
                 };
                 let (sent, ended) = (sent.map(Instant::from_nanos), ended.map(Instant::from_nanos));
@@ -211,7 +210,7 @@ impl Shared {
             drop(turn);
         }
         let request = errand.request()?;
-        let mut give_up = || self.is_shut() || !errand.is_wanted();
+        let mut give_up = || self.port.is_shut() || !errand.is_wanted();
         Some(self.call_shared(errand.destination, &request, errand.options, &mut give_up, take))
     }
 
@@ -222,7 +221,7 @@ impl Shared {
         hear: &mut dyn FnMut(Instant, &[u8]),
     ) -> Result<(), Failure> {
         self.listen_where_the_line_is(time, Wish::Listen, give_up, &mut |give_up, heard| match heard {
-            Whose::Ours(left) => self.listen_here(left, give_up, hear),
+            Whose::Ours(left) => self.port.listen(left, give_up, hear),
             Whose::Theirs(Told::Heard { at, bytes }) => {
                 hear(Instant::from_nanos(at), &bytes);
                 Ok(())
@@ -238,7 +237,7 @@ impl Shared {
         hear: &mut dyn FnMut(Overheard),
     ) -> Result<(), Failure> {
         self.listen_where_the_line_is(time, Wish::Overhear, give_up, &mut |give_up, heard| match heard {
-            Whose::Ours(left) => self.overhear_here(left, give_up, hear),
+            Whose::Ours(left) => self.port.overhear(left, give_up, hear),
             Whose::Theirs(Told::Overheard { at, sent, bytes }) => {
                 let direction = if sent { Direction::Sent } else { Direction::Heard };
                 hear(Overheard { at: Instant::from_nanos(at), direction, bytes });
@@ -257,9 +256,9 @@ impl Shared {
         hear: &mut Hear<'_>,
     ) -> Result<(), Failure> {
         let Some(sharing) = &self.sharing else { return hear(give_up, Whose::Ours(time)) };
-        let end = self.now() + time;
+        let end = self.port.now() + time;
         for _ in 0..HANDS {
-            let left = end.saturating_duration_since(self.now());
+            let left = end.saturating_duration_since(self.port.now());
             let Some(guest) = sharing.guest() else {
                 match hear(give_up, Whose::Ours(left)) {
                     Err(Failure::Port(_)) if sharing.is_guest() => continue,
@@ -267,7 +266,7 @@ impl Shared {
                 }
             };
             let mut ended = None;
-            let mut is_over = || self.is_shut() || give_up();
+            let mut is_over = || self.port.is_shut() || give_up();
             let asked = guest.ask(&wish(nanos(left)), false, &mut is_over, &mut |told| match told {
                 Told::Over(why) => {
                     ended = why.map(Failure::from);
@@ -282,19 +281,19 @@ impl Shared {
             });
             match (asked, ended) {
                 (Ok(()), None) => return Ok(()),
-                (Ok(()), Some(Failure::Interrupted)) | (Err(Lost::GivenUp), _) => return Err(self.given_up()),
+                (Ok(()), Some(Failure::Interrupted)) | (Err(Lost::GivenUp), _) => return Err(self.port.given_up()),
                 (Ok(()), Some(Failure::Closed)) | (Err(Lost::Unsent | Lost::Unknown), _) => sharing.lost(&guest),
                 (Ok(()), Some(failure)) => return Err(failure),
                 (Err(Lost::Silent(why) | Lost::SentAway(why)), _) => {
-                    return Err(Failure::Port(PortError::new(PortErrorKind::Busy, &self.name, why)));
+                    return Err(Failure::Port(PortError::new(PortErrorKind::Busy, &self.port.name, why)));
                 }
             }
         }
-        Err(Failure::Port(PortError::new(PortErrorKind::Busy, &self.name, "it goes from one program to another")))
+        Err(Failure::Port(PortError::new(PortErrorKind::Busy, &self.port.name, "it goes from one program to another")))
     }
 
     /// What the program that has the port says at once, if it is another one's and says so.
-    fn told_at_once<T>(&self, wish: &Wish, read: impl Fn(&Guest, Told) -> Option<T>) -> Option<T> {
+    pub(super) fn told_at_once<T>(&self, wish: &Wish, read: impl Fn(&Guest, Told) -> Option<T>) -> Option<T> {
         let sharing = self.sharing.as_ref()?;
         let guest = sharing.guest()?;
         let end = monotonic() + AT_ONCE;
@@ -315,7 +314,7 @@ impl Shared {
             _ => None,
         };
         self.told_at_once(&Wish::Stats, figures).unwrap_or_else(|| {
-            let mut stats = self.stats_here();
+            let mut stats = self.port.figures.stats();
             stats.programs = self.sharing.as_ref().map(|sharing| sharing.programs()).unwrap_or_default();
             stats
         })
@@ -326,7 +325,7 @@ impl Shared {
             Told::Link { good, asked } => Some(Link { good, asked }),
             _ => None,
         };
-        self.told_at_once(&Wish::Link(unit.get()), link).unwrap_or_else(|| self.link_here(unit))
+        self.told_at_once(&Wish::Link(unit.get()), link).unwrap_or_else(|| self.port.figures.link(unit))
     }
 
     pub(super) fn fresh_word(&self) -> u16 {
@@ -334,7 +333,7 @@ impl Shared {
             Told::Word(word) => Some(word),
             _ => None,
         };
-        self.told_at_once(&Wish::FreshWord, word).unwrap_or_else(|| self.words.next())
+        self.told_at_once(&Wish::FreshWord, word).unwrap_or_else(|| self.port.words.next())
     }
 
     pub(super) fn reconnects(&self) -> u64 {
@@ -345,44 +344,7 @@ impl Shared {
             }
             _ => None,
         };
-        self.told_at_once(&Wish::Reconnects, count).unwrap_or_else(|| self.reconnects_here())
-    }
-
-    /// Whether the port is another program's.
-    pub(super) fn is_guest(&self) -> bool {
-        self.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
-    }
-
-    /// Takes the port over from a program that is gone or has closed it, if somebody has left a will: whose program is gone is
-    /// halted, and whose program lives may have to be. Who asks for the port next would do that, and perhaps nobody does.
-    ///
-    /// Whether it is to be tried again later: nobody has left one yet, or the port cannot be opened.
-    pub(super) fn inherit(&self, gone: &Arc<Guest>) -> bool {
-        let Some(sharing) = self.sharing.as_ref().filter(|_| !self.is_shut() && self.is_of_this_process()) else {
-            return false;
-        };
-        if !sharing.is_left_by(gone) {
-            return false;
-        }
-        if !is_any(gone.place()) {
-            return true;
-        }
-        sharing.lost(gone);
-        let Ok(turn) = self.queue.turn((Priority::Stop, None), &mut || self.is_shut()) else { return false };
-        // Whoever was quicker has the port, and halts it: then this one is its guest.
-        let opened = self.lock().prepare(&mut || self.is_shut());
-        drop(turn);
-        opened.is_err() && !sharing.is_guest()
-    }
-
-    /// Tells the program that has the port of a will that was left. False where that is not known to have reached it: then
-    /// it is found all the same when the connection ends, or the port is opened.
-    pub(super) fn tell_of_wills(&self) -> bool {
-        self.told_at_once(&Wish::Wills, |_, told| matches!(told, Told::Wills).then_some(())).is_some()
-    }
-
-    pub(super) fn characters(&self) -> crate::share::message::Characters {
-        crate::share::message::Characters::of(&self.options.format)
+        self.told_at_once(&Wish::Reconnects, count).unwrap_or_else(|| self.port.figures.reconnects())
     }
 }
 

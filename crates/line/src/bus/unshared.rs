@@ -1,7 +1,5 @@
-//! Where programs cannot share a port: without the feature `share`, and on systems without Unix sockets.
+//! What a bus does where programs cannot share a port: it asks the line itself.
 
-use std::convert::Infallible;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
@@ -9,53 +7,13 @@ use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 use crate::ask::Done;
 use crate::bus::call::Call;
 use crate::bus::errand::Errand;
-use crate::bus::openings::Openings;
 use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
-use crate::line::Opener;
-use crate::options::{BusOptions, CallOptions};
-use crate::ports::key::PortKey;
+use crate::options::CallOptions;
 use crate::trace::Overheard;
 use crate::turns::queue::Turn;
-
-/// There is none.
-#[derive(Debug)]
-pub(super) struct Sharing(Infallible);
-
-impl Sharing {
-    /// The port is opened by `opener`, and is this program's alone.
-    pub(super) fn around(
-        _key: Option<PortKey>,
-        _options: &BusOptions,
-        _stats: &Arc<Mutex<Stats>>,
-        _openings: &Arc<Openings>,
-        opener: Opener,
-    ) -> (Option<Arc<Self>>, Opener) {
-        (None, opener)
-    }
-
-    pub(super) fn is_guest(&self) -> bool {
-        match self.0 {}
-    }
-
-    pub(super) fn serves(&self, _bus: &Arc<Shared>) {
-        match self.0 {}
-    }
-
-    pub(super) fn end(&self) {
-        match self.0 {}
-    }
-
-    pub(super) fn serves_no_more(&self) {
-        match self.0 {}
-    }
-
-    pub(super) fn notes(&self) -> Vec<String> {
-        match self.0 {}
-    }
-}
 
 impl Shared {
     /// What becomes of a call on a port that is shared: there is none.
@@ -67,7 +25,7 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        Call::new(self, self.ask(destination, request, &options), options).run(give_up, take)
+        Call::new(&self.port, self.port.ask(destination, request, &options), options).run(give_up, take)
     }
 
     pub(super) fn carry_out(
@@ -85,7 +43,7 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         hear: &mut dyn FnMut(Instant, &[u8]),
     ) -> Result<(), Failure> {
-        self.listen_here(time, give_up, hear)
+        self.port.listen(time, give_up, hear)
     }
 
     pub(super) fn overhear(
@@ -94,22 +52,22 @@ impl Shared {
         give_up: &mut dyn FnMut() -> bool,
         hear: &mut dyn FnMut(Overheard),
     ) -> Result<(), Failure> {
-        self.overhear_here(time, give_up, hear)
+        self.port.overhear(time, give_up, hear)
     }
 
     pub(super) fn stats(&self) -> Stats {
-        self.stats_here()
+        self.port.figures.stats()
     }
 
     pub(super) fn link(&self, unit: UnitAddress) -> Link {
-        self.link_here(unit)
+        self.port.figures.link(unit)
     }
 
     pub(super) fn fresh_word(&self) -> u16 {
-        self.words.next()
+        self.port.words.next()
     }
 
     pub(super) fn reconnects(&self) -> u64 {
-        self.reconnects_here()
+        self.port.figures.reconnects()
     }
 }

@@ -10,29 +10,26 @@
 mod halting;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
+use drivebus_rtu::{Instant, UnitAddress};
 
-use crate::bus::Bus;
-use crate::bus::call::Call;
-use crate::bus::shared::Shared;
 use crate::bus::wills::halting::{AT_ONCE, Halting, Next};
-use crate::bus::workers::pdu_of;
 use crate::error::Failure;
 use crate::line::Opener;
-use crate::options::{BusOptions, CallOptions, LastWill};
+use crate::options::{BusOptions, LastWill};
 use crate::ports::key::PortKey;
 use crate::share::guest::readable;
-use crate::share::message::{Characters, nanos};
+use crate::share::message::Characters;
+use crate::share::nanos;
 use crate::share::place::Place;
 use crate::share::will::{Found, Orphan, Paper, Will, find};
 use crate::system::clock::monotonic;
 use crate::system::process::own_name;
-use crate::turns::order::Priority;
 
 /// How often the wills of living programs are looked at.
 const LOOKS: Duration = Duration::from_millis(50);
@@ -46,12 +43,33 @@ const SAYS: Duration = Duration::from_secs(1);
 const FRESH: Duration = Duration::from_secs(300);
 /// How long an answer to a halt is waited for at most: the next one is not to come late.
 const LONGEST_ANSWER: Duration = Duration::from_millis(500);
-/// How long the question takes at most, which makes sure that it still is the same unit.
-const LOOK: Duration = Duration::from_millis(100);
 /// How long the end of a bus waits for a halt that is being given.
 const LET_OUT: Duration = Duration::from_secs(1);
 /// Notes that are kept.
 const NOTES: usize = 16;
+
+/// The bus whose wills these are, and by which others are carried out.
+pub(super) trait CarriesOut: fmt::Debug + Send + Sync {
+    /// Whether it was closed.
+    fn is_shut(&self) -> bool;
+
+    /// Whether the port is another program's.
+    fn is_guest(&self) -> bool;
+
+    /// Where the program looks for wills that has the port, if it is another one.
+    fn place(&self) -> Option<Place>;
+
+    /// Tells that program of a will that was left. False where that is not known to have reached it: then it is found all
+    /// the same when the connection ends, or the port is opened.
+    fn tell_of_wills(&self) -> bool;
+
+    /// Whether the unit says that it is another one than the will means, which has this question for it and such answers of
+    /// others.
+    fn is_another(&self, unit: UnitAddress, look: &(Vec<u8>, Vec<Vec<u8>>)) -> bool;
+
+    /// Halts the unit in one of the ways of `will`.
+    fn halt(&self, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure>;
+}
 
 /// The wills that one bus leaves, and those that it carries out.
 #[derive(Debug)]
@@ -59,7 +77,7 @@ pub(super) struct Wills {
     key: Option<PortKey>,
     characters: Characters,
     timeout: Duration,
-    bus: OnceLock<Weak<Shared>>,
+    bus: OnceLock<Weak<dyn CarriesOut>>,
     /// Whether there is anybody who is being halted.
     halts: AtomicBool,
     state: Mutex<State>,
@@ -119,8 +137,9 @@ impl Wills {
     }
 
     /// The bus is made: what was found by now is carried out.
-    pub(super) fn serves(self: &Arc<Self>, bus: &Arc<Shared>) {
-        self.bus.get_or_init(|| Arc::downgrade(bus));
+    pub(super) fn serves(self: &Arc<Self>, bus: &Arc<impl CarriesOut + 'static>) {
+        let bus: Weak<dyn CarriesOut> = Arc::downgrade(bus) as _;
+        self.bus.get_or_init(|| bus);
         let mut state = self.lock();
         self.begin(&mut state);
         self.attend(&mut state);
@@ -211,7 +230,7 @@ impl Wills {
     }
 
     /// Says of the wills of this program that it lives, and looks after those of others where this one has the port.
-    fn look_after(self: &Arc<Self>, bus: &Weak<Shared>) {
+    fn look_after(self: &Arc<Self>, bus: &Weak<dyn CarriesOut>) {
         let mut said = monotonic();
         loop {
             let Some(shared) = bus.upgrade().filter(|shared| !shared.is_shut()) else { return };
@@ -250,12 +269,12 @@ impl Wills {
 
     /// Where whoever has the port looks: the program through which this bus uses it, or this one.
     fn place(&self) -> Option<Place> {
-        let guest = self.bus.get().and_then(Weak::upgrade).and_then(|shared| shared.sharing.as_ref()?.guest());
-        guest.map_or_else(|| self.lock().place.clone(), |guest| Some(guest.place().clone()))
+        let there = self.bus.get().and_then(Weak::upgrade).and_then(|bus| bus.place());
+        there.or_else(|| self.lock().place.clone())
     }
 
     /// Leaves `last` where the one who has the port finds it. `None` where nobody could.
-    fn leave(self: &Arc<Self>, last: LastWill) -> Option<u64> {
+    pub(super) fn leave(self: &Arc<Self>, last: LastWill) -> Option<u64> {
         let place = self.place()?;
         let now = monotonic();
         let will = Will {
@@ -288,7 +307,8 @@ impl Wills {
         Some(token)
     }
 
-    fn withdraw(&self, token: u64) {
+    /// The will that was left under this number is not carried out.
+    pub(super) fn withdraw(&self, token: u64) {
         let paper = self.lock().own.remove(&token);
         if let Some(paper) = paper {
             paper.remove();
@@ -342,7 +362,7 @@ impl Wills {
     }
 
     /// Halts `unit` for a program that is gone, until it took that.
-    fn carry_out(&self, bus: &Weak<Shared>, unit: UnitAddress) {
+    fn carry_out(&self, bus: &Weak<dyn CarriesOut>, unit: UnitAddress) {
         loop {
             let Some(shared) = bus.upgrade().filter(|shared| !shared.is_shut()) else { return };
             if shared.is_guest() {
@@ -360,12 +380,12 @@ impl Wills {
             let mut took = None;
             match next {
                 Next::Look => {
-                    let is_another = will.look.as_ref().is_some_and(|look| is_another(&shared, unit, look));
+                    let is_another = will.look.as_ref().is_some_and(|look| shared.is_another(unit, look));
                     self.of(unit, |halted| halted.course.looked(is_another));
                     took = is_another.then_some(false);
                 }
                 Next::Halt(way) => {
-                    let outcome = halt(&shared, unit, &will, way);
+                    let outcome = shared.halt(unit, &will, way);
                     let is_lost = matches!(outcome, Err(Failure::Port(_)));
                     self.of(unit, |halted| halted.course.halted(monotonic(), outcome.is_ok(), is_lost));
                     took = outcome.is_ok().then_some(true);
@@ -439,51 +459,4 @@ impl State {
             self.notes.drain(..more);
         }
     }
-}
-
-impl Bus {
-    /// Leaves a last will: what halts a unit, should this program be gone without a word. Whoever has the port then, or
-    /// opens it within five minutes, sends that before anything else to this unit, until the unit takes it. Several of a
-    /// program add up, and the newest counts.
-    ///
-    /// `None` where nobody would find it: the port is of no kind that programs share, or the system gives no place. What
-    /// closes the bus leaves it to be carried out.
-    pub fn leave_will(&self, will: LastWill) -> Option<u64> {
-        (self.shared.is_of_this_process() && !self.is_shut()).then(|| self.shared.wills.leave(will)).flatten()
-    }
-
-    /// Takes back the will that [`leave_will`](Self::leave_will) gave this number. In a forked child it stays the parent's.
-    pub fn withdraw_will(&self, number: u64) {
-        if self.shared.is_of_this_process() {
-            self.shared.wills.withdraw(number);
-        }
-    }
-}
-
-/// Whether the unit says that it is another one than the will means.
-fn is_another(shared: &Shared, unit: UnitAddress, (question, others): &(Vec<u8>, Vec<Vec<u8>>)) -> bool {
-    let Ok(request) = Request::parse(question) else { return false };
-    if request.is_write() {
-        return false;
-    }
-    let mut came = Vec::new();
-    // At once: a halt waits for it, and it needs no echo before that makes sure of what is only a word against a halt.
-    let options = CallOptions::new().urgent(&request).timeout(LOOK).retries(0).in_doubt(true);
-    let ask = shared.ask(unit.into(), &request, &options);
-    let result = Call::new(shared, ask, options)
-        .run(&mut || shared.is_shut(), &mut |answer| came = pdu_of(Destination::Unit(unit), &answer));
-    result.is_ok() && others.contains(&came)
-}
-
-/// Halts the unit in one of the ways of `will`.
-fn halt(shared: &Shared, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure> {
-    for pdu in will.ways.get(way).into_iter().flatten() {
-        let Ok(request) = Request::parse(pdu) else { continue };
-        let options = CallOptions::new().urgent(&request).timeout(Duration::from_nanos(will.timeout)).retries(0);
-        let options = CallOptions { priority: Some(Priority::Stop), ..options };
-        let ask = shared.ask(unit.into(), &request, &options);
-        let result = Call::new(shared, ask, options).run(&mut || shared.is_shut(), &mut |_| ());
-        result.map_err(|error| error.failure)?;
-    }
-    Ok(())
 }

@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::thread;
 
-use drivebus_rtu::{Adu, Answer, Destination, Frame};
+use drivebus_rtu::Destination;
 
 use crate::bus::Bus;
-use crate::bus::errand::{Errand, Reply};
+use crate::bus::errand::{Errand, Reply, pdu_of};
 use crate::bus::shared::Shared;
 use crate::error::Failure;
 use crate::turns::crew::Employer;
@@ -28,8 +28,8 @@ impl Running {
     pub fn abandon(&self) {
         self.wanted.store(false, Ordering::Release);
         if let Some(bus) = self.bus.upgrade()
-            && bus.shared.is_of_this_process()
-            && let Some(errand) = bus.shared.queue.take_back(self.ticket)
+            && bus.port().is_of_this_process()
+            && let Some(errand) = bus.port().queue.take_back(self.ticket)
         {
             errand.forget();
         }
@@ -41,7 +41,7 @@ impl Bus {
     ///
     /// It waits in the order of all who wait, and a thread of the bus's own carries it out as [`call`](Self::call) would.
     pub fn send(self: &Arc<Self>, errand: Errand) -> Option<Running> {
-        let failure = if !self.shared.is_of_this_process() {
+        let failure = if !self.port().is_of_this_process() {
             Failure::Forked
         } else if self.is_shut() {
             Failure::Closed
@@ -53,7 +53,7 @@ impl Bus {
                 request => return self.enqueue(request.is_some_and(|request| request.is_write()), errand),
             }
         };
-        errand.fail(failure, self.shared.now_if_known());
+        errand.fail(failure, self.port().now_if_known());
         None
     }
 
@@ -64,11 +64,11 @@ impl Bus {
             Destination::Broadcast => None,
         };
         let wanted = Arc::clone(&errand.wanted);
-        match self.shared.queue.leave_work((priority, unit).into(), errand, || Box::new(Worked(Arc::downgrade(self)))) {
+        match self.port().queue.leave_work((priority, unit).into(), errand, || Box::new(Worked(Arc::downgrade(self)))) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),
             Err((errand, why)) => {
-                let failure = if why == NoTurn::Full { self.shared.no_turn(why) } else { Failure::Closed };
-                errand.fail(failure, self.shared.now_if_known());
+                let failure = if why == NoTurn::Full { self.port().no_turn(why) } else { Failure::Closed };
+                errand.fail(failure, self.port().now_if_known());
                 None
             }
         }
@@ -81,21 +81,10 @@ fn carry_out(mut errand: Errand, bus: &Shared, turn: Turn<'_, Errand>) {
     let result = bus.carry_out(&errand, turn, &mut |answer| pdu = pdu_of(errand.destination, &answer));
     let Some(result) = result else { return };
     let result = result.map(|done| Reply { pdu, done });
-    if bus.is_shut() {
-        bus.close();
+    if bus.port.is_shut() {
+        bus.port.close();
     }
     errand.tell(result);
-}
-
-/// The answer as it came.
-pub(super) fn pdu_of(from: Destination, answer: &Answer<'_>) -> Vec<u8> {
-    match from {
-        Destination::Unit(unit) => {
-            let frame = Adu::answer(unit, answer);
-            Frame::parse(frame.as_bytes()).map(|frame| frame.pdu().to_vec()).unwrap_or_default()
-        }
-        Destination::Broadcast => Vec::new(),
-    }
 }
 
 /// The bus that a crew works for.
@@ -117,7 +106,7 @@ impl Employer for Worked {
 fn work(bus: &Weak<Bus>) {
     let Some(queue) = bus.upgrade().map(|bus| {
         bus.enter_thread();
-        Arc::clone(&bus.shared.queue)
+        Arc::clone(&bus.port().queue)
     }) else {
         return;
     };
@@ -167,9 +156,9 @@ mod tests {
     fn who_is_told_that_there_is_no_thread_may_use_the_queue() {
         let bus = Bus::open(nobody::opener(), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
         let bus = Arc::new(bus);
-        bus.shared.queue.lock().crew.works_for(|| Box::new(Gives(false)));
+        bus.port().queue.lock().crew.works_for(|| Box::new(Gives(false)));
         let (tell, told) = channel();
-        let queue = Arc::clone(&bus.shared.queue);
+        let queue = Arc::clone(&bus.port().queue);
         let unit = UnitAddress::new(1).unwrap();
         let errand = Errand::new(unit.into(), &Request::write(0x2000, 5), CallOptions::default(), move |outcome| {
             tell.send((outcome.unwrap_err().failure, queue.state.try_lock().is_ok())).unwrap();
@@ -183,7 +172,7 @@ mod tests {
         let (tell, told) = channel();
         let options = BusOptions { queue: 2, ..BusOptions::new(SerialFormat::DEFAULT) };
         let bus = Arc::new(Bus::open(nobody::opener(), options, &mut || false).unwrap());
-        bus.shared.queue.lock().crew.works_for(|| Box::new(Gives(true)));
+        bus.port().queue.lock().crew.works_for(|| Box::new(Gives(true)));
         let unit = UnitAddress::new(1).unwrap();
         for number in 0..5 {
             let tell = tell.clone();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Failure;
 use crate::error::kind::ErrorKind;
 use crate::line::{PortError, PortErrorKind};
-use crate::share::message::nanos;
+use crate::share::nanos;
 
 /// A [`Failure`] on its way. Times are nanoseconds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

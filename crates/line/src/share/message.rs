@@ -16,6 +16,7 @@ use crate::error::CallError;
 use crate::health::stats::{Counters, Program, Stats};
 use crate::options::CallOptions;
 use crate::share::failure::Said;
+use crate::share::nanos;
 use crate::turns::order::Priority;
 
 /// How every greeting begins, of every version.
@@ -305,8 +306,4 @@ impl Told {
             reconnects,
         }
     }
-}
-
-pub(crate) fn nanos(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! What a forked child does before anything else: it gives up what its parent has open (`inherited`).
+//! What a forked child does before anything else: it gives up what its parent has open (`listed`).
 //!
 //! One of the two files of this project with `unsafe`: no crate offers `pthread_atfork` in safe Rust, since what runs there is
 //! bound as a signal handler is. It takes no lock, allocates nothing, and calls `dup3` alone (elsewhere than on Linux `dup2` and
@@ -12,7 +12,7 @@ use std::os::fd::RawFd;
 use std::sync::Once;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::system::inherited;
+use crate::system::listed;
 
 static ASKED: Once = Once::new();
 /// How many forks were begun, and are over, in this process.
@@ -63,7 +63,7 @@ extern "C" fn is_over() {
 extern "C" fn in_child() {
     // Of its parent's, those of other threads may be under way for ever.
     OVER.store(BEGUN.load(Ordering::SeqCst), Ordering::SeqCst);
-    inherited::each(|nothing, number| {
+    listed::each(|nothing, number| {
         put(nothing, number);
     });
 }

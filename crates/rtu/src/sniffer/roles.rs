@@ -15,10 +15,10 @@
 use core::time::Duration;
 
 use crate::Instant;
-use crate::frame::FrameError;
 
 use super::asked::{Asked, Spoken, can_ask, may_be_answer};
 use super::lengths::Length;
+use super::role::Role;
 use super::stories::{Behind, Held, Told};
 
 /// How soon an answer comes, whatever is usual on this line.
@@ -31,23 +31,6 @@ const SLOWER: u32 = 3;
 const INERTIA: u32 = 8;
 /// Later than this no answer comes any more.
 const LATEST: Duration = Duration::from_secs(3);
-
-/// Who said a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// A master asks.
-    Request,
-    /// The unit answers the request that was handed out last.
-    Answer,
-    /// A unit answers a request before the last one, which had stayed without an answer.
-    Late,
-    /// The open request once more, or an answer to it or to one before: what was heard does not tell.
-    Doubtful,
-    /// An answer to nothing that was heard.
-    Stray,
-    /// Bytes that belong to no frame, and why.
-    Noise(FrameError),
-}
 
 /// What was said so far, as far as it tells what may be said next.
 #[derive(Debug, Clone, Copy)]

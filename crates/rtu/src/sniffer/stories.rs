@@ -8,7 +8,7 @@ use core::time::Duration;
 use crate::Instant;
 
 use super::asked::{Asked, can_ask, is_pair};
-use super::roles::Role;
+use super::role::Role;
 
 /// So long is waited at most for the frames that decide, unless the one before waited longer.
 const PATIENCE: Duration = Duration::from_secs(1);

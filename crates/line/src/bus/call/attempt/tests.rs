@@ -16,9 +16,9 @@ const DAMAGE: Failure = Failure::Corrupt(FrameError::Crc { computed: 1, received
 fn told(heard: Option<u32>, probed: Option<Failure>) -> Failure {
     let bus = Bus::open(nobody::opener(), BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
     let read = Request::read(7, 1).unwrap();
-    let ask = bus.shared.ask(UNIT.into(), &read, &CallOptions::default());
-    let call = Call::new(&bus.shared, ask, CallOptions::default());
-    let mut turn = bus.shared.queue.turn((Priority::Read, Some(UNIT)), &mut || false).unwrap();
+    let ask = bus.port().ask(UNIT.into(), &read, &CallOptions::default());
+    let call = Call::new(bus.port(), ask, CallOptions::default());
+    let mut turn = bus.port().queue.turn((Priority::Read, Some(UNIT)), &mut || false).unwrap();
 
     let mut course = Course::new(Duration::from_millis(100), 0);
     while course.sends() {}

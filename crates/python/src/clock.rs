@@ -1,0 +1,39 @@
+//! Moments of the core as Python's numbers.
+
+use std::time::SystemTime;
+
+use drivebus_line::Bus as CoreBus;
+use drivebus_rtu::Instant;
+
+/// The line's clock and the calendar's, at one moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct UnixClock {
+    ahead: f64,
+}
+
+impl UnixClock {
+    /// `virtual_ahead` is where a simulation's clock stands on the calendar.
+    pub(crate) fn of(core: &CoreBus, virtual_ahead: Option<f64>) -> Self {
+        Self { ahead: virtual_ahead.unwrap_or_else(|| unix_time() - to_seconds(core.now())) }
+    }
+
+    pub(crate) fn at(self, moment: Instant) -> f64 {
+        to_seconds(moment) + self.ahead
+    }
+}
+
+/// The calendar's time: seconds since 1970.
+pub(crate) fn unix_time() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
+}
+
+/// A moment of the line's clock in seconds since it began.
+pub(crate) fn to_seconds(moment: Instant) -> f64 {
+    moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
+}
+
+/// A moment of the simulation in seconds.
+#[expect(clippy::cast_precision_loss, reason = "a float is what Python counts seconds in; 104 days are exact")]
+pub(crate) fn seconds(moment: Instant) -> f64 {
+    moment.as_nanos() as f64 / 1e9
+}
