@@ -209,10 +209,8 @@ fn conclude(
         (Event::Corrupt { error, bytes }, _) => (Failure::Corrupt(error), bytes),
         (Event::NoAnswer { bytes }, _) => (Failure::NoAnswer { timeout, attempts: 1 }, bytes),
         (Event::Busy, _) => (Failure::Busy { timeout }, &[][..]),
-        // The master says neither of a request that it did not hand out.
-        (Event::Transmit(_) | Event::Answer(_) | Event::BroadcastDone, _) => {
-            (Failure::NoAnswer { timeout, attempts: 1 }, &[][..])
-        }
+        // The master says nothing else of a request that it did not hand out.
+        _ => (Failure::NoAnswer { timeout, attempts: 1 }, &[][..]),
     };
     Err(ask.failed(failure, sent, ended, raw))
 }

@@ -34,6 +34,7 @@ const LATEST: Duration = Duration::from_secs(3);
 
 /// Who said a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Role {
     /// A master asks.
     Request,
@@ -47,6 +48,20 @@ pub enum Role {
     Stray,
     /// Bytes that belong to no frame, and why.
     Noise(FrameError),
+}
+
+impl Role {
+    /// As programs write it: `request`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Request => "request",
+            Self::Answer => "answer",
+            Self::Late => "late",
+            Self::Doubtful => "doubtful",
+            Self::Stray => "stray",
+            Self::Noise(_) => "noise",
+        }
+    }
 }
 
 /// What was said so far, as far as it tells what may be said next.
