@@ -26,7 +26,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke \
-        pictures matrix
+        pictures matrix semver
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -39,6 +39,7 @@ help: ## what can be made
 	@echo "make matrix  every case of the tests of which make test runs a sample"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"
+	@echo "make semver  what the published crates promise, compared with the last tag"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
 	@echo "make pictures   the pictures of the README, from what the commands show"
 	@echo "make wheel   the wheel, in dist/"
@@ -239,6 +240,19 @@ packages: $(VENV)/.dev ## what a package leaves out shows here
 # After a bound in Cargo.toml was lowered, or something newer was used.
 oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions
 	$(BIN)/python tools/oldest_versions.py
+
+# A release is a tag v1.2.3. Until there is one, nothing is promised, and the tool is not needed either.
+SEMVER   := .tools/cargo-semver-checks/bin/cargo-semver-checks
+LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null)
+PUBLISHED := drivebus-rtu drivebus-line drivebus-drives drivebus-sim drivebus
+
+$(SEMVER):
+	@sh tools/check_machine.sh $(PYTHON) rust
+	$(CARGO) install --quiet --locked --version 0.51.0 --root .tools/cargo-semver-checks cargo-semver-checks
+
+semver: $(if $(LAST_TAG),$(SEMVER)) ## a break since the last tag that the version does not say
+	@$(if $(LAST_TAG),set -x; $(SEMVER) semver-checks --baseline-rev $(LAST_TAG) $(PUBLISHED:%=--package %),\
+	    echo "make semver: there is no tag v* yet, so nothing to compare with")
 
 # Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
 SEED  ?= $(shell date +%s)

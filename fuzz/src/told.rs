@@ -26,6 +26,7 @@ impl Said {
             Event::NoAnswer { bytes } => Self::NoAnswer(bytes.to_vec()),
             Event::BroadcastDone => Self::BroadcastDone,
             Event::Busy => Self::Busy,
+            new => unreachable!("{new:?} is not judged here"),
         }
     }
 }
@@ -49,6 +50,7 @@ pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
             pdu
         }
         Request::Custom { pdu, .. } => pdu.to_vec(),
+        new => unreachable!("{new:?} is not judged here"),
     }
 }
 
@@ -71,5 +73,6 @@ pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
         Answer::WriteMultiple { address, count, .. } => four(16, address, count),
         Answer::Exception { function, code, .. } => vec![function | 0x80, code.0],
         Answer::Custom { pdu, .. } => pdu.to_vec(),
+        new => unreachable!("{new:?} is not judged here"),
     }
 }

@@ -268,7 +268,7 @@ impl Builder {
 fn parse(port: &str) -> Result<PortUrl, Error> {
     let families: Vec<&str> = drivebus_drives::Profile::builtin_names().collect();
     let faults = drivebus_sim::FaultKind::ALL.map(drivebus_sim::FaultKind::name);
-    Ok(PortUrl::parse(port, &Known { families: &families, faults: &faults, ..Known::default() })?)
+    Ok(PortUrl::parse(port, &Known::default().families(&families).faults(&faults))?)
 }
 
 #[cfg(not(feature = "sim"))]

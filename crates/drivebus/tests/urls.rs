@@ -45,7 +45,7 @@ fn vectors() -> Vec<Vector> {
 fn parse(port: &str) -> PortUrl {
     let families: Vec<&str> = Profile::builtin_names().collect();
     let faults = FaultKind::ALL.map(FaultKind::name);
-    PortUrl::parse(port, &Known { families: &families, faults: &faults, ..Known::default() }).unwrap()
+    PortUrl::parse(port, &Known::default().families(&families).faults(&faults)).unwrap()
 }
 
 #[test]

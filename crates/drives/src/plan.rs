@@ -24,11 +24,19 @@ impl ReadSpan {
 
 /// What a read costs, in any unit of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct ReadCost {
     /// What every request costs, however many words it asks for.
     pub request: u32,
     /// What each word costs on top.
     pub word: u32,
+}
+
+impl ReadCost {
+    /// So much for every request, and so much for each word.
+    pub const fn new(request: u32, word: u32) -> Self {
+        Self { request, word }
+    }
 }
 
 /// What a drive allows in one read, and what reads cost.

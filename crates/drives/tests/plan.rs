@@ -49,8 +49,7 @@ fn check(wanted: u16, readable: u16, max_words: u16, cost: ReadCost) {
 
 #[test]
 fn every_small_plan_is_the_best() {
-    let costs =
-        [ReadCost { request: 5, word: 2 }, ReadCost { request: 100, word: 1 }, ReadCost { request: 0, word: 1 }];
+    let costs = [ReadCost::new(5, 2), ReadCost::new(100, 1), ReadCost::new(0, 1)];
     for wanted in 0..1 << 6 {
         for readable in 0..1 << 6 {
             for max_words in 1..=4 {
@@ -65,12 +64,12 @@ fn every_small_plan_is_the_best() {
 proptest! {
     #[test]
     fn every_plan_is_the_best(wanted in 0_u16..1 << 10, readable in 0_u16..1 << 10, max_words in 1_u16..=5, request in 0_u32..30, word in 0_u32..5) {
-        check(wanted, readable, max_words, ReadCost { request, word });
+        check(wanted, readable, max_words, ReadCost::new(request, word));
     }
 
     #[test]
     fn order_and_repetition_do_not_matter(wanted in prop::collection::vec(any::<u16>(), 0..40)) {
-        let cost = ReadCost { request: 316, word: 22 };
+        let cost = ReadCost::new(316, 22);
         let mut sorted = wanted.clone();
         sorted.sort_unstable();
         sorted.dedup();
@@ -80,7 +79,7 @@ proptest! {
 
 #[test]
 fn the_ends_of_the_address_space_are_reached() {
-    let cost = ReadCost { request: 316, word: 22 };
+    let cost = ReadCost::new(316, 22);
     let plan = plan_reads(&[0xFFFF, 0xFFF0, 0x0000], 16, cost, |_| true);
     assert_eq!(
         plan,
@@ -110,7 +109,7 @@ fn a_gd350_is_read_in_few_requests() {
     assert_eq!(plan(&["P00.12", "P00.14"]), [(0x000C, 1), (0x000E, 1)]);
     assert_eq!(plan(&[]), []);
     // At 19200 8E1 with 5 ms delay: 20 characters of 11 bits and 96 bit times for a request, 22 for a word.
-    assert_eq!(profile.serial().unwrap().read_cost(), ReadCost { request: 316, word: 22 });
+    assert_eq!(profile.serial().unwrap().read_cost(), ReadCost::new(316, 22));
 }
 
 #[test]

@@ -16,6 +16,7 @@ use crate::line::PortError;
 ///
 /// Displays as one sentence: who was asked what, what came instead, and whether the unit may have acted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub struct CallError {
     /// Why.
     pub failure: Failure,
@@ -37,9 +38,10 @@ impl fmt::Display for CallError {
             Destination::Unit(unit) => write!(f, "unit {unit}")?,
             Destination::Broadcast => f.write_str("broadcast")?,
         }
-        let request = Frame::parse(&self.request).ok().and_then(|frame| Request::parse(frame.pdu()).ok());
+        let pdu = Frame::parse(&self.request).ok().map_or(&[][..], |frame| frame.pdu());
+        let request = Request::parse(pdu).ok();
         if let Some(request) = request {
-            write!(f, ", {}", Asked(request))?;
+            write!(f, ", {}", Asked { request, pdu })?;
         }
         write!(f, ": {}", self.failure)?;
         if !self.raw.is_empty() {
@@ -75,12 +77,15 @@ fn tells_all(failure: &Failure) -> bool {
     matches!(failure, Refused { .. } | NotTaken { .. } | Limited { .. } | Acknowledged { .. } | Unheard { .. })
 }
 
-/// A request in words.
-struct Asked<'a>(Request<'a>);
+/// A request in words, or in bytes where there are no words for it.
+struct Asked<'a> {
+    request: Request<'a>,
+    pdu: &'a [u8],
+}
 
 impl fmt::Display for Asked<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
+        match self.request {
             Request::Read { table: Table::Holding, address, count: 1, .. } => write!(f, "read {address:04X}H"),
             Request::Read { table, address, count: 1, .. } => write!(f, "read {} {address:04X}H", table.one()),
             Request::Read { table, address, count, .. } => {
@@ -94,7 +99,7 @@ impl fmt::Display for Asked<'_> {
                 write!(f, "write {} words from {address:04X}H", words.len())
             }
             Request::Echo { data, .. } => write!(f, "echo {data:04X}H"),
-            Request::Custom { pdu, .. } => write!(f, "PDU {}", Hex(pdu)),
+            _ => write!(f, "PDU {}", Hex(self.pdu)),
         }
     }
 }

@@ -135,6 +135,7 @@ pub enum PortErrorKind {
 /// A port that could not be opened, or was lost.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{port}: {message}")]
+#[non_exhaustive]
 pub struct PortError {
     /// Which kind of trouble.
     pub kind: PortErrorKind,

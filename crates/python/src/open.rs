@@ -70,7 +70,7 @@ pub(crate) fn port_url<'py>(
         names.iter().map(String::as_str).collect()
     }
     let (schemes, families, faults) = (texts(&schemes), texts(&families), texts(&faults));
-    let known = Known { schemes: &schemes, families: &families, faults: &faults };
+    let known = Known::default().schemes(&schemes).families(&families).faults(&faults);
     let (scheme, simulator) = match PortUrl::parse(port, &known).map_err(refuse)? {
         PortUrl::Simulator(simulator) => ("sim".to_owned(), simulator_arguments(py, &simulator)?),
         PortUrl::Foreign { scheme } => (scheme, PyDict::new(py)),

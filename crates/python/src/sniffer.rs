@@ -72,18 +72,23 @@ fn tell<'py>(py: Python<'py>, sniffer: &mut rtu::Sniffer, now: Instant, pieces: 
 }
 
 fn piece<'py>(py: Python<'py>, heard: &Heard<'_>) -> Piece<'py> {
-    let (role, error) = match heard.role {
-        Role::Request => ("request", None),
-        Role::Answer => ("answer", None),
-        Role::Late => ("late", None),
-        Role::Doubtful => ("doubtful", None),
-        Role::Stray => ("stray", None),
-        Role::Noise(error) => ("noise", Some(error.to_string())),
+    let error = match heard.role {
+        Role::Noise(error) => Some(error.to_string()),
+        _ => None,
     };
     let seconds = |moment: Instant| moment.saturating_duration_since(Instant::ZERO).as_secs_f64();
     let (gap, turnaround) = (heard.gap.map(|gap| gap.as_secs_f64()), heard.turnaround.map(|time| time.as_secs_f64()));
     let bytes = PyBytes::new(py, heard.bytes);
-    (role, bytes, seconds(heard.began), seconds(heard.ended), gap, heard.kept.as_secs_f64(), turnaround, error)
+    (
+        heard.role.name(),
+        bytes,
+        seconds(heard.began),
+        seconds(heard.ended),
+        gap,
+        heard.kept.as_secs_f64(),
+        turnaround,
+        error,
+    )
 }
 
 /// A moment in seconds; what is no moment is the start of the clock.

@@ -80,6 +80,7 @@ impl From<UnitAddress> for Destination {
 
 /// An address that no unit can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AddressError {
     /// What was given.
     pub raw: u8,

@@ -16,6 +16,7 @@ pub(crate) use head::MOST;
 
 /// An answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Answer<'a> {
     /// The words read, or the bits, each a word of 0 or 1.
     #[non_exhaustive]

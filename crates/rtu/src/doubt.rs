@@ -58,6 +58,7 @@ const MAX_RIVALS: u8 = 3;
 
 /// How sure the answer to a request can be, before it is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Attribution {
     /// What the master takes for the answer is the answer.
     Certain,

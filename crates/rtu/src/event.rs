@@ -4,6 +4,7 @@ use crate::{Answer, AnswerError, FrameError, UnitAddress};
 
 /// What happens to a request. All but [`Transmit`](Self::Transmit) end it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Event<'a> {
     /// The line was silent long enough: send these bytes in one piece, then call [`crate::Master::sent`].
     Transmit(&'a [u8]),
@@ -37,6 +38,7 @@ pub enum Event<'a> {
 /// What was seen on the line beside answers, since [`crate::Master::take_tally`]. Noise counts when its request ends. A count
 /// that is full stays full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Tally {
     /// Whole frames that came when nothing was waited for, or from a unit in quarantine.
     pub late: u32,

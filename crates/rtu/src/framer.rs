@@ -288,6 +288,7 @@ impl fmt::Debug for Framer {
 
 /// Bytes that belong to no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Skipped<'a> {
     /// The bytes.
     pub bytes: &'a [u8],

@@ -35,12 +35,20 @@ pub const TURNAROUND: Duration = Duration::from_millis(100);
 ///
 /// Who has the clock learns both from answers that became whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Patience {
     /// So long after the last byte: no pause inside an answer is longer, as adapters and gateways hand it over in lumps.
     pub pause: Duration,
     /// But so long after the request at least, which is when the unit has usually begun to answer: what came before may
     /// have been noise that looked like an answer.
     pub usual: Duration,
+}
+
+impl Patience {
+    /// So long after the last byte, and so long after the request at least.
+    pub const fn new(pause: Duration, usual: Duration) -> Self {
+        Self { pause, usual }
+    }
 }
 
 /// A master with at most one request in flight.

@@ -12,6 +12,7 @@ use crate::{Table, Words};
 
 /// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Request<'a> {
     /// 01H, 02H, 03H or 04H: read `count` words, or bits, of `table` from `address`.
     #[non_exhaustive]

@@ -106,7 +106,7 @@ impl State {
         };
         let mut master = Master::with_silence(Duration::ZERO);
         if scenario.damage != Damage::Final {
-            master.be_patient(Some(Patience { pause: Duration::ZERO, usual: Duration::ZERO }));
+            master.be_patient(Some(Patience::new(Duration::ZERO, Duration::ZERO)));
         }
         let mut state = Self {
             now: START,

@@ -1,5 +1,8 @@
 //! Nothing of its own: the tests stand in `tests/`, and the examples of docs/rust.md are tests here.
 
 #[cfg(doctest)]
+mod may_grow;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../../docs/rust.md")]
 struct RustPage;

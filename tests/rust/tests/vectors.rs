@@ -150,9 +150,7 @@ impl Fields {
                 Self::WriteMany { unit, address, words: words.iter().collect() }
             }
             Request::Echo { data, .. } => Self::Echo { unit, data },
-            other @ (Request::Read { .. } | Request::WriteCoil { .. } | Request::Custom { .. }) => {
-                panic!("no vector is like {other:?}")
-            }
+            other => panic!("no vector is like {other:?}"),
         }
     }
 
@@ -166,9 +164,7 @@ impl Fields {
             Answer::WriteMultiple { address, count, .. } => Self::WriteManyAnswer { unit, address, count },
             Answer::Echo { data, .. } => Self::Echo { unit, data },
             Answer::Exception { function, code, .. } => Self::Exception { unit, function, code: code.0 },
-            other @ (Answer::Read { .. } | Answer::WriteCoil { .. } | Answer::Custom { .. }) => {
-                panic!("no vector is like {other:?}")
-            }
+            other => panic!("no vector is like {other:?}"),
         }
     }
 }

@@ -108,6 +108,7 @@ impl std::str::FromStr for Command {
 /// No command has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no command \"{name}\"; the closest is \"{closest}\"")]
+#[non_exhaustive]
 pub struct ParseCommandError {
     /// The name as given.
     pub name: String,

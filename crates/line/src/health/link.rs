@@ -12,6 +12,7 @@ use crate::line::PortErrorKind;
 /// An answer is good, a refusal too. Silence, a damaged or a wrong answer, and a port that was lost are not. What was
 /// never sent, or given up by the caller, says nothing about the link and is not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Link {
     /// Exchanges that brought an answer.
     pub good: u32,

@@ -161,7 +161,9 @@ mod tests {
             ..Counters::default()
         };
         let mut counters = full.clone();
-        counters.add(Tally { late: 1, foreign: 1, noise: 1, noise_idle: 1, own_echo: 1, own_remnant: 1 });
+        let mut tally = Tally::default();
+        (tally.late, tally.foreign, tally.noise, tally.noise_idle, tally.own_echo) = (1, 1, 1, 1, 1);
+        counters.add(tally);
         counters.answered(Duration::MAX, Duration::MAX);
         counters.answered(Duration::MAX, Duration::MAX);
         assert_eq!(Counters { round_trip: full.round_trip, delay: full.delay, ..counters }, full);

@@ -121,7 +121,7 @@ impl Lumps {
     /// answers come whole or not at all.
     pub(crate) fn patience(&self, usual: Option<Duration>) -> Option<Patience> {
         self.least?;
-        Some(Patience { pause: self.pause, usual: usual.unwrap_or(UNKNOWN) })
+        Some(Patience::new(self.pause, usual.unwrap_or(UNKNOWN)))
     }
 
     /// What an exchange has taught that asked for an answer of `answer` bytes.

@@ -24,6 +24,7 @@ const SCHEMES: [&str; 3] = ["socket", "tcp", "sim"];
 
 /// The names that a URL may hold beside those of its grammar.
 #[derive(Debug, Clone, Copy, Default)]
+#[non_exhaustive]
 pub struct Known<'a> {
     /// Schemes that the caller opens itself.
     pub schemes: &'a [&'a str],
@@ -31,6 +32,26 @@ pub struct Known<'a> {
     pub families: &'a [&'a str],
     /// The kinds of faults that a simulated line can have.
     pub faults: &'a [&'a str],
+}
+
+impl<'a> Known<'a> {
+    /// Sets [`schemes`](Self#structfield.schemes).
+    #[must_use]
+    pub const fn schemes(self, schemes: &'a [&'a str]) -> Self {
+        Self { schemes, ..self }
+    }
+
+    /// Sets [`families`](Self#structfield.families).
+    #[must_use]
+    pub const fn families(self, families: &'a [&'a str]) -> Self {
+        Self { families, ..self }
+    }
+
+    /// Sets [`faults`](Self#structfield.faults).
+    #[must_use]
+    pub const fn faults(self, faults: &'a [&'a str]) -> Self {
+        Self { faults, ..self }
+    }
 }
 
 /// What somebody names as a port.

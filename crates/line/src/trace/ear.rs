@@ -13,6 +13,7 @@ const MOST: usize = 65_536;
 
 /// Bytes that went over the line.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Overheard {
     /// When they had left, or were handed over. On the line's clock.
     pub at: Instant,

@@ -51,7 +51,7 @@ impl Machine {
     }
 
     pub(crate) fn places(&self) -> Places {
-        Places { by_id: self.root.join("by-id"), tty_class: self.root.join("class") }
+        Places::default().by_id(self.root.join("by-id")).tty_class(self.root.join("class"))
     }
 
     /// The link of an adapter, made or led elsewhere.

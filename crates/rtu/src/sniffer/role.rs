@@ -4,6 +4,7 @@ use crate::frame::FrameError;
 
 /// Who said a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Role {
     /// A master asks.
     Request,
@@ -17,4 +18,18 @@ pub enum Role {
     Stray,
     /// Bytes that belong to no frame, and why.
     Noise(FrameError),
+}
+
+impl Role {
+    /// As programs write it: `request`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Request => "request",
+            Self::Answer => "answer",
+            Self::Late => "late",
+            Self::Doubtful => "doubtful",
+            Self::Stray => "stray",
+            Self::Noise(_) => "noise",
+        }
+    }
 }

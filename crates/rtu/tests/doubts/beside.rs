@@ -8,7 +8,7 @@ const WRITE: Request<'_> = Request::write(0x2001, 1000);
 fn patient() -> Asker {
     let mut asker = Asker::new();
     let (pause, usual) = (Duration::from_millis(10), Duration::ZERO);
-    asker.master.be_patient(Some(Patience { pause, usual }));
+    asker.master.be_patient(Some(Patience::new(pause, usual)));
     asker
 }
 
@@ -18,8 +18,15 @@ fn comes(asker: &mut Asker, now: u64, bytes: &[u8]) {
     assert_eq!(asker.master.poll(ms(now)), None);
 }
 
+/// What is counted where only this was.
+fn tally(of: impl FnOnce(&mut Tally)) -> Tally {
+    let mut tally = Tally::default();
+    of(&mut tally);
+    tally
+}
+
 fn noise(count: usize) -> Tally {
-    Tally { noise: count.try_into().unwrap(), ..Tally::default() }
+    tally(|tally| tally.noise = count.try_into().unwrap())
 }
 
 /// A read of one word for which `before` comes, and then the answer, or nothing.
@@ -111,8 +118,12 @@ fn what_may_be_left_of_the_request_is_told() {
     let own = Adu::request(unit(1).into(), &write);
     let mut damaged = own.as_bytes().to_vec();
     damaged[5] ^= 0x10;
-    let tally = counted(&write, &[&own.as_bytes()[2..6], &damaged], false);
-    assert_eq!(tally, Tally { own_remnant: 1, ..noise(4) }, "before it and in its place: of one request");
+    let counted = counted(&write, &[&own.as_bytes()[2..6], &damaged], false);
+    assert_eq!(
+        counted,
+        tally(|tally| (tally.own_remnant, tally.noise) = (1, 4)),
+        "before it and in its place: of one request"
+    );
 }
 
 /// Answers and refusals without their first byte, or the second.
@@ -181,8 +192,8 @@ fn only_the_broadcast_itself_is_the_adapters_echo() {
     master.begin(ms(0), Destination::Broadcast, &WRITE, TURNAROUND).unwrap();
     assert!(matches!(master.poll(ms(0)), Some(Event::Transmit(_))));
     master.sent(ms(0));
-    let late = Tally { late: 1, ..Tally::default() };
-    assert_eq!(comes(&mut master, 1, &own), Tally { own_echo: 1, ..Tally::default() });
+    let late = tally(|tally| tally.late = 1);
+    assert_eq!(comes(&mut master, 1, &own), tally(|tally| tally.own_echo = 1));
     assert_eq!(comes(&mut master, 2, &words(unit(1), 1, 7)), late);
     assert_eq!(master.poll(ms(100)), Some(Event::BroadcastDone));
     assert_eq!(comes(&mut master, 101, &own), late, "nothing is in flight");

@@ -92,7 +92,7 @@ fn words_of_a_shape_that_is_theirs_are_no_answer() {
 /// Nobody owes it: what is taken for an answer was another's, and the own one comes while the next is waited for.
 #[test]
 fn an_answer_of_another_length_makes_that_length_theirs() {
-    for patience in [None, Some(Patience { pause: TIMEOUT, usual: TIMEOUT })] {
+    for patience in [None, Some(Patience::new(TIMEOUT, TIMEOUT))] {
         let mut asker = asker();
         asker.master.be_patient(patience);
         asker.reads(NOW, unit(1), 1);

@@ -9,7 +9,7 @@ const PAUSE: u64 = 10;
 fn patient() -> Asker {
     let mut asker = Asker::new();
     let (pause, usual) = (Duration::from_millis(PAUSE), Duration::ZERO);
-    asker.master.be_patient(Some(Patience { pause, usual }));
+    asker.master.be_patient(Some(Patience::new(pause, usual)));
     asker
 }
 

@@ -128,7 +128,7 @@ impl Drive {
             }
             // Assumption: the echo works on a locked drive; it reads and writes nothing.
             Request::Echo { .. } => {}
-            Request::Custom { .. } => return Err(Refusal::Function),
+            _ => return Err(Refusal::Function),
         }
         Answer::confirming(request).ok_or(Refusal::Function)
     }

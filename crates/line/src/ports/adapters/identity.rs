@@ -19,6 +19,7 @@ const BY_ID_VARIABLE: &str = "DRIVEBUS_SERIAL_BY_ID";
 
 /// Where a system tells which adapter is which.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Places {
     /// Links named after adapters, each to its port: `/dev/serial/by-id`.
     pub by_id: PathBuf,
@@ -34,6 +35,20 @@ impl Default for Places {
             by_id: by_id.map_or_else(|| PathBuf::from("/dev/serial/by-id"), PathBuf::from),
             tty_class: PathBuf::from("/sys/class/tty"),
         }
+    }
+}
+
+impl Places {
+    /// Sets [`by_id`](Self#structfield.by_id).
+    #[must_use]
+    pub fn by_id(self, by_id: impl Into<PathBuf>) -> Self {
+        Self { by_id: by_id.into(), ..self }
+    }
+
+    /// Sets [`tty_class`](Self#structfield.tty_class).
+    #[must_use]
+    pub fn tty_class(self, tty_class: impl Into<PathBuf>) -> Self {
+        Self { tty_class: tty_class.into(), ..self }
     }
 }
 
