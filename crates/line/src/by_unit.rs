@@ -30,10 +30,6 @@ impl<T: Default> ByUnit<T> {
         &mut self.places[place]
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &T> {
-        self.places.iter()
-    }
-
     #[cold]
     fn grow(&mut self, places: usize) {
         self.places.resize_with(places, T::default);

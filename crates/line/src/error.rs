@@ -6,7 +6,7 @@ use std::fmt;
 use std::time::Duration;
 
 use drivebus_rtu::{
-    AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table,
+    AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table, Unanswered,
 };
 
 use crate::error::kind::ErrorKind;
@@ -258,6 +258,32 @@ pub enum Failure {
         /// Why, in the unit's own numbering.
         code: ExceptionCode,
     },
+}
+
+impl Failure {
+    /// As the line's policy has it: what the unit `shows` was read back, and it was `cut` short, if it was.
+    pub(crate) fn of(why: Unanswered, shows: Vec<u16>, cut: Option<Self>) -> Self {
+        match why {
+            Unanswered::NotBegun(error) => Self::NotBegun(error),
+            Unanswered::Reopened => Self::Reopened,
+            Unanswered::NotAsked { left } => Self::NotAsked { left },
+            Unanswered::Doubtful => Self::Doubtful,
+            Unanswered::Busy { timeout } => Self::Busy { timeout },
+            Unanswered::NoAnswer { timeout, attempts } => Self::NoAnswer { timeout, attempts },
+            Unanswered::Unreached => Self::Unreached,
+            Unanswered::Wrong(error) => Self::Wrong(error),
+            Unanswered::Corrupt(error) => Self::Corrupt(error),
+            Unanswered::Refused { function, code } => Self::Refused { function, code },
+            Unanswered::Disagreeing { asked } => Self::Disagreeing { asked },
+            Unanswered::OthersAsk => Self::OthersAsk,
+            Unanswered::NotTaken { times } => Self::NotTaken { times, shows },
+            Unanswered::Limited { took } => Self::Limited { took, shows: shows.first().copied().unwrap_or(took) },
+            Unanswered::Acknowledged { code } => Self::Acknowledged { code, shows },
+            Unanswered::CutShort(_) => cut.unwrap_or(Self::Interrupted),
+            // Neither is said of a call that this crate makes: there is room for every unit, and it asks in turn.
+            _ => Self::NotBegun(BeginError::OutOfTurn),
+        }
+    }
 }
 
 /// Words as people read them.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{OwnEcho, SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::turns::order::Priority;
 use crate::turns::queue::DEFAULT_QUEUE;
@@ -131,6 +131,16 @@ pub enum AdapterEcho {
     Present,
     /// It does not.
     Absent,
+}
+
+impl From<AdapterEcho> for OwnEcho {
+    fn from(echo: AdapterEcho) -> Self {
+        match echo {
+            AdapterEcho::Auto => Self::Unknown,
+            AdapterEcho::Present => Self::Present,
+            AdapterEcho::Absent => Self::Absent,
+        }
+    }
 }
 
 /// What one unit needs otherwise than the bus; `None` keeps what the bus has.

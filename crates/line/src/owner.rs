@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::{
-    AdapterEcho, Counts, Destination, Exchange, Instant, Known, Opened, Request, SerialFormat, Tally, UnitAddress,
+    Counts, Exchange, Instant, Known, Opened, OwnEcho, Request, SerialFormat, Tally, UnitAddress,
 };
 
 use crate::ask::Ask;
@@ -59,7 +59,7 @@ impl Owner {
     pub(crate) fn new(
         opener: Opener,
         format: SerialFormat,
-        echo: AdapterEcho,
+        echo: OwnEcho,
         chance: u64,
         stats: Arc<Mutex<Stats>>,
     ) -> Self {
@@ -141,7 +141,8 @@ impl Owner {
         }
         // Nothing is in flight, unless a caller's own code panicked while it was: then that is given up.
         self.known.abort(self.now());
-        self.known.is_connection(self.stats().reconnects);
+        let connection = self.stats().reconnects;
+        self.known.is_connection(connection);
         Ok(())
     }
 

@@ -45,7 +45,7 @@ use outcome::{Bytes, Kept, Slip};
 use probes::Tried;
 use write_back::Write;
 
-pub use echo::AdapterEcho;
+pub use echo::OwnEcho;
 pub use fresh_words::FreshWords;
 pub use known::{Known, Opened};
 pub use outcome::{Cut, Exchange, Outcome, Times, Unanswered};
@@ -101,11 +101,11 @@ pub struct Counts {
 ///
 /// ```
 /// use drivebus_rtu::{
-///     AdapterEcho, Answer, Conversation, Duration, FreshWords, Instant, Known, Opened, Outcome, Question, Request, SerialFormat,
+///     OwnEcho, Answer, Conversation, Duration, FreshWords, Instant, Known, Opened, Outcome, Question, Request, SerialFormat,
 ///     Step, UnitAddress,
 /// };
 ///
-/// let mut known: Known<4, 16> = Known::new(SerialFormat::DEFAULT, AdapterEcho::Absent, 1);
+/// let mut known: Known<4, 16> = Known::new(SerialFormat::DEFAULT, OwnEcho::Absent, 1);
 /// let words = FreshWords::beginning_at(0x1234);
 /// let mut now = Instant::ZERO;
 /// known.opened(now, &Opened::new().gapless(true)); // nobody else asks on it
@@ -183,7 +183,9 @@ enum State<'r> {
     InFlight(Flight<'r>),
     /// What came behind an answer is taken down.
     Proving { ask: Ask<'r>, count: u16, times: Times },
-    /// The request is over.
+    /// The request is over, and nobody was told yet.
+    Over(Flight<'r>, Result<Times, Slip>),
+    /// That was told: now it is judged.
     Heard(Flight<'r>, Result<Times, Slip>),
     /// The unit is at work: it is looked at again then.
     Pausing(Instant),
@@ -262,8 +264,12 @@ impl<'r> Conversation<'r> {
                 State::InFlight(_) => match self.poll(now, known) {
                     Polled::Send => return Step::Send(known.master.frame()),
                     Polled::Listen(until) => return Step::Listen(until),
-                    Polled::Over => return self.tell(),
+                    Polled::Over => {}
                 },
+                State::Over(flight, result) => {
+                    self.state = State::Heard(flight, result);
+                    return Step::Heard(self.exchange(&flight, &result));
+                }
                 State::Heard(flight, result) => self.conclude(now, known, flight, result),
                 State::Pausing(until) => {
                     self.state = State::Passing;
@@ -339,12 +345,14 @@ impl<'r> Conversation<'r> {
                 self.came.clear();
                 self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
             }
-            State::Heard(flight, Err(slip)) => {
-                if !slip.why.is_refused() {
-                    self.state = State::Heard(flight, Err(Slip { why, ..slip }));
-                }
+            State::Over(flight, Err(slip)) if !slip.why.is_refused() => {
+                self.state = State::Over(flight, Err(Slip { why, ..slip }));
             }
-            State::Heard(_, Ok(_)) => {}
+            State::Heard(flight, Err(slip)) if !slip.why.is_refused() => {
+                self.state = State::Heard(flight, Err(Slip { why, ..slip }));
+            }
+            // The unit has said what it does, whoever waits for that.
+            State::Over(..) | State::Heard(..) => {}
             _ => {
                 let slip = self.slip(why, None, now);
                 self.end_attempt(now, known, Err(slip));
@@ -402,7 +410,7 @@ impl<'r> Conversation<'r> {
 
     /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who
     /// polls has others to ask meanwhile.
-    fn patience(&self) -> Duration {
+    pub fn patience(&self) -> Duration {
         if self.question.urgency == Urgency::Poll {
             return Duration::ZERO;
         }
@@ -526,11 +534,7 @@ impl<'r> Conversation<'r> {
     fn outcome(&self, result: Result<Times, Slip>) -> Outcome<'_> {
         match result {
             Ok(times) => {
-                let answer = match self.question.request {
-                    Request::Read { count, .. } => self.answer.answer().map(|answer| answer.shortened(count)),
-                    _ => self.answer.answer(),
-                };
-                Outcome::Answered { times, answer }
+                Outcome::Answered { times, answer: self.answer.answer() }
             }
             Err(Slip { why, sent, ended }) => {
                 let is_shown = matches!(

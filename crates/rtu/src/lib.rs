@@ -32,7 +32,7 @@ pub use address::{AddressError, Destination, UnitAddress};
 pub use agreement::Agreement;
 pub use answer::{Answer, AnswerError, Head};
 pub use conversation::{
-    AdapterEcho, Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, Question, Step, Times,
+    OwnEcho, Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, Question, Step, Times,
     Unanswered, Urgency,
 };
 pub use crc::crc16;

@@ -1,4 +1,5 @@
-//! One call from its place in the queue to its end: dead units, attempts, and what may be repeated.
+//! One call from its place in the queue to its end: its turn, the line, and the waiting. What is asked, and how often, its
+//! [`Conversation`] decides.
 //!
 //! | kind | after silence or a damaged answer |
 //! | --- | --- |
@@ -9,22 +10,19 @@
 //! What it takes to be sure is bounded too: a call sends eight requests at most for each time that it may ask, the questions,
 //! the probes, and what is asked again included.
 
-mod attempt;
-mod course;
-mod value;
-
+use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Destination, Instant, Meaning, Request, UnitAddress};
+use drivebus_rtu::{Answer, Conversation, Instant, Question, UnitAddress, Urgency};
 
 use crate::ask::{Ask, Done};
-use crate::bus::call::course::Course;
 use crate::bus::errand::Errand;
 use crate::bus::port::Port;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
-use crate::owner::dead_units::Verdict;
+use crate::owner::Owner;
+use crate::owner::exchange::{Talk, Then};
 use crate::turns::order::{Claim, Priority, Program};
 use crate::turns::queue::{NoTurn, Turn};
 
@@ -33,15 +31,15 @@ const HALTED: Duration = Duration::from_millis(10);
 
 /// A call under way.
 pub(crate) struct Call<'b, 'r> {
-    pub(crate) bus: &'b Port,
-    pub(crate) ask: Ask<'r>,
-    pub(crate) unit: Option<UnitAddress>,
-    pub(crate) priority: Priority,
+    bus: &'b Port,
+    ask: Ask<'r>,
+    unit: Option<UnitAddress>,
+    priority: Priority,
     program: Program,
     retries: u32,
-    pub(crate) verify: bool,
-    pub(crate) read_back: Option<u16>,
-    pub(crate) connection: Option<u64>,
+    verify: bool,
+    read_back: Option<u16>,
+    connection: Option<u64>,
     /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
     wanted: Option<&'r dyn Wanted>,
 }
@@ -68,10 +66,7 @@ impl<'b, 'r> Call<'b, 'r> {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
         Self {
             bus,
-            unit: match ask.destination {
-                Destination::Unit(unit) => Some(unit),
-                Destination::Broadcast => None,
-            },
+            unit: ask.unit(),
             priority: options.priority.unwrap_or(kind),
             program: Program::default(),
             retries: options.retries.unwrap_or(bus.options.retries),
@@ -96,7 +91,7 @@ impl<'b, 'r> Call<'b, 'r> {
         self
     }
 
-    pub(crate) fn is_wanted(&self) -> bool {
+    fn is_wanted(&self) -> bool {
         self.wanted.is_none_or(Wanted::is_wanted)
     }
 
@@ -122,41 +117,99 @@ impl<'b, 'r> Call<'b, 'r> {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<Done, Box<CallError>> {
-        if let Some(unit) = self.unit
-            && self.priority != Priority::Stop
-        {
-            self.spare_the_others(&mut turn, unit, give_up)?;
-        }
-        let mut course = Course::new(self.ask.timeout, self.retries);
         // Asked every 50 ms of who has the line, by whoever has it.
         let give_up = &mut || {
             let ends = give_up();
             self.bus.queue.goes_on();
             ends
         };
-        let result = match (self.ask.request, self.read_back) {
-            (Request::Read { .. }, _) => self.repeat(&mut turn, &mut course, give_up, take),
-            (_, Some(address)) => self.write_value(&mut turn, &mut course, address, give_up, take),
-            _ => self.once(&mut turn, &mut course, give_up, take),
-        };
-        if let Some(unit) = self.unit {
-            let mut owner = self.bus.lock();
-            match &result {
-                Ok(done) => owner.dead.answered(unit, done.ended),
-                Err(error) => match error.ended {
-                    Some(ended) if is_silence(&error.failure) => owner.dead.silent(unit, ended),
-                    Some(ended) if error.sent.is_some() && !error.raw.is_empty() => owner.dead.answered(unit, ended),
-                    _ => {}
-                },
-            }
+        let mut talk = Talk::new(Conversation::new(self.question(), &self.bus.words), &self.ask);
+        let mut owner = self.bus.lock();
+        loop {
+            talk.call.is_wanted(self.is_wanted());
+            let now = self.bus.now_of(&owner);
+            let came_on = match owner.go_on(&mut talk, now, give_up, take) {
+                Then::Done(result) => return self.told(&mut owner, result),
+                Then::LetPass => {
+                    drop(owner);
+                    self.pass(&mut turn, &talk, give_up)
+                }
+                Then::StandBy(until) => {
+                    drop(owner);
+                    self.stand_by(&mut turn, until, give_up).map(|()| self.bus.lock())
+                }
+            };
+            owner = match came_on {
+                Ok(owner) => owner,
+                Err(failure) => {
+                    let mut owner = self.bus.lock();
+                    let now = self.bus.now_of(&owner);
+                    talk.cut_short(&mut owner, now, failure);
+                    owner
+                }
+            };
         }
+    }
+
+    /// What the call came to, in the words that its caller hears.
+    fn told(&self, owner: &mut Owner, result: Result<Done, Box<CallError>>) -> Result<Done, Box<CallError>> {
         result.map_err(|mut error| {
-            if error.failure == Failure::Interrupted {
-                error.failure = self.bus.given_up();
+            match error.failure {
+                Failure::Interrupted => error.failure = self.bus.given_up(),
+                Failure::NotAsked { .. } => owner.stats().count(self.unit, |counters| counters.not_asked += 1),
+                _ => {}
             }
-            error.request = self.ask.frame();
             error
         })
+    }
+
+    fn question(&self) -> Question<'r> {
+        let urgency = match self.priority {
+            Priority::Stop => Urgency::Stop,
+            Priority::Poll => Urgency::Poll,
+            _ => Urgency::Call,
+        };
+        let Ask { destination, request, timeout, gap, in_doubt, meanings, .. } = self.ask;
+        Question::new(destination, *request, timeout)
+            .gap(gap)
+            .retries(self.retries)
+            .urgency(urgency)
+            .in_doubt(in_doubt)
+            .verify(self.verify)
+            .read_back(self.read_back)
+            .connection(self.connection)
+            .meanings(self.bus.meanings.that_hold(self.unit, meanings))
+    }
+
+    /// Lets stops go first, and comes back with the line, opened again if it was lost.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure`]: the call may not go on, or the port cannot be opened.
+    fn pass(
+        &self,
+        turn: &mut Turn<'b, Errand>,
+        talk: &Talk<'_, '_>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<MutexGuard<'b, Owner>, Failure> {
+        loop {
+            if !turn.let_pass(give_up) || !self.is_wanted() {
+                return Err(self.bus.given_up());
+            }
+            let mut owner = self.bus.lock();
+            if self.bus.is_shut() {
+                owner.close();
+                return Err(Failure::Closed);
+            }
+            owner.prepare(give_up)?;
+            let Some(failure) =
+                self.bus.wills.keeps_from(self.unit).filter(|_| self.priority != Priority::Stop)
+            else {
+                return Ok(owner);
+            };
+            drop(owner);
+            self.wait_for_the_halt(turn, talk.call.patience(), failure, give_up)?;
+        }
     }
 
     fn claim(&self) -> Claim {
@@ -171,63 +224,20 @@ impl<'b, 'r> Call<'b, 'r> {
         self.ask.failed(self.bus.no_turn(why), None, self.bus.now_if_known(), &[])
     }
 
-    /// An error of a request that was not sent.
-    pub(crate) fn failed(&self, failure: Failure) -> Box<CallError> {
-        self.ask.failed(failure, None, self.bus.now(), &[])
-    }
-
-    /// A unit that was silent lately waits off the line, while others use it, for as long as it would have been silent.
-    fn spare_the_others(
-        &mut self,
-        turn: &mut Turn<'b, Errand>,
-        unit: UnitAddress,
-        give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<(), Box<CallError>> {
-        let mut patience = None;
-        loop {
-            let mut owner = self.bus.lock();
-            let now = self.bus.now_of(&owner);
-            let until = match owner.dead.verdict(unit, now) {
-                Verdict::AskOnce => {
-                    self.retries = 0;
-                    return Ok(());
-                }
-                Verdict::Wait(until) if owner.line().is_some() => until,
-                Verdict::Ask | Verdict::Wait(_) => return Ok(()),
-            };
-            let patience = *patience.get_or_insert(now + self.patience());
-            if now >= patience {
-                owner.stats().count(Some(unit), |counters| counters.not_asked += 1);
-                let left = until.saturating_duration_since(now);
-                return Err(self.ask.failed(Failure::NotAsked { left }, None, now, &[]));
-            }
-            drop(owner);
-            self.stand_by(turn, until.min(patience), give_up)?;
-        }
-    }
-
-    /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who
-    /// polls has others to ask meanwhile.
-    fn patience(&self) -> Duration {
-        if self.priority == Priority::Poll {
-            return Duration::ZERO;
-        }
-        self.ask.timeout.saturating_mul(self.retries.saturating_add(1))
-    }
-
     /// Its unit is being halted for a program that is gone: waits off the line for that, as long as for one that is silent.
     /// `failure` says so.
-    pub(crate) fn wait_for_the_halt(
+    fn wait_for_the_halt(
         &self,
         turn: &mut Turn<'b, Errand>,
+        patience: Duration,
         failure: Failure,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<(), Box<CallError>> {
-        let end = self.bus.now() + self.patience();
+    ) -> Result<(), Failure> {
+        let end = self.bus.now() + patience;
         while self.bus.wills.keeps_from(self.unit).is_some() {
             let now = self.bus.now();
             if now >= end {
-                return Err(self.failed(failure));
+                return Err(failure);
             }
             self.stand_by(turn, end.min(now + HALTED), give_up)?;
         }
@@ -235,12 +245,12 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     /// Leaves the line to others until `until`.
-    pub(crate) fn stand_by(
+    fn stand_by(
         &self,
         turn: &mut Turn<'b, Errand>,
         until: Instant,
         give_up: &mut dyn FnMut() -> bool,
-    ) -> Result<(), Box<CallError>> {
+    ) -> Result<(), Failure> {
         turn.leave();
         let mut ended = false;
         self.bus.sleep(until.saturating_duration_since(self.bus.now()), &mut || {
@@ -248,73 +258,9 @@ impl<'b, 'r> Call<'b, 'r> {
             ended
         });
         if ended || self.bus.is_shut() {
-            return Err(self.failed(self.bus.given_up()));
+            return Err(self.bus.given_up());
         }
-        *turn = self.bus.queue.turn_again(self.claim(), give_up).map_err(|why| self.no_turn(why))?;
+        *turn = self.bus.queue.turn_again(self.claim(), give_up).map_err(|why| self.bus.no_turn(why))?;
         Ok(())
     }
-
-    /// Asks what may be asked once only.
-    fn once(
-        &self,
-        turn: &mut Turn<'b, Errand>,
-        course: &mut Course,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        course.go_on_with(self.ask.timeout, 0);
-        self.repeat(turn, course, give_up, take)
-    }
-
-    /// Asks, and asks again as often as `course` says while nothing comes of it.
-    fn repeat(
-        &self,
-        turn: &mut Turn<'b, Errand>,
-        course: &mut Course,
-        give_up: &mut dyn FnMut() -> bool,
-        take: &mut dyn FnMut(Answer<'_>),
-    ) -> Result<Done, Box<CallError>> {
-        let mut lost = None;
-        loop {
-            let asked = course.asked();
-            let error = match self.attempt(turn, course, give_up, take) {
-                Ok(done) => return Ok(done),
-                Err(error) => error,
-            };
-            let is_port = matches!(error.failure, Failure::Port(_));
-            if !course.goes_on(&error, asked, self.is_to_ask_again(&error)) || !self.is_wanted() {
-                // How the port was lost tells more than that it is still not there. But where the request went out only
-                // the second time, that has to be said.
-                let lost = lost.filter(|_| is_port && error.sent.is_none());
-                return Err(lost.unwrap_or_else(|| attempted(error, course.asked())));
-            }
-            lost = is_port.then_some(error);
-            if let Some(unit) = self.unit {
-                self.bus.lock().stats().count(Some(unit), |counters| counters.retries += 1);
-            }
-        }
-    }
-
-    /// Whether the unit could not take the request, as it says itself by `error`, and may the next time.
-    fn is_to_ask_again(&self, error: &CallError) -> bool {
-        self.unit.is_some_and(|unit| self.bus.meanings.asks_again(unit, self.ask.meanings, &error.failure))
-    }
-
-    /// What the unit says by `error`, if that is a refusal.
-    fn means(&self, error: &CallError) -> Option<Meaning> {
-        self.unit.and_then(|unit| self.bus.meanings.of(unit, self.ask.meanings, &error.failure))
-    }
-}
-
-/// Whether a time-out was waited for in vain.
-pub(crate) fn is_silence(failure: &Failure) -> bool {
-    matches!(failure, Failure::NoAnswer { .. })
-}
-
-/// `error`, which came when it was asked for the last of so many times.
-fn attempted(mut error: Box<CallError>, attempts: u32) -> Box<CallError> {
-    if let Failure::NoAnswer { timeout, .. } = error.failure {
-        error.failure = Failure::NoAnswer { timeout, attempts: attempts.max(1) };
-    }
-    error
 }

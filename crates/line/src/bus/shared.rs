@@ -48,7 +48,7 @@ impl Shared {
         let wills = Arc::new(Wills::new(key.clone(), &options));
         let (sharing, opener) = Sharing::around(key, &options, &stats, &openings, openings.counting(opener));
         let opener = wills.finding(opener);
-        let mut owner = Owner::new(opener, options.format, options.echo, random(), Arc::clone(&stats));
+        let mut owner = Owner::new(opener, options.format, options.echo.into(), random(), Arc::clone(&stats));
         match owner.open(give_up) {
             Err(failure) if !sharing.as_ref().is_some_and(|sharing| sharing.is_guest()) => return Err(failure),
             _ => {}

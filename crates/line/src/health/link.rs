@@ -2,9 +2,8 @@
 
 use drivebus_rtu::UnitAddress;
 
-use crate::ask::Done;
 use crate::by_unit::ByUnit;
-use crate::error::{CallError, Failure};
+use crate::error::Failure;
 use crate::line::PortErrorKind;
 
 /// Of the last 10 exchanges with one unit, how many brought an answer; of fewer, while there were fewer.
@@ -36,12 +35,10 @@ struct Ring {
 }
 
 impl Links {
-    /// Keeps what became of one exchange with `unit`; whether it brought an answer, where it says anything of the link.
-    pub(crate) fn note(&mut self, unit: UnitAddress, result: &Result<Done, Box<CallError>>) -> Option<bool> {
-        let good = match result {
-            Ok(_) => Some(true),
-            Err(error) => good(&error.failure),
-        };
+    /// Keeps what became of one exchange with `unit`: an answer, or `failure`. Whether it was good, where that says anything of
+    /// the link.
+    pub(crate) fn note(&mut self, unit: UnitAddress, failure: Option<&Failure>) -> Option<bool> {
+        let good = failure.map_or(Some(true), good);
         if let Some(good) = good {
             self.0.of(unit).push(good);
         }
@@ -79,9 +76,8 @@ fn good(failure: &Failure) -> Option<bool> {
 mod tests {
     use std::time::Duration;
 
-    use drivebus_rtu::{BeginError, ExceptionCode, FrameError, Instant, Request};
+    use drivebus_rtu::{BeginError, ExceptionCode, FrameError};
 
-    use crate::ask::Ask;
     use crate::line::PortError;
 
     use super::*;
@@ -90,41 +86,22 @@ mod tests {
         UnitAddress::new(raw).unwrap()
     }
 
-    fn failed(failure: Failure) -> Result<Done, Box<CallError>> {
-        let request = Request::read(0x2100, 1).unwrap();
-        let ask = Ask {
-            destination: unit(1).into(),
-            request: &request,
-            timeout: Duration::ZERO,
-            learns: false,
-            gap: Duration::ZERO,
-            in_doubt: false,
-            yields: None,
-            meanings: None,
-        };
-        Err(ask.failed(failure, None, None, &[]))
-    }
-
-    const ANSWERED: Result<Done, Box<CallError>> = Ok(Done { sent: Instant::ZERO, ended: Instant::ZERO });
-
-    fn silence() -> Result<Done, Box<CallError>> {
-        failed(Failure::NoAnswer { timeout: Duration::from_millis(500), attempts: 1 })
-    }
+    const SILENCE: Failure = Failure::NoAnswer { timeout: Duration::from_millis(500), attempts: 1 };
 
     #[test]
     fn ten_are_remembered() {
         let mut links = Links::default();
         assert_eq!(links.of(unit(1)), Link { good: 0, asked: 0 });
         for asked in 1..=3 {
-            links.note(unit(1), &silence());
+            links.note(unit(1), Some(&SILENCE));
             assert_eq!(links.of(unit(1)), Link { good: 0, asked });
         }
         // The three bad ones are forgotten one by one, after seven good ones.
         for (good, asked) in [(1, 4), (2, 5), (3, 6), (4, 7), (5, 8), (6, 9), (7, 10), (8, 10), (9, 10), (10, 10)] {
-            links.note(unit(1), &ANSWERED);
+            links.note(unit(1), None);
             assert_eq!(links.of(unit(1)), Link { good, asked });
         }
-        links.note(unit(1), &silence());
+        links.note(unit(1), Some(&SILENCE));
         assert_eq!(links.of(unit(1)), Link { good: 9, asked: 10 });
         assert_eq!(links.of(unit(2)), Link { good: 0, asked: 0 }, "each unit has its own");
     }
@@ -147,7 +124,7 @@ mod tests {
         for (failure, expected) in cases {
             let mut links = Links::default();
             let name = format!("{failure:?}");
-            links.note(unit(1), &failed(failure));
+            links.note(unit(1), Some(&failure));
             let link = links.of(unit(1));
             let seen = (link.asked > 0).then_some(link.good == 1);
             assert_eq!(seen, expected, "{name}");

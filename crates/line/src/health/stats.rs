@@ -107,15 +107,7 @@ impl Latency {
     }
 }
 
-/// How many requests went to a unit, and how often the port was opened again by then.
-pub(crate) type Asked = (u64, u64);
-
 impl Stats {
-    /// What `unit` was asked so far.
-    pub(crate) fn asked(&self, unit: UnitAddress) -> Asked {
-        (self.units.get(&unit).map_or(0, |counters| counters.requests), self.reconnects)
-    }
-
     pub(crate) fn count(&mut self, unit: Option<UnitAddress>, change: impl Fn(&mut Counters)) {
         change(&mut self.total);
         if let Some(unit) = unit {

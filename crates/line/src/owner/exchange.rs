@@ -102,8 +102,21 @@ impl Owner {
         give_up: &mut dyn FnMut() -> bool,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Then {
+        let then = self.carry_out(talk, now, give_up, take);
+        self.count(talk.ask, talk.call.take_counts());
+        then
+    }
+
+    fn carry_out(
+        &mut self,
+        talk: &mut Talk<'_, '_>,
+        now: Instant,
+        give_up: &mut dyn FnMut() -> bool,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Then {
         let mut now = now;
         let mut carried: Option<Carried> = None;
+        let mut yields = self.yields(talk.ask);
         let mut buffer = [0; 256];
         // What of it was not taken yet.
         let mut rest = 0..0;
@@ -160,7 +173,7 @@ impl Owner {
                                 talk.cut_short(self, now, Failure::Interrupted);
                                 continue;
                             }
-                            if quiet >= STOP_WAITS && self.yields(talk.ask).is_some_and(Stops::has_stop) {
+                            if quiet >= STOP_WAITS && yields.is_some_and(Stops::has_stop) {
                                 talk.call.give_way(now, &mut self.known, quiet);
                                 continue;
                             }
@@ -211,9 +224,8 @@ impl Owner {
                     if is_given_up {
                         talk.cut_short(self, now, Failure::Interrupted);
                     }
+                    yields = self.yields(talk.ask);
                     self.prepare_next(talk);
-                    let counts = talk.call.take_counts();
-                    self.count(talk.ask, counts);
                 }
                 _ => {}
             }

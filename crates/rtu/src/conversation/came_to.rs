@@ -7,7 +7,7 @@ use super::first_contact::Put;
 use super::known::{Ask, Known};
 use super::outcome::{Slip, Times, Unanswered};
 use super::probes::Probe;
-use super::{AdapterEcho, Conversation, State, Urgency};
+use super::{OwnEcho, Conversation, State, Urgency};
 use crate::{Adu, Answer, Instant, Request};
 
 impl<'r> Conversation<'r> {
@@ -88,7 +88,7 @@ impl<'r> Conversation<'r> {
         let ask = self.ask();
         match result {
             Ok(times)
-                if known.echo == AdapterEcho::Auto
+                if known.echo == OwnEcho::Unknown
                     && unit_of(&ask).is_some()
                     && ask.request.expected().may_repeat_request() =>
             {
@@ -109,7 +109,7 @@ impl<'r> Conversation<'r> {
     /// If it has not, the request went out, and it is not known whether the unit took it.
     fn looked_after<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, times: Times) {
         let ask = self.ask();
-        let (AdapterEcho::Auto | AdapterEcho::Present, Some(unit)) = (known.echo, unit_of(&ask)) else {
+        let (OwnEcho::Unknown | OwnEcho::Present, Some(unit)) = (known.echo, unit_of(&ask)) else {
             return self.end_attempt(now, known, Ok(times));
         };
         known.master.still_owed(times.ended, unit, &ask.request, ask.timeout);
@@ -127,7 +127,7 @@ impl<'r> Conversation<'r> {
         result: Result<Times, Slip>,
     ) {
         let is_last = self.tried.looks >= LOOKS;
-        if known.echo != AdapterEcho::Auto {
+        if known.echo != OwnEcho::Unknown {
             self.state = State::Passing;
             return;
         }
@@ -238,7 +238,7 @@ impl<'r> Conversation<'r> {
         let result = if is_ours {
             Ok(times)
         } else {
-            match (unit_of(&ask), self.answer.answer()) {
+            match (unit_of(&ask), self.answer.whole()) {
                 (Some(unit), Some(answer)) => self.came.set(Adu::answer(unit, &answer).as_bytes()),
                 _ => self.came.clear(),
             }

@@ -12,9 +12,9 @@ pub(super) const LOOKS: u32 = 3;
 
 /// What is known about the adapter sending our own bytes back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum AdapterEcho {
-    /// Find out.
-    Auto,
+pub enum OwnEcho {
+    /// Nothing yet: it is found out.
+    Unknown,
     /// It does: the request is taken off before every answer.
     Present,
     /// It does not.
@@ -25,16 +25,16 @@ impl<const U: usize, const P: usize> Known<U, P> {
     /// Keeps what an exchange has shown about the adapter and the line: why `ask` was not answered, if it was not, so many
     /// `bytes` that came in the place of the answer, and what was seen beside it.
     pub(super) fn learn(&mut self, ask: &Ask<'_>, failure: Option<Unanswered>, bytes: usize, tally: Tally) {
-        if self.given_echo != AdapterEcho::Auto {
+        if self.given_echo != OwnEcho::Unknown {
             return;
         }
         let is_broadcast = ask.destination == Destination::Broadcast;
-        if tally.own_echo > 0 && (self.echo == AdapterEcho::Auto || !is_broadcast) {
-            self.echo = AdapterEcho::Present;
+        if tally.own_echo > 0 && (self.echo == OwnEcho::Unknown || !is_broadcast) {
+            self.echo = OwnEcho::Present;
             self.master.strip_echo(true);
             return;
         }
-        if self.echo == AdapterEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
+        if self.echo == OwnEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
             return;
         }
         let silent = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= ask.request.adu_len());
@@ -47,10 +47,10 @@ impl<const U: usize, const P: usize> Known<U, P> {
                 Some(_) => false,
             };
         match self.echo {
-            AdapterEcho::Auto if clean => self.echo = AdapterEcho::Absent,
+            OwnEcho::Unknown if clean => self.echo = OwnEcho::Absent,
             // It did not echo this time: to be looked at again before anything depends on it.
-            AdapterEcho::Present if clean && failure.is_none() => {
-                self.echo = AdapterEcho::Auto;
+            OwnEcho::Present if clean && failure.is_none() => {
+                self.echo = OwnEcho::Unknown;
                 self.master.strip_echo(false);
             }
             _ => {}

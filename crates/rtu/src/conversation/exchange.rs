@@ -6,7 +6,7 @@ use super::first_contact::Put;
 use super::known::{Ask, Known};
 use super::outcome::{Exchange, Slip, Times, Unanswered};
 use super::probes::Probe;
-use super::{Conversation, Polled, State, Step};
+use super::{Conversation, Polled, State};
 use crate::{
     Adu, Answer, AnswerError, Destination, Event, ExceptionCode, Instant, Master, Meaning, Request, Tally, UnitAddress,
 };
@@ -100,6 +100,10 @@ impl<'r> Conversation<'r> {
 
     /// What has become of the request in flight by `now`.
     pub(super) fn poll<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) -> Polled {
+        let asked = match self.ask().request {
+            Request::Read { count, .. } => count,
+            _ => u16::MAX,
+        };
         let State::InFlight(flight) = &mut self.state else { return Polled::Over };
         // What is queued already is no answer, and the line was not silent while it came.
         if !flight.listened {
@@ -133,7 +137,7 @@ impl<'r> Conversation<'r> {
             }
             Some(Event::Answer(answer)) => {
                 if flight.purpose.keeps_the_answer() {
-                    self.answer.set(expected, &answer);
+                    self.answer.set(expected, &answer, asked);
                 }
                 None
             }
@@ -174,19 +178,18 @@ impl<'r> Conversation<'r> {
         result: Result<Times, Slip>,
     ) {
         flight.tally = known.master.take_tally();
-        self.state = State::Heard(flight, result);
+        self.state = State::Over(flight, result);
     }
 
-    /// Says what the request came to.
-    pub(super) fn tell(&self) -> Step<'_, 'r> {
-        let State::Heard(flight, result) = &self.state else { return Step::LetPass };
+    /// What the request came to, for who keeps figures.
+    pub(super) fn exchange(&self, flight: &Flight<'r>, result: &Result<Times, Slip>) -> Exchange<'r> {
         let (sent, ended, failure, bytes) = match result {
             Ok(times) => (Some(times.sent), times.ended, None, 0),
             Err(slip) => (slip.sent, slip.ended, Some(slip.why), self.came.as_slice().len()),
         };
         let Ask { destination, request, .. } = flight.ask;
         let (timeout, tally) = (flight.timeout, flight.tally);
-        Step::Heard(Exchange { destination, request, timeout, sent, ended, failure, bytes, tally })
+        Exchange { destination, request, timeout, sent, ended, failure, bytes, tally }
     }
 
     /// Keeps what `flight` has taught.

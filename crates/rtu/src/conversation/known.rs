@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::echo::AdapterEcho;
+use super::echo::OwnEcho;
 use super::first_contact::Put;
 use super::fresh_words::FreshWords;
 use super::longer_reads::Longer;
@@ -98,9 +98,9 @@ pub struct Known<const UNITS: usize = 247, const PLACES: usize = 1024> {
     pub(super) master: Master,
     format: SerialFormat,
     /// What the user knows about the adapter.
-    pub(super) given_echo: AdapterEcho,
+    pub(super) given_echo: OwnEcho,
     /// What is known by now about the one that is plugged in.
-    pub(super) echo: AdapterEcho,
+    pub(super) echo: OwnEcho,
     pub(super) units: Units<UNITS>,
     /// Which reads can be asked in a longer form.
     pub(super) longer: Longer<PLACES>,
@@ -119,7 +119,7 @@ pub struct Known<const UNITS: usize = 247, const PLACES: usize = 1024> {
 impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
     /// Of a line of `format` that is not open yet. `chance` tells two masters on one line apart: any number that another
     /// has not.
-    pub fn new(format: SerialFormat, echo: AdapterEcho, chance: u64) -> Self {
+    pub fn new(format: SerialFormat, echo: OwnEcho, chance: u64) -> Self {
         Self {
             master: Master::new(&format),
             format,
@@ -143,10 +143,10 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             self.master = Master::with_silence(Duration::ZERO);
         }
         self.echo = match self.given_echo {
-            AdapterEcho::Auto if !line.may_echo => AdapterEcho::Absent,
+            OwnEcho::Unknown if !line.may_echo => OwnEcho::Absent,
             given => given,
         };
-        self.master.strip_echo(self.echo == AdapterEcho::Present);
+        self.master.strip_echo(self.echo == OwnEcho::Present);
         // A connection of our own whose frames are told apart carries nobody else's answers.
         if !line.gapless {
             self.master.opened(now);
@@ -172,7 +172,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
     }
 
     /// What is known about the adapter that is plugged in.
-    pub const fn echo(&self) -> AdapterEcho {
+    pub const fn echo(&self) -> OwnEcho {
         self.echo
     }
 
@@ -270,7 +270,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         {
             return Next::AskApart(count);
         }
-        if self.echo == AdapterEcho::Auto && (ask.request.expected().may_repeat_request() || in_quarantine) {
+        if self.echo == OwnEcho::Unknown && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;
         }
         let in_doubt = match ask.request {

@@ -267,21 +267,29 @@ pub(super) struct Kept {
     pdu: [u8; MAX_PDU],
     len: usize,
     expected: Option<Expected>,
+    /// How many words of it were asked for.
+    asked: u16,
 }
 
 impl Kept {
-    pub(super) const NONE: Self = Self { pdu: [0; MAX_PDU], len: 0, expected: None };
+    pub(super) const NONE: Self = Self { pdu: [0; MAX_PDU], len: 0, expected: None, asked: 0 };
 
-    pub(super) fn set(&mut self, expected: Expected, answer: &Answer<'_>) {
+    pub(super) fn set(&mut self, expected: Expected, answer: &Answer<'_>, asked: u16) {
         self.len = answer.put(&mut self.pdu);
-        self.expected = Some(expected);
+        (self.expected, self.asked) = (Some(expected), asked);
     }
 
     pub(super) fn clear(&mut self) {
         self.expected = None;
     }
 
+    /// With as many words as were asked for.
     pub(super) fn answer(&self) -> Option<Answer<'_>> {
+        self.whole().map(|answer| answer.shortened(self.asked))
+    }
+
+    /// As it came.
+    pub(super) fn whole(&self) -> Option<Answer<'_>> {
         self.expected?.parse(&self.pdu[..self.len]).ok()
     }
 
