@@ -6,7 +6,8 @@ use std::fmt;
 use std::time::Duration;
 
 use drivebus_rtu::{
-    AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table, Unanswered,
+    AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table,
+    Unanswered,
 };
 
 use crate::error::kind::ErrorKind;

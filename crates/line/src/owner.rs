@@ -9,9 +9,7 @@ pub(crate) mod opener;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drivebus_rtu::{
-    Counts, Exchange, Instant, Known, Opened, OwnEcho, Request, SerialFormat, Tally, UnitAddress,
-};
+use drivebus_rtu::{Counts, Exchange, Instant, Known, Opened, OwnEcho, Request, SerialFormat, Tally, UnitAddress};
 
 use crate::ask::Ask;
 use crate::error::Failure;
@@ -147,10 +145,8 @@ impl Owner {
     }
 
     fn take_line(&mut self, line: Box<dyn Line>) {
-        let opened = Opened::new()
-            .may_echo(line.may_echo())
-            .may_have_others(line.may_have_others())
-            .gapless(line.gapless());
+        let opened =
+            Opened::new().may_echo(line.may_echo()).may_have_others(line.may_have_others()).gapless(line.gapless());
         self.known.opened(line.now(), &opened);
         self.clock = line.clock();
         self.lumps = Lumps::of(line.as_ref());

@@ -533,9 +533,7 @@ impl<'r> Conversation<'r> {
 
     fn outcome(&self, result: Result<Times, Slip>) -> Outcome<'_> {
         match result {
-            Ok(times) => {
-                Outcome::Answered { times, answer: self.answer.answer() }
-            }
+            Ok(times) => Outcome::Answered { times, answer: self.answer.answer() },
             Err(Slip { why, sent, ended }) => {
                 let is_shown = matches!(
                     why,

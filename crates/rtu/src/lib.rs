@@ -32,7 +32,7 @@ pub use address::{AddressError, Destination, UnitAddress};
 pub use agreement::Agreement;
 pub use answer::{Answer, AnswerError, Head};
 pub use conversation::{
-    OwnEcho, Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, Question, Step, Times,
+    Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, OwnEcho, Question, Step, Times,
     Unanswered, Urgency,
 };
 pub use crc::crc16;
@@ -52,3 +52,6 @@ pub use sniffer::{Heard, Role, Sniffer};
 pub use table::Table;
 pub use time::Instant;
 pub use words::Words;
+
+#[cfg(test)]
+extern crate std;

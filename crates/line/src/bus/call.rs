@@ -123,10 +123,10 @@ impl<'b, 'r> Call<'b, 'r> {
             self.bus.queue.goes_on();
             ends
         };
-        let mut talk = Talk::new(Conversation::new(self.question(), &self.bus.words), &self.ask);
+        let is_wanted = || self.is_wanted();
+        let mut talk = Talk::new(Conversation::new(self.question(), &self.bus.words), &self.ask, &is_wanted);
         let mut owner = self.bus.lock();
         loop {
-            talk.call.is_wanted(self.is_wanted());
             let now = self.bus.now_of(&owner);
             let came_on = match owner.go_on(&mut talk, now, give_up, take) {
                 Then::Done(result) => return self.told(&mut owner, result),
@@ -202,9 +202,7 @@ impl<'b, 'r> Call<'b, 'r> {
                 return Err(Failure::Closed);
             }
             owner.prepare(give_up)?;
-            let Some(failure) =
-                self.bus.wills.keeps_from(self.unit).filter(|_| self.priority != Priority::Stop)
-            else {
+            let Some(failure) = self.bus.wills.keeps_from(self.unit).filter(|_| self.priority != Priority::Stop) else {
                 return Ok(owner);
             };
             drop(owner);

@@ -34,13 +34,15 @@ pub(crate) enum Then {
 pub(crate) struct Talk<'a, 'r> {
     pub(crate) call: Conversation<'r>,
     pub(crate) ask: &'a Ask<'r>,
+    /// Whether somebody still waits for it.
+    is_wanted: &'a dyn Fn() -> bool,
     /// The last time, and the one before.
     cuts: [Option<Failure>; 2],
 }
 
 impl<'a, 'r> Talk<'a, 'r> {
-    pub(crate) fn new(call: Conversation<'r>, ask: &'a Ask<'r>) -> Self {
-        Self { call, ask, cuts: [None, None] }
+    pub(crate) fn new(call: Conversation<'r>, ask: &'a Ask<'r>, is_wanted: &'a dyn Fn() -> bool) -> Self {
+        Self { call, ask, is_wanted, cuts: [None, None] }
     }
 
     /// It is cut short at `now` by `failure`.
@@ -224,6 +226,7 @@ impl Owner {
                     if is_given_up {
                         talk.cut_short(self, now, Failure::Interrupted);
                     }
+                    talk.call.is_wanted((talk.is_wanted)());
                     yields = self.yields(talk.ask);
                     self.prepare_next(talk);
                 }

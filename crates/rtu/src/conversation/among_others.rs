@@ -187,11 +187,8 @@ impl<const U: usize, const P: usize> Known<U, P> {
                 free.push(words, shape(&read));
             }
         }
-        let one = if self.master.has_others(now, unit) {
-            self.by_chance(free.all())
-        } else {
-            free.all().first().copied()
-        };
+        let one =
+            if self.master.has_others(now, unit) { self.by_chance(free.all()) } else { free.all().first().copied() };
         one.map(|(words, _)| words)
     }
 

@@ -24,11 +24,7 @@ impl<'r> Conversation<'r> {
     ///
     /// A read that only this call left open is asked again as it is: whichever of the two is answered, it is this
     /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
-    pub(super) fn decide<const U: usize, const P: usize>(
-        &mut self,
-        now: Instant,
-        known: &mut Known<U, P>,
-    ) {
+    pub(super) fn decide<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) {
         let ask = self.ask();
         let in_time = self.course.is_in_time(now);
         if !self.course.sends() {

@@ -7,7 +7,7 @@ use super::first_contact::Put;
 use super::known::{Ask, Known};
 use super::outcome::{Slip, Times, Unanswered};
 use super::probes::Probe;
-use super::{OwnEcho, Conversation, State, Urgency};
+use super::{Conversation, OwnEcho, State, Urgency};
 use crate::{Adu, Answer, Instant, Request};
 
 impl<'r> Conversation<'r> {
@@ -215,7 +215,9 @@ impl<'r> Conversation<'r> {
         match result {
             Err(slip) if !slip.why.is_refused() => return self.apart_ended(now, known, proof, Err(slip)),
             Err(_) => {
-                if let (Request::Read { table, address, count: words, .. }, Some(unit)) = (proof.request, unit_of(proof)) {
+                if let (Request::Read { table, address, count: words, .. }, Some(unit)) =
+                    (proof.request, unit_of(proof))
+                {
                     let refused = if words > count { words } else { u16::MAX };
                     known.longer.refused(unit, (table, address), refused);
                 }

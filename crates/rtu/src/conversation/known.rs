@@ -8,9 +8,7 @@ use super::fresh_words::FreshWords;
 use super::longer_reads::Longer;
 use super::probes::{Probe, Tried};
 use super::units::Units;
-use crate::{
-    Attribution, Destination, Instant, Master, Patience, Request, SerialFormat, Table, Tally, UnitAddress,
-};
+use crate::{Attribution, Destination, Instant, Master, Patience, Request, SerialFormat, Table, Tally, UnitAddress};
 
 /// One request on its way.
 #[derive(Debug, Clone, Copy)]
@@ -262,8 +260,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             return next;
         }
         // A unit that returns echoes proves more by one: that it has caught up.
-        let may_be_mistaken =
-            if in_quarantine { self.knows_no_echo(unit) } else { attribution.may_be_mistaken() };
+        let may_be_mistaken = if in_quarantine { self.knows_no_echo(unit) } else { attribution.may_be_mistaken() };
         if apart
             && may_be_mistaken
             && let Some(count) = self.longer.form(&self.master, now, unit, &ask.request)
@@ -327,7 +324,9 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
     /// told `apart`, one word more than that asks for.
     pub(super) fn look(&self, now: Instant, ask: &Ask<'_>, apart: bool) -> Option<Request<'static>> {
         let (address, count) = match ask.request {
-            Request::Read { table: Table::Holding, address, count, .. } if apart && count < super::probes::MAX_WORDS => {
+            Request::Read { table: Table::Holding, address, count, .. }
+                if apart && count < super::probes::MAX_WORDS =>
+            {
                 (address, count + 1)
             }
             Request::Read { table: Table::Holding, address, .. } => (address, 1),

@@ -142,7 +142,12 @@ mod tests {
     #[test]
     fn the_shortest_length_that_nothing_owed_has_even_cut_short() {
         let form = |owed_counts: &[u16], count| {
-            Longer::<REMEMBERED>::new().form(&owed(owed_counts), Instant::ZERO, UNIT, &Request::read(100, count).unwrap())
+            Longer::<REMEMBERED>::new().form(
+                &owed(owed_counts),
+                Instant::ZERO,
+                UNIT,
+                &Request::read(100, count).unwrap(),
+            )
         };
         assert_eq!(form(&[1], 1), Some(2));
         assert_eq!(form(&[1, 2, 4], 1), Some(5), "four words cut short could be three");
@@ -153,7 +158,11 @@ mod tests {
         let write = Request::write(100, 1);
         assert_eq!(Longer::<REMEMBERED>::new().form(&owed(&[1]), Instant::ZERO, UNIT, &write), None);
         let last = Request::read(0xFFFF, 1).unwrap();
-        assert_eq!(Longer::<REMEMBERED>::new().form(&owed(&[1]), Instant::ZERO, UNIT, &last), None, "no register comes after it");
+        assert_eq!(
+            Longer::<REMEMBERED>::new().form(&owed(&[1]), Instant::ZERO, UNIT, &last),
+            None,
+            "no register comes after it"
+        );
     }
 
     /// Out of quarantine another length will do where no greater one is given.

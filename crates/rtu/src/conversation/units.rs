@@ -1,8 +1,8 @@
 //! What is known of each unit, in a table without a heap.
 
+use super::among_others::Watched;
 use super::dead_units::Life;
 use super::first_contact::Met;
-use super::among_others::Watched;
 use super::probes::Probing;
 use crate::UnitAddress;
 

@@ -1,78 +1,65 @@
 //! How long a call may go on, how often, and what one attempt leaves to the next: on paper, without a line.
 
-use std::sync::Arc;
-
-use drivebus_rtu::{AnswerError, ExceptionCode, FrameError, SerialFormat};
-
 use super::*;
-use crate::line::PortError;
-use crate::nobody;
-use crate::options::AdapterEcho;
-use crate::owner::Owner;
-use crate::owner::resync::FreshWords;
+use crate::conversation::outcome::Cut;
+use crate::{AnswerError, ExceptionCode, FrameError};
 
 const TIMEOUT: Duration = Duration::from_millis(100);
-const UNIT: UnitAddress = UnitAddress::MIN;
 
-const SILENCE: Failure = Failure::NoAnswer { timeout: TIMEOUT, attempts: 1 };
-const DAMAGE: Failure = Failure::Corrupt(FrameError::Crc { computed: 1, received: 2 });
-const ANOTHER_UNITS: Failure = Failure::Wrong(AnswerError::Unit { asked: 1, came: 2 });
-const REFUSAL: Failure = Failure::Refused { function: 3, code: ExceptionCode::ILLEGAL_ADDRESS };
-
-fn port(kind: PortErrorKind) -> Failure {
-    Failure::Port(PortError::new(kind, "port", "trouble"))
-}
+const SILENCE: Unanswered = Unanswered::NoAnswer { timeout: TIMEOUT, attempts: 1 };
+const DAMAGE: Unanswered = Unanswered::Corrupt(FrameError::Crc { computed: 1, received: 2 });
+const ANOTHER_UNITS: Unanswered = Unanswered::Wrong(AnswerError::Unit { asked: 1, came: 2 });
+const REFUSAL: Unanswered = Unanswered::Refused { function: 3, code: ExceptionCode::ILLEGAL_ADDRESS };
 
 /// After these a read is asked again: the same may well succeed the next time.
-fn passing() -> Vec<Failure> {
-    let others = [Failure::Busy { timeout: TIMEOUT }, Failure::Doubtful, Failure::Disagreeing { asked: 4 }];
-    [port(PortErrorKind::Lost)].into_iter().chain(others).chain(unanswered()).collect()
-}
+const PASSING: [Unanswered; 8] = [
+    Unanswered::CutShort(Cut::Lost),
+    Unanswered::Busy { timeout: TIMEOUT },
+    Unanswered::Doubtful,
+    Unanswered::Disagreeing { asked: 4 },
+    SILENCE,
+    Unanswered::Unreached,
+    DAMAGE,
+    ANOTHER_UNITS,
+];
 
 /// The request went out, and no right answer came.
-fn unanswered() -> [Failure; 4] {
-    [SILENCE, Failure::Unreached, DAMAGE, ANOTHER_UNITS]
-}
+const UNANSWERED: [Unanswered; 4] = [SILENCE, Unanswered::Unreached, DAMAGE, ANOTHER_UNITS];
 
 /// After these asking again would help nobody.
-fn final_ones() -> Vec<Failure> {
-    let ports = [PortErrorKind::NotFound, PortErrorKind::Busy, PortErrorKind::Closed, PortErrorKind::Other];
-    let others = [
-        REFUSAL,
-        Failure::Closed,
-        Failure::Interrupted,
-        Failure::Reopened,
-        Failure::NotAsked { left: TIMEOUT },
-        Failure::NotTaken { times: 1, shows: vec![7] },
-    ];
-    ports.into_iter().map(port).chain(others).collect()
-}
+const FINAL: [Unanswered; 6] = [
+    Unanswered::CutShort(Cut::Unusable),
+    Unanswered::CutShort(Cut::GivenUp),
+    REFUSAL,
+    Unanswered::Reopened,
+    Unanswered::NotAsked { left: TIMEOUT },
+    Unanswered::NotTaken { times: 1 },
+];
 
 fn at(millis: u64) -> Instant {
     Instant::ZERO + Duration::from_millis(millis)
 }
 
-fn failed(failure: Failure, ended: impl Into<Option<Instant>>) -> CallError {
-    let (request, ended) = (Vec::new(), ended.into());
-    CallError { failure, destination: UNIT.into(), request, raw: Vec::new(), sent: None, ended }
+fn failed(why: Unanswered, ended: Instant) -> Slip {
+    Slip { why, sent: None, ended }
 }
 
 /// Asks, and meets with `failure` before any time has passed: whether there is another attempt.
-fn asks_and_fails(course: &mut Course, failure: Failure) -> bool {
+fn asks_and_fails(course: &mut Course, failure: Unanswered) -> bool {
     let asked = course.asked();
     course.asks(at(0));
     course.goes_on(&failed(failure, at(0)), asked, false)
 }
 
 /// An attempt that ends before the question: whether there is another one.
-fn fails_before_asking(course: &mut Course, failure: Failure) -> bool {
+fn fails_before_asking(course: &mut Course, failure: Unanswered) -> bool {
     let asked = course.asked();
     course.goes_on(&failed(failure, at(0)), asked, false)
 }
 
 /// How often may be asked when all ends in `failure`.
-fn questions(course: &mut Course, failure: &Failure) -> u32 {
-    let more = (0..100).take_while(|_| asks_and_fails(course, failure.clone())).count();
+fn questions(course: &mut Course, failure: Unanswered) -> u32 {
+    let more = (0..100).take_while(|_| asks_and_fails(course, failure)).count();
     assert!(more < 100, "without end");
     course.asked()
 }
@@ -80,9 +67,9 @@ fn questions(course: &mut Course, failure: &Failure) -> u32 {
 #[test]
 fn silence_costs_a_retry_and_damage_half_of_one() {
     for retries in 0..5 {
-        let questions = |failure| questions(&mut Course::new(TIMEOUT, retries), &failure);
+        let questions = |failure| questions(&mut Course::new(TIMEOUT, retries), failure);
         assert_eq!(questions(SILENCE), retries + 1, "{retries} retries");
-        assert_eq!(questions(Failure::Unreached), retries + 1, "{retries} retries");
+        assert_eq!(questions(Unanswered::Unreached), retries + 1, "{retries} retries");
         assert_eq!(questions(DAMAGE), 2 * retries + 1, "{retries} retries");
         assert_eq!(questions(ANOTHER_UNITS), 2 * retries + 1, "{retries} retries");
     }
@@ -94,11 +81,11 @@ fn silence_costs_a_retry_and_damage_half_of_one() {
 
 #[test]
 fn only_what_may_succeed_the_next_time_is_asked_again() {
-    for failure in passing() {
-        assert!(asks_and_fails(&mut Course::new(TIMEOUT, 1), failure.clone()), "{failure:?}");
+    for failure in PASSING {
+        assert!(asks_and_fails(&mut Course::new(TIMEOUT, 1), failure), "{failure:?}");
     }
-    for failure in final_ones() {
-        assert!(!asks_and_fails(&mut Course::new(TIMEOUT, 1), failure.clone()), "{failure:?}");
+    for failure in FINAL {
+        assert!(!asks_and_fails(&mut Course::new(TIMEOUT, 1), failure), "{failure:?}");
     }
 }
 
@@ -110,13 +97,13 @@ fn attempts_that_end_with_a_probe_are_bounded_apart() {
         for _ in 0..asked {
             assert!(asks_and_fails(&mut course, SILENCE));
         }
-        let went_on = [(); 6].map(|()| fails_before_asking(&mut course, Failure::Doubtful));
+        let went_on = [(); 6].map(|()| fails_before_asking(&mut course, Unanswered::Doubtful));
         assert_eq!(went_on, [true, true, true, true, false, false], "asked {asked} times");
     }
     // None of them was a question: all retries are left.
     let mut course = Course::new(TIMEOUT, 2);
     assert!([SILENCE, DAMAGE, SILENCE].into_iter().all(|failure| fails_before_asking(&mut course, failure)));
-    assert_eq!(questions(&mut course, &SILENCE), 3);
+    assert_eq!(questions(&mut course, SILENCE), 3);
 }
 
 #[test]
@@ -128,7 +115,7 @@ fn eight_requests_are_allowed_for_each_question_the_last_look_at_the_adapter_inc
             assert!(course.sends(), "{sent} of {allowed}");
         }
         assert!(!course.sends() && !course.sends());
-        assert!(!fails_before_asking(&mut course, Failure::Doubtful), "nothing is left to ask with");
+        assert!(!fails_before_asking(&mut course, Unanswered::Doubtful), "nothing is left to ask with");
     }
 }
 
@@ -136,9 +123,9 @@ fn eight_requests_are_allowed_for_each_question_the_last_look_at_the_adapter_inc
 fn there_is_another_attempt_as_long_as_one_request_is_left() {
     let mut course = Course::new(TIMEOUT, 0);
     assert!((0..6).all(|_| course.sends()));
-    assert!(fails_before_asking(&mut course, Failure::Doubtful));
+    assert!(fails_before_asking(&mut course, Unanswered::Doubtful));
     assert!(course.sends());
-    assert!(!fails_before_asking(&mut course, Failure::Doubtful));
+    assert!(!fails_before_asking(&mut course, Unanswered::Doubtful));
 }
 
 /// A write and the reads that look for its words are one call.
@@ -154,7 +141,7 @@ fn what_goes_on_with_something_else_has_only_the_requests_that_are_left() {
     assert!(!course.sends());
     let mut course = Course::new(TIMEOUT, 0);
     course.go_on_with(TIMEOUT, 2);
-    assert_eq!(questions(&mut course, &SILENCE), 3);
+    assert_eq!(questions(&mut course, SILENCE), 3);
 }
 
 /// The time-outs of all questions once before the first of them, and once from it on.
@@ -177,7 +164,7 @@ fn the_time_is_that_of_all_time_outs_twice() {
 
 #[test]
 fn no_attempt_begins_when_the_time_is_over() {
-    for (ended, goes_on) in [(Some(at(199)), true), (Some(at(200)), false), (None, false)] {
+    for (ended, goes_on) in [(at(199), true), (at(200), false)] {
         let mut course = Course::new(TIMEOUT, 1);
         course.asks(at(0));
         assert_eq!(course.goes_on(&failed(SILENCE, ended), 0, false), goes_on, "{ended:?}");
@@ -189,18 +176,18 @@ fn no_attempt_begins_when_the_time_is_over() {
 fn what_has_to_be_repeated_is_granted_once() {
     let mut course = Course::new(TIMEOUT, 0);
     course.takes_more(2, TIMEOUT);
-    assert_eq!(questions(&mut course, &SILENCE), 3);
+    assert_eq!(questions(&mut course, SILENCE), 3);
 
     let mut course = Course::new(TIMEOUT, 0);
     for more in [2, 2, 1] {
         course.takes_more(more, TIMEOUT);
     }
-    assert_eq!(questions(&mut course, &SILENCE), 3, "the same is granted once");
+    assert_eq!(questions(&mut course, SILENCE), 3, "the same is granted once");
 
     let mut course = Course::new(TIMEOUT, 0);
     course.takes_more(2, TIMEOUT);
     course.takes_more(3, TIMEOUT);
-    assert_eq!(questions(&mut course, &SILENCE), 4);
+    assert_eq!(questions(&mut course, SILENCE), 4);
 
     // Before the first look, and after it.
     let mut course = Course::new(TIMEOUT, 0);
@@ -222,92 +209,51 @@ fn that_a_write_was_not_proven_is_said_once() {
     assert!(!course.take_unproven());
 }
 
-fn owner() -> Owner {
-    let words = Arc::new(FreshWords::new());
-    let mut owner = Owner::new(nobody::opener(), SerialFormat::DEFAULT, AdapterEcho::Absent, words, Arc::default());
-    owner.open(&mut || false).unwrap();
-    owner
-}
+/// What a unit was asked, and over which connection.
+const ASKED: Asked = (7, 2);
 
-/// `request` was put to `destination` in this form, and ended so.
-fn after(
-    owner: &Owner,
-    destination: Destination,
-    request: &Request<'_>,
-    form: Form,
-    result: Result<Done, Failure>,
-) -> Course {
-    let ask = Ask {
-        destination,
-        request,
-        timeout: TIMEOUT,
-        learns: false,
-        gap: Duration::ZERO,
-        in_doubt: false,
-        yields: None,
-        meanings: None,
-    };
+/// A read was put in this form, and ended so.
+fn after(form: Form, failure: Option<Unanswered>) -> Course {
     let mut course = Course::new(TIMEOUT, 1);
-    let result = result.map_err(|failure| Box::new(failed(failure, at(0))));
-    course.leaves_open(&ask, form, &result, |unit| owner.asked(unit));
+    course.leaves_open(form, failure, Some(ASKED));
     course
-}
-
-fn lost_read(owner: &Owner, form: Form) -> Course {
-    after(owner, UNIT.into(), &Request::read(100, 1).unwrap(), form, Err(SILENCE))
 }
 
 /// A read that was left open, and nothing else: the answer is to the same question, whenever it comes.
 #[test]
 fn only_a_read_that_brought_no_answer_may_be_asked_again_as_it_was() {
-    let owner = owner();
-    let read = Request::read(100, 1).unwrap();
     for form in [Form::Plain, Form::Apart(3), Form::Repeated] {
-        for failure in unanswered() {
-            let mut course = after(&owner, UNIT.into(), &read, form, Err(failure));
-            assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(form));
-            assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "it is said once");
+        for failure in UNANSWERED {
+            let mut course = after(form, Some(failure));
+            assert_eq!(course.owes_only_this(ASKED), Some(form));
+            assert_eq!(course.owes_only_this(ASKED), None, "it is said once");
         }
     }
-    let answered = passing().into_iter().filter(|failure| !unanswered().contains(failure));
-    for failure in answered.chain(final_ones()) {
-        let mut course = after(&owner, UNIT.into(), &read, Form::Plain, Err(failure.clone()));
-        assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "{failure:?}");
+    for failure in PASSING.into_iter().filter(|failure| !UNANSWERED.contains(failure)).chain(FINAL) {
+        assert_eq!(after(Form::Plain, Some(failure)).owes_only_this(ASKED), None, "{failure:?}");
     }
-    let done = Done { sent: at(0), ended: at(10) };
-    assert_eq!(after(&owner, UNIT.into(), &read, Form::Plain, Ok(done)).owes_only_this(|| owner.asked(UNIT)), None);
-    // What acts may have acted.
-    for request in [Request::write(100, 5), Request::write_many(100, &[5]).unwrap(), Request::echo(7)] {
-        let mut course = after(&owner, UNIT.into(), &request, Form::Plain, Err(SILENCE));
-        assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "{request:?}");
-    }
-    let mut broadcast = after(&owner, Destination::Broadcast, &read, Form::Plain, Err(SILENCE));
-    assert_eq!(broadcast.owes_only_this(|| owner.asked(UNIT)), None);
+    assert_eq!(after(Form::Plain, None).owes_only_this(ASKED), None, "it was answered");
+    // What acts may have acted, and nobody answers a broadcast.
+    let mut course = Course::new(TIMEOUT, 1);
+    course.leaves_open(Form::Plain, Some(SILENCE), None);
+    assert_eq!(course.owes_only_this(ASKED), None);
 }
 
 #[test]
 fn who_asked_something_else_in_between_may_have_left_that_open() {
-    let owner = owner();
-    let mut course = lost_read(&owner, Form::Plain);
-    owner.stats().units.entry(UNIT).or_default().requests += 1;
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "another request");
-    let mut course = lost_read(&owner, Form::Plain);
-    owner.stats().reconnects += 1;
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "another connection");
-    let mut course = lost_read(&owner, Form::Plain);
-    owner.stats().units.entry(UnitAddress::MAX).or_default().requests += 1;
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(Form::Plain), "another unit's is no rival");
+    for other in [(ASKED.0 + 1, ASKED.1), (ASKED.0, ASKED.1 + 1)] {
+        assert_eq!(after(Form::Plain, Some(SILENCE)).owes_only_this(other), None, "{other:?}");
+    }
 }
 
 #[test]
 fn a_question_that_is_repeated_goes_on_only_where_nothing_else_is_owed() {
-    let owner = owner();
     let mut course = Course::new(TIMEOUT, 0);
-    course.repeats(false, || owner.asked(UNIT));
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None);
-    course.repeats(true, || owner.asked(UNIT));
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), Some(Form::Repeated));
-    let mut course = lost_read(&owner, Form::Apart(2));
+    course.repeats(false, ASKED);
+    assert_eq!(course.owes_only_this(ASKED), None);
+    course.repeats(true, ASKED);
+    assert_eq!(course.owes_only_this(ASKED), Some(Form::Repeated));
+    let mut course = after(Form::Apart(2), Some(SILENCE));
     course.asks_otherwise();
-    assert_eq!(course.owes_only_this(|| owner.asked(UNIT)), None, "it is put in another way");
+    assert_eq!(course.owes_only_this(ASKED), None, "it is put in another way");
 }

@@ -1,17 +1,17 @@
 //! What is sent to a unit in quarantine, attempt by attempt, as the unit makes itself known: on paper, without a line.
 
 use std::collections::BTreeSet;
-
-use drivebus_rtu::{Duration, SerialFormat};
+use std::vec::Vec;
 
 use super::*;
+use crate::{Duration, FreshWords, SerialFormat};
 
 const UNIT: UnitAddress = UnitAddress::MIN;
 
 /// A unit that left reads of these lengths open, and what is known of it.
 struct Doubt {
     master: Master,
-    resync: Resync,
+    probing: Probing,
     tried: Tried,
 }
 
@@ -33,18 +33,18 @@ impl Doubt {
             let open = Request::read(7, count).unwrap();
             master.still_owed(Instant::ZERO, UNIT, &open, Duration::ZERO);
         }
-        Self { master, resync: Resync::default(), tried: Tried::default() }
+        Self { master, probing: Probing::default(), tried: Tried::default() }
     }
 
     /// One that answered a read of register 7 before.
     fn about_one_that_lives() -> Self {
         let mut doubt = Self::about([1]);
-        doubt.resync.answered(UNIT, &Request::read(7, 1).unwrap(), false);
+        doubt.probing.answered(&Request::read(7, 1).unwrap(), false);
         doubt
     }
 
     fn echoed(mut self, refused: bool) -> Self {
-        self.resync.answered(UNIT, &Request::echo(1), refused);
+        self.probing.answered(&Request::echo(1), refused);
         self
     }
 
@@ -56,10 +56,10 @@ impl Doubt {
 
     /// What goes out before `request`, of which nothing comes.
     fn before(&mut self, request: &Request<'_>, in_time: bool) -> Option<Probe> {
-        let probe = self.resync.probe(&self.master, Instant::ZERO, UNIT, request, &self.tried, in_time)?;
+        let probe = self.probing.probe(&self.master, Instant::ZERO, UNIT, request, &self.tried, in_time)?;
         self.tried.note(probe);
         if probe == Probe::Echo {
-            self.resync.silent_on_echo(UNIT);
+            self.probing.silent_on_echo();
         }
         Some(probe)
     }
@@ -78,14 +78,14 @@ impl Doubt {
 
 #[test]
 fn no_word_comes_twice_before_all_have_come() {
-    let fresh = FreshWords::new();
+    let fresh = FreshWords::beginning_at(0x3A17);
     let words: BTreeSet<u16> = (0..=u16::MAX).map(|_| fresh.next()).collect();
     assert_eq!(words.len(), 65_536);
 }
 
 #[test]
 fn only_the_word_that_was_given_out_last_is_the_latest() {
-    let fresh = FreshWords::new();
+    let fresh = FreshWords::beginning_at(0x3A17);
     let words = [fresh.next(), fresh.next()];
     assert_eq!(words.map(|word| fresh.is_latest(word)), [false, true]);
     let all = (0..=u16::MAX).filter(|&word| fresh.is_latest(word)).count();
@@ -114,7 +114,7 @@ fn a_unit_that_never_answered_is_sent_one_probe_an_attempt() {
     // Two reads are what the doubt is worth.
     assert_eq!(doubt.attempt(), [ECHO]);
     assert_eq!(doubt.attempt(), [ECHO]);
-    doubt.resync.is_sure(UNIT);
+    doubt.probing.is_sure();
     assert_eq!(doubt.attempt(), [other_read(100, 2)]);
 }
 
@@ -133,8 +133,14 @@ fn a_unit_that_was_not_silent_on_an_echo_is_echoed_again() {
     let mut doubt = Doubt::about([1]);
     for _ in 0..3 {
         doubt.again();
-        let probe =
-            doubt.resync.probe(&doubt.master, Instant::ZERO, UNIT, &Request::read(100, 1).unwrap(), &doubt.tried, true);
+        let probe = doubt.probing.probe(
+            &doubt.master,
+            Instant::ZERO,
+            UNIT,
+            &Request::read(100, 1).unwrap(),
+            &doubt.tried,
+            true,
+        );
         assert_eq!(probe, Some(ECHO));
     }
 }
@@ -142,7 +148,7 @@ fn a_unit_that_was_not_silent_on_an_echo_is_echoed_again() {
 #[test]
 fn a_unit_that_returns_echoes_is_echoed_twice_an_attempt_and_once_when_time_is_over() {
     let mut doubt = Doubt::about_one_that_lives().echoed(RETURNED);
-    assert!(!doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
+    assert!(!doubt.probing.knows_no_echo() && !doubt.probing.refuses_echoes());
     assert_eq!(doubt.attempt(), [ECHO, ECHO]);
     doubt = doubt.echoed(RETURNED);
     assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), [ECHO, ECHO]);
@@ -154,30 +160,30 @@ fn a_unit_that_returns_echoes_is_echoed_twice_an_attempt_and_once_when_time_is_o
 fn a_unit_that_returned_echoes_is_asked_a_read_after_five_silences() {
     let mut doubt = Doubt::about_one_that_lives().echoed(RETURNED);
     for _ in 0..4 {
-        doubt.resync.silent_on_echo(UNIT);
+        doubt.probing.silent_on_echo();
     }
     doubt = doubt.echoed(RETURNED);
     for _ in 0..4 {
-        assert!(!doubt.resync.knows_no_echo(UNIT), "four in a row are not enough");
-        doubt.resync.silent_on_echo(UNIT);
+        assert!(!doubt.probing.knows_no_echo(), "four in a row are not enough");
+        doubt.probing.silent_on_echo();
     }
-    assert!(!doubt.resync.knows_no_echo(UNIT));
-    doubt.resync.silent_on_echo(UNIT);
-    assert!(doubt.resync.knows_no_echo(UNIT));
+    assert!(!doubt.probing.knows_no_echo());
+    doubt.probing.silent_on_echo();
+    assert!(doubt.probing.knows_no_echo());
     assert_eq!(doubt.attempt(), [other_read(7, 2), ECHO]);
-    assert!(!doubt.echoed(RETURNED).resync.knows_no_echo(UNIT));
+    assert!(!doubt.echoed(RETURNED).probing.knows_no_echo());
 }
 
 /// Units that know no echo are ordinary: one silence, and a read comes first.
 #[test]
 fn a_unit_that_lives_and_never_returned_an_echo_is_asked_a_read() {
     let mut doubt = Doubt::about_one_that_lives();
-    assert!(!doubt.resync.knows_no_echo(UNIT));
+    assert!(!doubt.probing.knows_no_echo());
     assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)], "the register that is known to be readable");
-    assert!(doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
+    assert!(doubt.probing.knows_no_echo() && !doubt.probing.refuses_echoes());
     assert_eq!(doubt.attempt(), [other_read(7, 2), ECHO]);
     assert_eq!(doubt.attempt(), [ECHO], "two reads are what a doubt is worth");
-    doubt.resync.is_sure(UNIT);
+    doubt.probing.is_sure();
     assert_eq!(doubt.attempt_before(&Request::write(100, 5), true), [other_read(7, 2), ECHO]);
 }
 
@@ -185,18 +191,18 @@ fn a_unit_that_lives_and_never_returned_an_echo_is_asked_a_read() {
 #[test]
 fn a_unit_that_refuses_echoes_is_echoed_once_and_then_asked_a_read() {
     let mut doubt = Doubt::about_one_that_lives().echoed(REFUSED);
-    assert!(doubt.resync.knows_no_echo(UNIT) && doubt.resync.refuses_echoes(UNIT));
+    assert!(doubt.probing.knows_no_echo() && doubt.probing.refuses_echoes());
     assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)]);
     assert_eq!(doubt.attempt(), [ECHO, other_read(7, 2)]);
     assert_eq!(doubt.attempt(), [ECHO]);
     let doubt = doubt.echoed(RETURNED);
-    assert!(!doubt.resync.knows_no_echo(UNIT) && !doubt.resync.refuses_echoes(UNIT));
+    assert!(!doubt.probing.knows_no_echo() && !doubt.probing.refuses_echoes());
 }
 
 #[test]
 fn what_is_not_known_is_not_said() {
-    let resync = Resync::default();
-    assert!(!resync.knows_no_echo(UNIT) && !resync.refuses_echoes(UNIT));
+    let probing = Probing::default();
+    assert!(!probing.knows_no_echo() && !probing.refuses_echoes());
 }
 
 /// The shortest that no open answer could pass for, 16 words at the most, from a register that is known to be there.
@@ -204,10 +210,10 @@ fn what_is_not_known_is_not_said() {
 fn the_other_read_has_a_length_that_no_open_answer_has() {
     let silent = |counts: std::ops::RangeInclusive<u16>| {
         let mut doubt = Doubt::about(counts);
-        doubt.resync.silent_on_echo(UNIT);
+        doubt.probing.silent_on_echo();
         doubt
     };
-    let lives = |doubt: &mut Doubt, request: &Request<'_>, refused| doubt.resync.answered(UNIT, request, refused);
+    let lives = |doubt: &mut Doubt, request: &Request<'_>, refused| doubt.probing.answered(request, refused);
 
     let mut doubt = silent(1..=3);
     lives(&mut doubt, &Request::write(200, 1), false);
@@ -229,17 +235,17 @@ fn the_other_read_has_a_length_that_no_open_answer_has() {
 /// A unit that was busy, or got an echo damaged, may know echoes all the same; one that says so each time is taken at its word.
 #[test]
 fn an_echo_that_a_unit_could_not_take_does_not_tell_that_it_knows_none() {
-    let (unit, echo) = (UnitAddress::MIN, Request::echo(7));
-    let mut resync = Resync::default();
+    let echo = Request::echo(7);
+    let mut probing = Probing::default();
     for _ in 1..BUSY_FOR_GOOD {
-        resync.was_busy(unit, &echo);
-        assert!(!resync.knows_no_echo(unit) && !resync.refuses_echoes(unit));
+        probing.was_busy(&echo);
+        assert!(!probing.knows_no_echo() && !probing.refuses_echoes());
     }
-    resync.answered(unit, &echo, false);
+    probing.answered(&echo, false);
     for refuses in [false, false, true] {
-        resync.was_busy(unit, &echo);
-        assert_eq!(resync.refuses_echoes(unit), refuses);
+        probing.was_busy(&echo);
+        assert_eq!(probing.refuses_echoes(), refuses);
     }
-    resync.answered(unit, &echo, false);
-    assert!(!resync.refuses_echoes(unit), "it has returned one since");
+    probing.answered(&echo, false);
+    assert!(!probing.refuses_echoes(), "it has returned one since");
 }
