@@ -153,7 +153,7 @@ impl Course {
         self.granted += granted;
         self.left = self.left.saturating_add(granted.saturating_mul(2));
         let longer = timeout.saturating_mul(granted);
-        self.allowed += longer;
+        self.allowed = self.allowed.saturating_add(longer);
         self.until = self.until.map(|until| until + longer);
     }
 
