@@ -168,10 +168,10 @@ impl Pace {
             return None; // nothing new: they come in lumps, and the next is waited for
         }
         self.count = self.count.saturating_add(came);
-        let begun = now.saturating_duration_since(Instant::ZERO + self.char_time * self.count);
+        let begun = now.saturating_duration_since(Instant::ZERO + self.char_time.saturating_mul(self.count));
         self.begun = self.begun.min(Instant::ZERO + begun);
         let (chars, time) = EARLY;
-        let all = self.char_time * self.count.saturating_add(lacks).saturating_sub(chars);
+        let all = self.char_time.saturating_mul(self.count.saturating_add(lacks).saturating_sub(chars));
         (lacks > chars).then(|| self.begun + all.saturating_sub(time))
     }
 }
@@ -333,5 +333,13 @@ mod tests {
         };
         assert_eq!(read(&mut Silent::default(), 5, None, &mut give_up), Failure::Interrupted);
         assert_eq!(asked, 1);
+    }
+
+    #[test]
+    fn a_character_may_take_as_long_as_it_likes() {
+        for char_time in [Duration::from_nanos(u64::MAX), Duration::MAX] {
+            let mut pace = Pace::new(char_time);
+            assert_eq!(pace.nearly_whole(Instant::ZERO, 3, 250), Some(Instant::from_nanos(u64::MAX)));
+        }
     }
 }
