@@ -79,11 +79,9 @@ impl fmt::Debug for Error {
     }
 }
 
-impl std::error::Error for Error {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        self.call.as_ref().map(|call| call as _)
-    }
-}
+/// Without a [`source`](std::error::Error::source): its sentence says all, and a chain would say it twice. What is known
+/// beside it, [`call`](Error::call) has.
+impl std::error::Error for Error {}
 
 impl From<Box<CallError>> for Error {
     fn from(call: Box<CallError>) -> Self {

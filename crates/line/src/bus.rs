@@ -220,6 +220,9 @@ impl Bus {
     }
 
     /// Now, on the line's clock; its start in a forked child, where only the line of the parent knows.
+    ///
+    /// Inside of a watch or a `give_up`, on a virtual line without a [clock](crate::Line::clock): the latest moment that is
+    /// known, as nobody can ask the line then.
     pub fn now(&self) -> Instant {
         self.port().now()
     }

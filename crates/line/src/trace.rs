@@ -7,6 +7,7 @@ mod ear;
 
 use std::fmt;
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
@@ -72,6 +73,8 @@ pub(crate) struct Trace(Arc<Watchers>);
 struct Watchers {
     watch: Mutex<Option<Watch>>,
     ears: Mutex<Vec<Weak<Ear>>>,
+    /// The latest moment that the line told, in nanoseconds of its clock.
+    latest: AtomicU64,
 }
 
 impl fmt::Debug for Trace {
@@ -87,6 +90,16 @@ impl Trace {
 
     pub(crate) fn watch(&self) -> Option<Watch> {
         self.0.watch.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The line has come to `moment`.
+    pub(crate) fn has_come_to(&self, moment: Instant) {
+        self.0.latest.fetch_max(moment.as_nanos(), Ordering::Relaxed);
+    }
+
+    /// The latest moment that it is known to have come to: for who watches, while nobody can ask the line.
+    pub(crate) fn latest(&self) -> Instant {
+        Instant::from_nanos(self.0.latest.load(Ordering::Relaxed))
     }
 
     /// An ear that has all that goes over the line for as long as it is kept.
@@ -130,6 +143,7 @@ impl Watched {
         let gap = self.last.map(|last| at.saturating_duration_since(last));
         self.last = Some(end);
         if let Some(watch) = self.trace.watch() {
+            self.trace.has_come_to(self.line.now());
             watch(Traced { at, gap, direction, bytes: bytes.to_vec(), elsewhere: false });
         }
     }

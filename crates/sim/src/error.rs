@@ -108,5 +108,12 @@ pub enum SimError {
     },
     /// The system has no port to give.
     #[error("cannot serve the simulated line: {0}")]
-    Io(#[from] std::io::Error),
+    Io(std::io::Error),
+}
+
+impl From<std::io::Error> for SimError {
+    /// The text says it all: it is no [`source`](std::error::Error::source), or a chain would say it twice.
+    fn from(error: std::io::Error) -> Self {
+        Self::Io(error)
+    }
 }

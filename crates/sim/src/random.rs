@@ -51,8 +51,9 @@ impl Random {
 
     /// 0 to `longest`, in whole nanoseconds.
     pub(crate) fn up_to(&mut self, longest: Duration) -> Duration {
-        let nanos = u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX - 1);
-        Duration::from_nanos(self.next() % (nanos + 1))
+        let nanos = u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX);
+        let drawn = self.next();
+        Duration::from_nanos(nanos.checked_add(1).map_or(drawn, |bound| drawn % bound))
     }
 }
 
@@ -76,5 +77,17 @@ mod tests {
         assert!((0..1_000).all(|_| random.happens(1.0)));
         assert!(!(0..1_000).any(|_| random.happens(0.0)));
         assert_eq!((random.below(0), random.below(1), random.up_to(Duration::ZERO)), (0, 0, Duration::ZERO));
+    }
+
+    #[test]
+    fn any_time_has_a_share() {
+        let mut random = Random::new(1);
+        for longest in [Duration::from_nanos(1), Duration::from_nanos(u64::MAX - 1), Duration::from_nanos(u64::MAX)] {
+            assert!(random.up_to(longest) <= longest);
+        }
+        assert!(
+            random.up_to(Duration::MAX) > Duration::from_secs(3_600),
+            "what no clock counts is the longest it counts"
+        );
     }
 }

@@ -4,6 +4,8 @@
 //! would. Whoever is at the other end hears words; whatever comes from there reaches the line only as a request that this
 //! program could have made itself.
 
+mod at_door;
+
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::io;
@@ -15,7 +17,6 @@ use std::thread;
 use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
-use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Resource, getrlimit};
 
 use crate::ask::Ask;
@@ -32,7 +33,7 @@ use crate::share::guest::readable;
 use crate::share::message::{
     Characters, Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish,
 };
-use crate::share::place::{Door, Entrance, Place};
+use crate::share::place::{Door, Place};
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::{self, Life, Process};
@@ -53,8 +54,6 @@ const WORD: Duration = Duration::from_millis(200);
 /// How long a thread of this program may have the line without a sign that it goes on, until a guest is told so.
 const HOLDS_ON: Duration = Duration::from_secs(2);
 const HOLDS_ON_TO_A_STOP: Duration = Duration::from_secs(1);
-/// How long nobody is let in where the system has no more files or threads for that.
-const BREATHER: Duration = Duration::from_millis(10);
 /// Programs that are remembered when they are gone.
 const REMEMBERED: usize = 64;
 
@@ -71,6 +70,8 @@ pub(super) struct Host {
 #[derive(Debug, Default)]
 pub(super) struct Guests {
     inside: Mutex<Inside>,
+    /// Why nobody can come in now.
+    kept_out: Mutex<Option<String>>,
 }
 
 #[derive(Debug, Default)]
@@ -100,29 +101,17 @@ impl Host {
         let (waker, woken) = (Kept::new(waker), Kept::new(woken));
         let entrances = Arc::clone(&door.entrances);
         thread::Builder::new().name("drivebus-door".to_owned()).spawn(move || {
-            loop {
-                let doors = entrances.iter().map(|entrance| PollFd::new(&*entrance.listener, PollFlags::IN));
-                let mut descriptors: Vec<_> =
-                    doors.chain(std::iter::once(PollFd::new(&*woken, PollFlags::IN))).collect();
-                let ready = poll(&mut descriptors, None);
-                let is_over = descriptors.last().is_none_or(|woken| !woken.revents().is_empty());
-                if is_over || matches!(ready, Err(error) if error != rustix::io::Errno::INTR) {
-                    return;
-                }
-                for Entrance { listener, is_private } in &*entrances {
-                    match listener.accept() {
-                        Ok((stream, _)) => {
-                            let (guests, port, is_private) = (Arc::clone(&guests), Weak::clone(&port), *is_private);
-                            // Where the system gives no thread, the guest finds its connection ended.
-                            let _ = thread::Builder::new()
-                                .name("drivebus-guest".to_owned())
-                                .spawn(move || serve(stream, is_private, &guests, &port));
-                        }
-                        Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-                        Err(_) => thread::sleep(BREATHER),
-                    }
-                }
-            }
+            at_door::stand(
+                &entrances,
+                &woken,
+                |refused| guests.keeps_out(refused),
+                |stream, is_private| {
+                    let (guests, port) = (Arc::clone(&guests), Weak::clone(&port));
+                    // Where the system gives no thread, the guest finds its connection ended.
+                    let guest = thread::Builder::new().name("drivebus-guest".to_owned());
+                    guest.spawn(move || serve(stream, is_private, &guests, &port)).map(drop)
+                },
+            );
         })?;
         Ok(Self { door, waker, opened_by: Process::current() })
     }
@@ -145,6 +134,17 @@ impl Drop for Host {
 impl Guests {
     fn lock(&self) -> MutexGuard<'_, Inside> {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Nobody can come in, since the system refuses what that takes; `None`: they can.
+    fn keeps_out(&self, refused: Option<&io::Error>) {
+        let why = refused.map(|error| format!("other programs cannot come in to use this port now: {error}"));
+        *self.kept_out.lock().unwrap_or_else(PoisonError::into_inner) = why;
+    }
+
+    /// Why nobody can come in now, if that is so.
+    pub(super) fn note(&self) -> Option<String> {
+        self.kept_out.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Hears no more of anybody; what they asked for by now, they are still told about.

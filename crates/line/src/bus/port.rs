@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 use std::time::Duration;
 
 use drivebus_rtu::{BeginError, Destination, FreshWords, Instant, Request, UnitAddress};
@@ -198,8 +198,19 @@ impl Port {
 
     /// Now, on the line's clock; its start in a forked child, where only the line of the parent knows.
     pub(crate) fn now(&self) -> Instant {
-        let asked = || if self.opened_by.is_current() { self.lock().now() } else { Instant::ZERO };
-        self.clock.now().unwrap_or_else(asked)
+        self.clock.now().unwrap_or_else(|| if self.opened_by.is_current() { self.ask_now() } else { Instant::ZERO })
+    }
+
+    /// Now, where only the line knows; the latest moment it told where this thread uses it, and would wait for itself: inside
+    /// of a watch or a `give_up`.
+    fn ask_now(&self) -> Instant {
+        let owner = match self.owner.try_lock() {
+            Ok(owner) => owner,
+            Err(TryLockError::Poisoned(broken)) => broken.into_inner(),
+            Err(TryLockError::WouldBlock) if self.queue.has_this_thread() => return self.trace.latest(),
+            Err(TryLockError::WouldBlock) => self.lock(),
+        };
+        self.now_of(&owner)
     }
 
     /// As [`now`](Self::now), without waiting for who uses the line: `None` where only the line knows, and it is in use.
@@ -275,7 +286,11 @@ impl Port {
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.
     pub(crate) fn now_of(&self, owner: &Owner) -> Instant {
-        self.clock.now().unwrap_or_else(|| owner.now())
+        self.clock.now().unwrap_or_else(|| {
+            let now = owner.now();
+            self.trace.has_come_to(now);
+            now
+        })
     }
 
     pub(crate) fn no_turn(&self, why: NoTurn) -> Failure {

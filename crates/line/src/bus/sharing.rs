@@ -354,7 +354,7 @@ impl Sharing {
                 "{left_out} pieces of what went over the line were not heard: this program did not take them in time"
             )
         });
-        whose.into_iter().chain(gaps).collect()
+        whose.into_iter().chain(self.guests.note()).chain(gaps).collect()
     }
 
     fn serving(&self) -> MutexGuard<'_, Serving> {

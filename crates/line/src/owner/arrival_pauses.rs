@@ -102,7 +102,7 @@ impl Lumps {
         let least = match (line.gapless(), line.char_time(), line.latency()) {
             (true, ..) => None,
             (false, None, Duration::ZERO) => Some(LEAST_BEHIND_UNKNOWN),
-            (false, _, latency) => Some(LEAST + latency),
+            (false, _, latency) => Some(LEAST.saturating_add(latency)),
         };
         Self::with_least(least)
     }
@@ -327,5 +327,10 @@ mod tests {
         let mut lumps = by_characters();
         (0..ENOUGH).for_each(|_| lumps.learn(&in_two(450, true), Some(ANSWER - 2), Ended::Whole));
         assert_eq!(lumps.pause, 2 * UNKNOWN);
+    }
+
+    #[test]
+    fn a_line_may_hand_over_as_late_as_it_likes() {
+        assert_eq!(Lumps::of(&Nobody { char_time: None, latency: Duration::MAX }).pause, Duration::MAX);
     }
 }

@@ -273,10 +273,10 @@ impl Pace {
             return None; // nothing new: they come in lumps, and the next is waited for
         }
         self.count = self.count.saturating_add(came);
-        let begun = now.saturating_duration_since(Instant::ZERO + self.char_time * self.count);
+        let begun = now.saturating_duration_since(Instant::ZERO + self.char_time.saturating_mul(self.count));
         self.begun = self.begun.min(Instant::ZERO + begun);
         let (chars, time) = EARLY;
-        let all = self.char_time * self.count.saturating_add(lacks).saturating_sub(chars);
+        let all = self.char_time.saturating_mul(self.count.saturating_add(lacks).saturating_sub(chars));
         (lacks > chars).then(|| self.begun + all.saturating_sub(time))
     }
 }

@@ -1,8 +1,13 @@
 //! Who is next among those who wait for the line: the rule alone, without threads and without a clock.
 
+mod class;
+
 use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 use drivebus_rtu::UnitAddress;
+
+use class::{Class, Kin};
 
 /// How many turns of a higher class, asked for later, somebody who waits lets go before it. Stops do not count.
 ///
@@ -12,7 +17,8 @@ pub(crate) const OVERTAKEN_AT_MOST: u32 = 32;
 
 /// Broadcasts are a unit of their own, with the address they have on the wire; 247 is the highest.
 const UNITS: usize = 248;
-const CLASSES: usize = 4;
+/// Those beside stops.
+const CLASSES: usize = 3;
 
 /// Who goes first among those who wait for the line.
 ///
@@ -57,28 +63,49 @@ impl From<(Priority, Option<UnitAddress>)> for Claim {
 /// A place in the order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Ticket {
-    /// Lower came earlier.
-    number: u64,
+    number: Number,
     claim: Claim,
 }
 
+/// When somebody came, or had a turn: lower is earlier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Number(u64);
+
+impl Ord for Number {
+    fn cmp(&self, other: &Self) -> Ordering {
+        #[cfg(test)]
+        tests::compares();
+        self.0.cmp(&other.0)
+    }
+}
+
+impl PartialOrd for Number {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 /// Those who wait, and when each program and each unit had its last turn. `T` is what the caller keeps about each.
+///
+/// The lowest is next: stops, who let them pass, who was overtaken too often, and then class by class. Within a class by the
+/// last turn of the program and then of the unit, so that one with many tickets takes no more turns than one with few. Each
+/// of these is kept sorted: a turn costs the logarithm of what waits.
 #[derive(Debug)]
 pub(crate) struct Order<T> {
     arrivals: u64,
     turns: u64,
-    waiting: Vec<Waiting<T>>,
-    /// The number of the last turn, for each unit of each class: a stop or a write takes nothing from the unit's reads.
-    last_turn: Vec<u64>,
-    /// The same for each program of each class.
-    last_turn_of: Vec<[u64; CLASSES]>,
+    /// All who wait, by when they came.
+    waiting: BTreeMap<Number, Waiting<T>>,
+    stops: BTreeSet<Number>,
+    /// Who had the turn already, and lets stops pass.
+    aside: BTreeSet<Number>,
+    /// The others, by class, the highest first.
+    classes: [Class; CLASSES],
 }
 
 #[derive(Debug)]
 struct Waiting<T> {
     ticket: Ticket,
-    /// How often it was overtaken by later arrivals of a higher class.
-    overtaken: u32,
     /// It had the turn already, and lets stops pass.
     aside: bool,
     whose: T,
@@ -89,44 +116,69 @@ impl Ticket {
         self.claim.priority == Priority::Stop
     }
 
-    /// Where the last turn of its unit in its class is kept.
-    fn place(&self) -> usize {
-        self.claim.priority as usize * UNITS + self.claim.unit.map_or(0, |unit| usize::from(unit.get()))
+    /// Where its class is kept; none for a stop, which goes before all classes.
+    fn class(&self) -> Option<usize> {
+        (self.claim.priority as usize).checked_sub(Priority::Write as usize)
+    }
+
+    fn kin(&self) -> Kin {
+        (self.claim.unit.map_or(0, UnitAddress::get), self.claim.program.0)
     }
 }
 
 impl<T> Default for Order<T> {
     fn default() -> Self {
-        let last_turn = vec![0; CLASSES * UNITS];
-        Self { arrivals: 0, turns: 0, waiting: Vec::new(), last_turn, last_turn_of: vec![[0; CLASSES]] }
+        Self {
+            arrivals: 0,
+            turns: 0,
+            waiting: BTreeMap::new(),
+            stops: BTreeSet::new(),
+            aside: BTreeSet::new(),
+            classes: Default::default(),
+        }
     }
 }
 
 impl<T> Order<T> {
-    /// A ticket for somebody who comes now.
+    /// A ticket for somebody who comes now, and waits before anybody else has a turn.
     pub(crate) fn ticket(&mut self, claim: Claim) -> Ticket {
         self.arrivals += 1;
-        let programs = usize::from(claim.program.0) + 1;
-        if self.last_turn_of.len() < programs {
-            self.last_turn_of.resize(programs, [0; CLASSES]);
+        let ticket = Ticket { number: Number(self.arrivals), claim };
+        if let Some(class) = ticket.class() {
+            self.classes[class].knows(claim.program.0);
         }
-        Ticket { number: self.arrivals, claim }
+        ticket
     }
 
     /// `ticket` waits.
     pub(crate) fn wait(&mut self, ticket: Ticket, whose: T) {
-        self.waiting.push(Waiting { ticket, overtaken: 0, aside: false, whose });
+        match ticket.class() {
+            Some(class) => self.classes[class].wait(ticket.number, ticket.kin()),
+            None => _ = self.stops.insert(ticket.number),
+        }
+        self.waiting.insert(ticket.number, Waiting { ticket, aside: false, whose });
     }
 
     /// `ticket`, which has the turn, waits until the stops have passed.
     pub(crate) fn step_aside(&mut self, ticket: Ticket, whose: T) {
-        self.waiting.push(Waiting { ticket, overtaken: 0, aside: true, whose });
+        let set = if ticket.is_stop() { &mut self.stops } else { &mut self.aside };
+        set.insert(ticket.number);
+        self.waiting.insert(ticket.number, Waiting { ticket, aside: true, whose });
     }
 
     /// `ticket` waits no longer; `None` if it does not wait.
     pub(crate) fn leave(&mut self, ticket: Ticket) -> Option<T> {
-        let index = self.waiting.iter().position(|other| other.ticket == ticket)?;
-        Some(self.waiting.swap_remove(index).whose)
+        self.remove(ticket.number).map(|gone| gone.whose)
+    }
+
+    fn remove(&mut self, number: Number) -> Option<Waiting<T>> {
+        let gone = self.waiting.remove(&number)?;
+        match gone.ticket.class() {
+            None => _ = self.stops.remove(&number),
+            Some(_) if gone.aside => _ = self.aside.remove(&number),
+            Some(class) => self.classes[class].leave(number, gone.ticket.kin()),
+        }
+        Some(gone)
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -139,38 +191,40 @@ impl<T> Order<T> {
     }
 
     /// What is kept about those who wait, in no order.
+    #[cfg(test)]
     pub(crate) fn waiting(&self) -> impl Iterator<Item = &T> {
-        self.waiting.iter().map(|waiting| &waiting.whose)
+        self.waiting.values().map(|waiting| &waiting.whose)
     }
 
     pub(crate) fn has_stop(&self) -> bool {
-        self.waiting.iter().any(|waiting| waiting.ticket.is_stop())
+        !self.stops.is_empty()
     }
 
     /// Who is next.
     pub(crate) fn next(&self) -> Option<&T> {
-        self.next_index().map(|index| &self.waiting[index].whose)
+        self.waiting.get(&self.next_number()?).map(|waiting| &waiting.whose)
     }
 
     /// The place of who is next.
     pub(crate) fn next_ticket(&self) -> Option<Ticket> {
-        self.next_index().map(|index| self.waiting[index].ticket)
+        self.waiting.get(&self.next_number()?).map(|waiting| waiting.ticket)
     }
 
     /// All who wait and of whom `who` says so wait no longer.
     pub(crate) fn dismiss(&mut self, who: impl Fn(&T) -> bool) -> Vec<T> {
-        let (gone, kept) = std::mem::take(&mut self.waiting).into_iter().partition(|waiting| who(&waiting.whose));
-        self.waiting = kept;
-        gone.into_iter().map(|waiting| waiting.whose).collect()
+        let gone = self.waiting.iter().filter(|(_, waiting)| who(&waiting.whose)).map(|(&number, _)| number);
+        let gone: Vec<Number> = gone.collect();
+        gone.into_iter().filter_map(|number| self.remove(number)).map(|gone| gone.whose).collect()
     }
 
     /// `ticket` has the turn now, if it is next.
     pub(crate) fn take(&mut self, ticket: Ticket) -> Option<T> {
-        let index = self.next_index().filter(|&index| self.waiting[index].ticket == ticket)?;
-        let taken = self.waiting.swap_remove(index);
+        let number = self.next_number().filter(|&number| number == ticket.number)?;
+        let taken = self.remove(number)?;
         // The turn of one who stepped aside was counted when it began.
         if !taken.aside {
-            self.count(ticket, taken.is_late());
+            let late = ticket.class().is_some_and(|class| self.classes[class].is_late(number));
+            self.count(ticket, late);
         }
         Some(taken.whose)
     }
@@ -187,45 +241,19 @@ impl<T> Order<T> {
     #[inline(always)]
     fn count(&mut self, ticket: Ticket, late: bool) {
         self.turns += 1;
-        self.last_turn[ticket.place()] = self.turns;
-        self.last_turn_of[usize::from(ticket.claim.program.0)][ticket.claim.priority as usize] = self.turns;
-        for other in &mut self.waiting {
-            match other.ticket.number.cmp(&ticket.number) {
-                // One turn for all who came later, else a crowd of them would hold up the higher classes at one go.
-                Ordering::Greater if late => other.overtaken = 0,
-                Ordering::Less if ticket.claim.priority < other.ticket.claim.priority && !ticket.is_stop() => {
-                    other.overtaken += 1;
-                }
-                _ => {}
-            }
+        let Some(class) = ticket.class() else { return };
+        self.classes[class].count(ticket.kin(), Number(self.turns));
+        if late {
+            // One turn for all who came later, else a crowd of them would hold up the higher classes at one go.
+            self.classes.iter_mut().for_each(|class| class.forgives(ticket.number));
         }
+        self.classes[class + 1..].iter_mut().for_each(|lower| lower.is_overtaken(ticket.number));
     }
 
-    fn next_index(&self) -> Option<usize> {
-        (0..self.waiting.len()).min_by_key(|&index| self.rank(&self.waiting[index]))
-    }
-
-    /// The lowest is next: stops, who let them pass, who was overtaken too often, and then class by class. Within a class
-    /// by the last turn of the program and then of the unit, so that one with many tickets takes no more turns than one with
-    /// few.
-    fn rank(&self, waiting: &Waiting<T>) -> (u8, u64, u64, u64) {
-        let Ticket { number, claim } = waiting.ticket;
-        let class = match claim.priority {
-            Priority::Stop => return (0, 0, 0, number),
-            _ if waiting.aside => return (1, 0, 0, number),
-            _ if waiting.is_late() => return (2, 0, 0, number),
-            Priority::Write => 3,
-            Priority::Read => 4,
-            Priority::Poll => 5,
-        };
-        let of_program = self.last_turn_of[usize::from(claim.program.0)][claim.priority as usize];
-        (class, of_program, self.last_turn[waiting.ticket.place()], number)
-    }
-}
-
-impl<T> Waiting<T> {
-    fn is_late(&self) -> bool {
-        self.overtaken >= OVERTAKEN_AT_MOST
+    fn next_number(&self) -> Option<Number> {
+        let late = || self.classes.iter().filter_map(Class::late).min();
+        let by_class = || self.classes.iter().find_map(Class::next);
+        self.stops.first().or_else(|| self.aside.first()).copied().or_else(late).or_else(by_class)
     }
 }
 

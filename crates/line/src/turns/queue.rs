@@ -5,6 +5,7 @@
 mod watching;
 mod work;
 
+use std::collections::HashSet;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -62,6 +63,8 @@ pub(crate) struct State<W> {
     pub(crate) owner: Option<(Ticket, Thread)>,
     /// While the line is free and somebody waits, the next one has been called.
     pub(crate) order: Order<Waiter<W>>,
+    /// The threads that wait in it.
+    threads: HashSet<ThreadId>,
     pub(crate) crew: Crew,
 }
 
@@ -133,7 +136,7 @@ impl<W> Queue<W> {
             state.owner = Some((ticket, thread));
             return Ok(Turn { queue: self, ticket });
         }
-        state.order.wait(ticket, Waiter::Thread(thread));
+        state.wait(ticket, Waiter::Thread(thread));
         drop(state);
         let turn = Turn { queue: self, ticket };
         if turn.comes(give_up) { Ok(turn) } else { Err(NoTurn::GivenUp) }
@@ -157,7 +160,7 @@ impl<W> Queue<W> {
     /// How many wait.
     #[cfg(test)]
     pub(crate) fn waiting(&self) -> usize {
-        self.lock().order.waiting().count()
+        self.lock().order.len()
     }
 
     /// Wakes who is next, if the line is free. It looks for itself whether it still is.
@@ -198,6 +201,7 @@ impl<W> Turn<'_, W> {
             return true;
         }
         if let Some((ticket, thread)) = state.owner.take_if(|(owner, _)| *owner == self.ticket) {
+            state.threads.insert(thread.id());
             state.order.step_aside(ticket, Waiter::Thread(thread));
         }
         self.queue.call_next(state);
@@ -233,7 +237,7 @@ impl<W> Turn<'_, W> {
     pub(crate) fn leave(&self) {
         let mut state = self.queue.lock();
         let had_the_line = state.owner.take_if(|(owner, _)| *owner == self.ticket);
-        let waited = state.order.leave(self.ticket);
+        let waited = state.leave(self.ticket);
         if had_the_line.is_some() || waited.is_some() {
             self.queue.call_next(state);
         }
@@ -248,7 +252,7 @@ impl<W> Drop for Turn<'_, W> {
 
 impl<W> Default for State<W> {
     fn default() -> Self {
-        Self { owner: None, order: Order::default(), crew: Crew::default() }
+        Self { owner: None, order: Order::default(), threads: HashSet::new(), crew: Crew::default() }
     }
 }
 
@@ -263,14 +267,41 @@ impl<W> State<W> {
 
     /// Whether `this` thread has the line or waits for it.
     fn has(&self, this: ThreadId) -> bool {
-        self.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this)
-            || self.order.waiting().any(|waiter| matches!(waiter, Waiter::Thread(thread) if thread.id() == this))
+        self.owner.as_ref().is_some_and(|(_, thread)| thread.id() == this) || self.threads.contains(&this)
+    }
+
+    /// Whether work waits that one of the crew has to do.
+    fn has_work(&self) -> bool {
+        self.order.len() > self.threads.len()
+    }
+
+    /// `waiter` waits with `ticket`.
+    fn wait(&mut self, ticket: Ticket, waiter: Waiter<W>) {
+        if let Waiter::Thread(thread) = &waiter {
+            self.threads.insert(thread.id());
+        }
+        self.order.wait(ticket, waiter);
+    }
+
+    /// Who waits with `ticket` waits no longer.
+    fn leave(&mut self, ticket: Ticket) -> Option<Waiter<W>> {
+        let waiter = self.order.leave(ticket);
+        self.waits_no_longer(waiter.as_ref());
+        waiter
+    }
+
+    fn waits_no_longer(&mut self, waiter: Option<&Waiter<W>>) {
+        if let Some(Waiter::Thread(thread)) = waiter {
+            self.threads.remove(&thread.id());
+        }
     }
 
     /// Takes the line for `ticket` if it is free and `ticket` is next.
     fn take(&mut self, ticket: Ticket) -> bool {
         if self.owner.is_none() {
-            self.owner = self.order.take(ticket).map(|waiter| match waiter {
+            let waiter = self.order.take(ticket);
+            self.waits_no_longer(waiter.as_ref());
+            self.owner = waiter.map(|waiter| match waiter {
                 Waiter::Thread(thread) => (ticket, thread),
                 Waiter::Work(_) => (ticket, thread::current()),
             });

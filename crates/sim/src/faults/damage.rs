@@ -56,21 +56,22 @@ impl Faults {
                 self.happened(kind);
             }
         }
-        damaged.delay += outgoing.delay;
+        let mut delay = damaged.delay.saturating_add(outgoing.delay);
         if hits.has(FaultKind::Delay) {
-            damaged.delay += self.random.up_to(self.times.delay);
+            delay = delay.saturating_add(self.random.up_to(self.times.delay));
             self.happened(FaultKind::Delay);
         }
         if hits.has(FaultKind::Late) {
-            damaged.delay += self.times.late + self.random.up_to(self.times.late);
+            delay = delay.saturating_add(self.times.late).saturating_add(self.random.up_to(self.times.late));
             self.happened(FaultKind::Late);
         }
         if hits.has(FaultKind::Overtaken) {
             let (least, most) = self.times.overtaken;
-            damaged.delay += least + self.random.up_to(most.saturating_sub(least));
+            delay = delay.saturating_add(least).saturating_add(self.random.up_to(most.saturating_sub(least)));
             damaged.may_be_passed = true;
             self.happened(FaultKind::Overtaken);
         }
+        damaged.delay = delay;
         Some(damaged)
     }
 }

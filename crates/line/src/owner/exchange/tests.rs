@@ -127,3 +127,11 @@ fn who_gives_up_is_heard_after_the_shortest_time_out() {
     assert_eq!(read(Silent::default(), 5, None, &mut give_up).0, Failure::Interrupted);
     assert_eq!(asked, 1);
 }
+
+#[test]
+fn a_character_may_take_as_long_as_it_likes() {
+    for char_time in [Duration::from_nanos(u64::MAX), Duration::MAX] {
+        let mut pace = Pace::new(char_time);
+        assert_eq!(pace.nearly_whole(Instant::ZERO, 3, 250), Some(Instant::from_nanos(u64::MAX)));
+    }
+}

@@ -1,8 +1,13 @@
 //! Who comes next, on paper: priorities, units that take turns, and who was overtaken long enough.
 
+mod linear;
+
+use std::cell::Cell;
+
 use proptest::prelude::*;
 
 use super::*;
+use linear::Linear;
 
 use Priority::{Poll, Read, Stop, Write};
 
@@ -19,12 +24,12 @@ fn come(order: &mut Order<u32>, priority: Priority, raw: u8, name: u32) -> Ticke
 
 /// Gives the next one its turn.
 fn serve(order: &mut Order<u32>) -> u32 {
-    let ticket = order.waiting[order.next_index().unwrap()].ticket;
+    let ticket = order.next_ticket().unwrap();
     order.take(ticket).unwrap()
 }
 
 fn serve_all(order: &mut Order<u32>) -> Vec<u32> {
-    (0..order.waiting.len()).map(|_| serve(order)).collect()
+    (0..order.len()).map(|_| serve(order)).collect()
 }
 
 #[test]
@@ -274,4 +279,133 @@ fn a_stop_of_any_program_goes_first_and_a_write_before_its_reads() {
         order.wait(ticket, name);
     }
     assert_eq!(serve_all(&mut order), [3, 4, 2, 0, 1]);
+}
+
+thread_local! {
+    static COMPARISONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Two places were compared.
+pub(super) fn compares() {
+    COMPARISONS.set(COMPARISONS.get() + 1);
+}
+
+/// How many comparisons `what` takes.
+fn comparisons(what: impl FnOnce()) -> u64 {
+    let before = COMPARISONS.get();
+    what();
+    COMPARISONS.get() - before
+}
+
+fn claim(class: usize, raw: u8, program: u16) -> Claim {
+    Claim { priority: [Stop, Write, Read, Poll][class], unit: unit(raw), program: Program(program) }
+}
+
+/// The most comparisons that a turn takes, that somebody comes, and that somebody leaves, while `count` wait: of `units` units
+/// and `programs` programs, in all classes.
+fn costs(count: u32, units: u32, programs: u32) -> [u64; 3] {
+    let mut order = Order::default();
+    let come = |order: &mut Order<u32>, name: u32| {
+        let (raw, program) = (u8::try_from(name % units).unwrap(), u16::try_from(name % programs).unwrap());
+        let ticket = order.ticket(claim(1 + (name / 7 % 3) as usize, raw, program));
+        order.wait(ticket, name);
+        ticket
+    };
+    (0..count).for_each(|name| _ = come(&mut order, name));
+    let mut most = [0; 3];
+    for name in count..count + 1_000 {
+        let turn = comparisons(|| _ = serve(&mut order));
+        let mut newest = None;
+        let comes = comparisons(|| newest = Some(come(&mut order, name)));
+        let leaves = comparisons(|| _ = order.leave(newest.unwrap()));
+        come(&mut order, name);
+        most = [most[0].max(turn), most[1].max(comes), most[2].max(leaves)];
+    }
+    most
+}
+
+/// A tree of a thousand times as many is ten comparisons deeper, and some trees are looked into for each.
+#[test]
+fn a_turn_costs_the_logarithm_of_what_waits() {
+    for (units, programs) in [(1, 1), (247, 1), (5, 3)] {
+        let (few, many) = (costs(16, units, programs), costs(16_000, units, programs));
+        for (few, many) in few.into_iter().zip(many) {
+            assert!(many <= few + 400, "{many} comparisons of 16 000, {few} of 16: {units} units, {programs} programs");
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Move {
+    Come { class: usize, unit: u8, program: u16 },
+    Serve,
+    LetPass,
+    Leave(prop::sample::Index),
+    Dismiss(u32),
+}
+
+fn moves() -> impl Strategy<Value = Vec<Move>> {
+    let come = |classes: std::ops::Range<usize>| {
+        (classes, 0u8..5, 0u16..4).prop_map(|(class, unit, program)| Move::Come { class, unit, program })
+    };
+    let each = prop_oneof![
+        60 => come(0..4),
+        50 => Just(Move::Serve),
+        4 => Just(Move::LetPass),
+        8 => any::<prop::sample::Index>().prop_map(Move::Leave),
+        1 => (2u32..9).prop_map(Move::Dismiss),
+    ];
+    let rush = (10usize..50, come(1..3)).prop_map(|(count, come)| [come, Move::Serve].repeat(count));
+    prop_oneof![3 => prop::collection::vec(each, 1..60), 1 => prop::collection::vec(come(2..4), 1..40), 2 => rush]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn what_is_kept_sorted_is_in_the_order_of_who_looks_at_all(moves in prop::collection::vec(moves(), 0..12)) {
+        let (mut order, mut linear) = (Order::default(), Linear::default());
+        let mut tickets = Vec::new();
+        for (name, step) in (0..).zip(moves.into_iter().flatten()) {
+            match step {
+                Move::Come { class, unit, program } => {
+                    let ticket = order.ticket(claim(class, unit, program));
+                    linear.knows(ticket.claim);
+                    if order.is_empty() && name % 3 == 0 {
+                        order.begin(ticket);
+                        linear.begin(ticket);
+                    } else {
+                        order.wait(ticket, name);
+                        linear.wait(ticket, name);
+                        tickets.push(ticket);
+                    }
+                }
+                Move::Serve => if let Some(ticket) = linear.next_ticket() {
+                    prop_assert_eq!(order.take(ticket), linear.take(ticket));
+                },
+                Move::LetPass => if let Some(ticket) = linear.next_ticket().filter(|ticket| !ticket.is_stop()) {
+                    prop_assert_eq!(order.take(ticket), linear.take(ticket));
+                    order.step_aside(ticket, name);
+                    linear.step_aside(ticket, name);
+                },
+                Move::Leave(index) => if !tickets.is_empty() {
+                    let ticket = tickets[index.index(tickets.len())];
+                    prop_assert_eq!(order.leave(ticket), linear.leave(ticket));
+                },
+                Move::Dismiss(each) => {
+                    let mut gone = linear.dismiss(|name| name % each == 0);
+                    gone.sort_unstable();
+                    let mut left = order.dismiss(|name| name % each == 0);
+                    left.sort_unstable();
+                    prop_assert_eq!(left, gone);
+                }
+            }
+            prop_assert_eq!(order.next_ticket(), linear.next_ticket());
+            prop_assert_eq!((order.len(), order.is_empty(), order.has_stop()), (linear.len(), linear.is_empty(), linear.has_stop()));
+        }
+        while let Some(ticket) = linear.next_ticket() {
+            prop_assert_eq!(order.take(ticket), linear.take(ticket));
+        }
+        prop_assert!(order.is_empty());
+    }
 }

@@ -170,7 +170,7 @@ fn who_was_called_and_gives_up_calls_the_next() {
     let waits = |priority, thread| {
         let mut state = queue.lock();
         let ticket = state.order.ticket((priority, unit(1)).into());
-        state.order.wait(ticket, Waiter::Thread(thread));
+        state.wait(ticket, Waiter::Thread(thread));
         Turn { queue: &queue, ticket }
     };
     let (called, next) = (waits(Write, elsewhere), waits(Read, thread::current()));

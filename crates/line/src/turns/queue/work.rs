@@ -26,7 +26,7 @@ impl<W> Queue<W> {
         }
         state.crew.works_for(employer);
         let ticket = state.order.ticket(claim);
-        state.order.wait(ticket, Waiter::Work(work));
+        state.wait(ticket, Waiter::Work(work));
         self.call_next(state);
         Ok(ticket)
     }
@@ -34,7 +34,7 @@ impl<W> Queue<W> {
     /// Takes work back whose turn has not come.
     pub(crate) fn take_back(&self, ticket: Ticket) -> Option<W> {
         let mut state = self.lock();
-        let waiter = state.order.leave(ticket);
+        let waiter = state.leave(ticket);
         self.call_next(state);
         waiter.and_then(Waiter::into_work)
     }
@@ -61,8 +61,7 @@ impl<W> Queue<W> {
             if let Some((ticket, work)) = state.take_work() {
                 return Some((Turn { queue: self, ticket }, work));
             }
-            let is_needed = state.order.waiting().any(|waiter| matches!(waiter, Waiter::Work(_)));
-            if state.crew.is_dismissed() || (waited && !is_needed) {
+            if state.crew.is_dismissed() || (waited && !state.has_work()) {
                 return None;
             }
             state.crew.begins_to_wait();

@@ -257,3 +257,13 @@ fn a_question_that_is_repeated_goes_on_only_where_nothing_else_is_owed() {
     course.asks_otherwise();
     assert_eq!(course.owes_only_this(ASKED), None, "it is put in another way");
 }
+
+#[test]
+fn a_time_out_without_an_end_is_never_longer_than_that() {
+    for timeout in [Duration::from_nanos(u64::MAX), Duration::from_secs(u64::MAX), Duration::MAX] {
+        let mut course = Course::new(timeout, u32::MAX);
+        course.asks(at(1));
+        course.takes_more(u32::MAX, timeout);
+        assert!(course.is_in_time(at(1_000)), "{timeout:?}");
+    }
+}
