@@ -37,12 +37,12 @@ use core::time::Duration;
 
 use crate::{Destination, Instant, Request, UnitAddress};
 
+use attempt::Attempt;
 use course::Course;
 use dead_units::Verdict;
 use exchange::Flight;
 use known::Ask;
 use outcome::{Bytes, Kept, Slip};
-use probes::Tried;
 use write_back::Write;
 
 pub use echo::OwnEcho;
@@ -148,13 +148,7 @@ pub struct Conversation<'r> {
     is_wanted: bool,
     write: Option<Write<'r>>,
     course: Course,
-    tried: Tried,
-    /// Whether the question may be put in another length, in this attempt.
-    apart: bool,
-    /// Whether the next question of this attempt counts: one that is repeated until the answers agree counts once.
-    asks: bool,
-    /// How often it was asked before this attempt.
-    asked_before: u32,
+    attempt: Attempt,
     /// How the attempt before this one ended, if that was with the port.
     port_failed: Option<Slip>,
     /// Whether that is how the call ended.
@@ -203,10 +197,7 @@ impl<'r> Conversation<'r> {
             is_wanted: true,
             write: None,
             course: Course::new(question.timeout, question.retries),
-            tried: Tried::default(),
-            apart: !question.verify,
-            asks: true,
-            asked_before: 0,
+            attempt: Attempt::new(question.verify, 0),
             port_failed: None,
             ended_before: false,
             state: State::Sparing { patience: None },
@@ -339,7 +330,6 @@ impl<'r> Conversation<'r> {
     pub fn cut_short<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, why: Cut) {
         let why = Unanswered::CutShort(why);
         match self.state {
-            State::Done(_) => {}
             State::InFlight(flight) => {
                 known.master.abort(now);
                 self.came.clear();
@@ -352,7 +342,7 @@ impl<'r> Conversation<'r> {
                 self.state = State::Heard(flight, Err(Slip { why, ..slip }));
             }
             // The unit has said what it does, whoever waits for that.
-            State::Over(..) | State::Heard(..) => {}
+            State::Over(..) | State::Heard(..) | State::Done(_) => {}
             _ => {
                 let slip = self.slip(why, None, now);
                 self.end_attempt(now, known, Err(slip));
@@ -456,22 +446,15 @@ impl<'r> Conversation<'r> {
     /// The first attempt.
     fn begin(&mut self) {
         self.course = Course::new(self.question.timeout, self.retries);
-        match self.question.request {
-            Request::Read { .. } => {}
-            _ => {
-                self.write = Write::of(&self.question, self.retries);
-                self.course.go_on_with(self.question.timeout, 0);
-            }
+        if !matches!(self.question.request, Request::Read { .. }) {
+            self.write = Write::of(&self.question, self.retries);
+            self.course.go_on_with(self.question.timeout, 0);
         }
         self.begin_attempt();
     }
 
     fn begin_attempt(&mut self) {
-        self.tried = Tried::default();
-        // Whatever else is repeated would be done twice, and what is verified is asked as it is.
-        self.apart = !self.question.verify;
-        self.asks = true;
-        self.asked_before = self.course.asked();
+        self.attempt = Attempt::new(self.question.verify, self.course.asked());
         self.state = State::Passing;
     }
 
@@ -485,7 +468,7 @@ impl<'r> Conversation<'r> {
         let Err(slip) = result else { return self.settle(now, known, result) };
         let is_port = slip.why.is_of_the_port();
         let to_ask_again = self.unit().is_some() && slip.why.asks_again(&self.question.meanings);
-        if !self.course.goes_on(&slip, self.asked_before, to_ask_again) || !self.is_wanted {
+        if !self.course.goes_on(&slip, self.attempt.asked_before, to_ask_again) || !self.is_wanted {
             let why = match slip.why {
                 // It came when it was asked for the last of so many times.
                 Unanswered::NoAnswer { timeout, .. } => {

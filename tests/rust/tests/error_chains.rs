@@ -9,10 +9,8 @@ use std::time::Duration;
 
 use drivebus_drives::Profile;
 use drivebus_line::url::{Known, PortUrl, UnitError, UrlError};
-use drivebus_line::{CallError, Failure, PollError, PortError, PortErrorKind};
-use drivebus_rtu::{
-    AddressError, AnswerError, BeginError, Destination, ExceptionCode, FrameError, Request, UnitAddress,
-};
+use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Failure, Line, PollError, PortError, PortErrorKind};
+use drivebus_rtu::{AnswerError, BeginError, ExceptionCode, FrameError, Request, SerialFormat, UnitAddress};
 use drivebus_sim::{Options, SimError, Simulator};
 
 /// The texts of `error` and of all behind it, as they are printed one below the other.
@@ -51,10 +49,17 @@ fn failures() -> Vec<Failure> {
     ]
 }
 
+/// The error of a read that nobody answered, as if it had ended in `failure`, after two bytes.
 fn call_error(failure: Failure) -> CallError {
-    let request = vec![0x01, 0x03, 0x21, 0x00, 0x00, 0x02, 0xCE, 0x37];
-    let destination = Destination::from(UnitAddress::new(1).unwrap());
-    CallError { failure, destination, request, raw: vec![1, 2], sent: None, ended: None }
+    let simulator = Simulator::new([(1, "gd350")], Options::default()).unwrap();
+    let opener = Box::new(move || Ok(Box::new(simulator.open_line()?) as Box<dyn Line>));
+    let bus = Bus::open(opener, BusOptions::new(SerialFormat::DEFAULT), &mut || false).unwrap();
+    let nobody = UnitAddress::new(9).unwrap();
+    let read = Request::read(0x2100, 2).unwrap();
+    let result = bus.call(nobody.into(), &read, CallOptions::new().retries(0), &mut || false, &mut |_| ());
+    let mut error = *result.unwrap_err();
+    (error.failure, error.raw) = (failure, vec![1, 2]);
+    error
 }
 
 #[test]
@@ -90,7 +95,7 @@ fn what_cannot_be_is_said_once() {
 #[test]
 fn why_nothing_is_simulated_is_said_once() {
     says_it_once(SimError::from(io::Error::other("no such folder")));
-    says_it_once(SimError::from(AddressError { raw: 0 }));
+    says_it_once(SimError::from(UnitAddress::new(0).unwrap_err()));
     says_it_once(drivebus::Error::from(SimError::from(io::Error::other("no such folder"))));
     for units in [vec![(0, "gd350")], vec![(1, "nothing")], vec![(1, "gd350"), (1, "gd350")]] {
         says_it_once(Simulator::new(units, Options::default()).unwrap_err());

@@ -1,12 +1,13 @@
 //! Carries a conversation out on an open line: bytes, the clock, and the wish to give up.
 
+use std::ops::Range;
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, Conversation, Cut, Exchange, Instant, Outcome, Step, Unanswered};
+use drivebus_rtu::{Answer, BeginError, Conversation, Cut, Exchange, Instant, Outcome, Step, Unanswered};
 
 use crate::ask::{Ask, Done};
 use crate::error::{CallError, Failure};
-use crate::line::{PortError, PortErrorKind};
+use crate::line::{Line, PortError, PortErrorKind};
 use crate::owner::Owner;
 use crate::owner::arrival_pauses::{Arrivals, Ended};
 use crate::system::clock::LOOK_UP;
@@ -36,7 +37,7 @@ pub(crate) struct Talk<'a, 'r> {
     pub(crate) ask: &'a Ask<'r>,
     /// Whether somebody still waits for it.
     is_wanted: &'a dyn Fn() -> bool,
-    /// The last time, and the one before.
+    /// Why it was cut short the last time, and the one before.
     cuts: [Option<Failure>; 2],
 }
 
@@ -92,7 +93,38 @@ struct Carried {
     limit: Instant,
     slept: bool,
     looked_up: Instant,
+    /// How many bytes came the last time.
     came: usize,
+}
+
+impl Carried {
+    fn new(line: &dyn Line, now: Instant) -> Self {
+        let pace = line.char_time().map(Pace::new);
+        Self { arrivals: Arrivals::new(), pace, out: None, limit: now, slept: false, looked_up: now, came: 0 }
+    }
+
+    /// For how long nothing came by `now`.
+    fn quiet(&self, now: Instant) -> Duration {
+        self.out.map_or(Duration::ZERO, |out| now.saturating_duration_since(self.arrivals.last().max(out)))
+    }
+
+    /// Until when to wait for bytes, where something changes at `deadline` and the answer `lacks` so many; sleeps as long as
+    /// they cannot have come.
+    fn wait(&mut self, line: &mut dyn Line, now: Instant, deadline: Instant, lacks: usize) -> Instant {
+        let wake = now + LOOK_UP;
+        let nearly = self.pace.as_mut().and_then(|pace| pace.nearly_whole(now, self.came, lacks));
+        let Some(nearly) = nearly else { return deadline.min(wake) };
+        line.sleep(nearly.min(self.limit).min(wake));
+        self.slept = true;
+        // What has come by then is taken without waiting for more.
+        now
+    }
+}
+
+/// What came over the line and was not taken yet.
+struct Inbox {
+    buffer: [u8; 256],
+    rest: Range<usize>,
 }
 
 impl Owner {
@@ -118,10 +150,7 @@ impl Owner {
     ) -> Then {
         let mut now = now;
         let mut carried: Option<Carried> = None;
-        let mut yields = self.yields(talk.ask);
-        let mut buffer = [0; 256];
-        // What of it was not taken yet.
-        let mut rest = 0..0;
+        let mut inbox = Inbox { buffer: [0; 256], rest: 0..0 };
         self.prepare_next(talk);
         loop {
             match talk.call.next(now, &mut self.known) {
@@ -129,110 +158,106 @@ impl Owner {
                 Step::StandBy(until) => return Then::StandBy(until),
                 Step::Done(outcome) => return Then::Done(Talk::result(&mut talk.cuts, talk.ask, outcome, take)),
                 Step::Send(frame) => {
-                    let Some(line) = self.line.as_deref_mut() else {
-                        talk.cut_short(self, now, Failure::Closed);
-                        continue;
+                    let sent = match self.line.as_deref_mut() {
+                        Some(line) => line.send(frame).map_err(|error| (line.now(), Failure::Port(error))),
+                        None => Err((now, Failure::Closed)),
                     };
-                    match line.send(frame) {
+                    match sent {
                         Ok(end) => {
                             let limit = talk.call.sent(&mut self.known, end).unwrap_or(end);
                             if let Some(carried) = &mut carried {
                                 (carried.out, carried.limit) = (Some(end), limit);
                             }
                         }
-                        Err(error) => {
-                            now = line.now();
-                            talk.cut_short(self, now, Failure::Port(error));
+                        Err((at, failure)) => {
+                            now = at;
+                            talk.cut_short(self, now, failure);
                         }
                     }
-                }
-                // Whatever there was no room for, there is after polling.
-                Step::Listen(_) if !rest.is_empty() => {
-                    let taken = talk.call.heard(now, &mut self.known, &buffer[rest.clone()]).unwrap_or(rest.len());
-                    rest.start += taken;
                 }
                 Step::Listen(deadline) => {
-                    let Some(line) = self.line.as_deref_mut() else {
-                        talk.cut_short(self, now, Failure::Closed);
+                    if inbox.rest.is_empty()
+                        && let Err(failure) = self.listen(talk, &mut carried, &mut inbox, (&mut now, deadline), give_up)
+                    {
+                        talk.cut_short(self, now, failure);
                         continue;
-                    };
-                    let mut until = deadline;
-                    if talk.call.is_in_flight() {
-                        let carried = carried.get_or_insert_with(|| Carried {
-                            arrivals: Arrivals::new(),
-                            pace: line.char_time().map(Pace::new),
-                            out: None,
-                            limit: now,
-                            slept: false,
-                            looked_up: now,
-                            came: 0,
-                        });
-                        if now.saturating_duration_since(carried.looked_up) >= LOOK_UP {
-                            carried.looked_up = now;
-                            let last = |out| now.saturating_duration_since(carried.arrivals.last().max(out));
-                            let quiet = carried.out.map_or(Duration::ZERO, last);
-                            if give_up() {
-                                talk.cut_short(self, now, Failure::Interrupted);
-                                continue;
-                            }
-                            if quiet >= STOP_WAITS && yields.is_some_and(Stops::has_stop) {
-                                talk.call.give_way(now, &mut self.known, quiet);
-                                continue;
-                            }
-                        }
-                        let wake = now + LOOK_UP;
-                        until = deadline.min(wake);
-                        let (came, lacks) = (carried.came, self.known.master().lacks());
-                        let nearly = carried.pace.as_mut().and_then(|pace| pace.nearly_whole(now, came, lacks));
-                        if let Some(nearly) = nearly {
-                            line.sleep(nearly.min(carried.limit).min(wake));
-                            carried.slept = true;
-                            // What has come by then is taken without waiting for more.
-                            until = now;
-                        }
                     }
-                    let received = line.receive(&mut buffer, until);
-                    now = line.now();
-                    let count = match received {
-                        Ok(count) => count,
-                        Err(error) => {
-                            talk.cut_short(self, now, Failure::Port(error));
-                            continue;
-                        }
-                    };
-                    if let Some(carried) = &mut carried {
-                        if count > 0 {
-                            let (master, slept) = (self.known.master(), carried.slept);
-                            carried.arrivals.came(now, count, || !slept && master.lacks() > 0);
-                        }
-                        (carried.slept, carried.came) = (false, count);
-                    }
-                    // Whatever there is no room for now, there is after polling.
-                    let taken = talk.call.heard(now, &mut self.known, &buffer[..count]).unwrap_or(count);
-                    rest = taken..count;
+                    // Whatever there is no room for, there is after polling.
+                    let bytes = &inbox.buffer[inbox.rest.clone()];
+                    let taken = talk.call.heard(now, &mut self.known, bytes).unwrap_or(bytes.len());
+                    inbox.rest.start += taken;
                 }
                 Step::Heard(exchange) => {
-                    rest = 0..0;
+                    inbox.rest = 0..0;
                     let arrivals = carried.take().map_or_else(Arrivals::new, |carried| carried.arrivals);
                     self.lumps.learn(&arrivals, exchange.request.expected().adu_len(), ended(&exchange));
-                    let cut = talk.cuts[0].clone();
-                    let mut failure = exchange.failure.map(|why| Failure::of(why, Vec::new(), cut));
-                    // Time-outs may be shorter than the time between two looks, and retries many.
-                    let is_given_up = failure.as_ref().is_some_and(may_be_given_up) && give_up();
-                    if is_given_up {
-                        failure = Some(Failure::Interrupted);
-                    }
-                    self.keep(talk.ask, &exchange, failure.as_ref());
-                    if is_given_up {
-                        talk.cut_short(self, now, Failure::Interrupted);
-                    }
-                    talk.call.is_wanted((talk.is_wanted)());
-                    yields = self.yields(talk.ask);
-                    self.prepare_next(talk);
+                    self.is_over(talk, now, &exchange, give_up);
                 }
-                _ => {}
+                // A step that this line does not know.
+                _ => talk.cut_short(self, now, Failure::NotBegun(BeginError::OutOfTurn)),
             }
         }
+    }
+
+    /// Waits for bytes, where something changes at `deadline`, and has the time told.
+    fn listen(
+        &mut self,
+        talk: &mut Talk<'_, '_>,
+        carried: &mut Option<Carried>,
+        inbox: &mut Inbox,
+        (now, deadline): (&mut Instant, Instant),
+        give_up: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Failure> {
+        let yields = self.yields(talk.ask);
+        let Some(line) = self.line.as_deref_mut() else { return Err(Failure::Closed) };
+        let mut until = deadline;
+        if talk.call.is_in_flight() {
+            let carried = carried.get_or_insert_with(|| Carried::new(line, *now));
+            if now.saturating_duration_since(carried.looked_up) >= LOOK_UP {
+                carried.looked_up = *now;
+                if give_up() {
+                    return Err(Failure::Interrupted);
+                }
+                let quiet = carried.quiet(*now);
+                if quiet >= STOP_WAITS && yields.is_some_and(Stops::has_stop) {
+                    talk.call.give_way(*now, &mut self.known, quiet);
+                    return Ok(());
+                }
+            }
+            until = carried.wait(line, *now, deadline, self.known.master().lacks());
+        }
+        let received = line.receive(&mut inbox.buffer, until);
+        *now = line.now();
+        let count = received.map_err(Failure::Port)?;
+        inbox.rest = 0..count;
+        if let Some(carried) = carried {
+            if count > 0 {
+                let (master, slept) = (self.known.master(), carried.slept);
+                carried.arrivals.came(*now, count, || !slept && master.lacks() > 0);
+            }
+            (carried.slept, carried.came) = (false, count);
+        }
+        Ok(())
+    }
+
+    /// A request of `talk` is over at `now`: keeps what it came to, and asks whether anybody still waits.
+    fn is_over(
+        &mut self,
+        talk: &mut Talk<'_, '_>,
+        now: Instant,
+        exchange: &Exchange<'_>,
+        give_up: &mut dyn FnMut() -> bool,
+    ) {
+        let failure = exchange.failure.map(|why| Failure::of(why, Vec::new(), talk.cuts[0].clone()));
+        // Time-outs may be shorter than the time between two looks, and retries many.
+        if failure.as_ref().is_some_and(may_be_given_up) && give_up() {
+            self.keep(talk.ask, exchange, Some(&Failure::Interrupted));
+            talk.cut_short(self, now, Failure::Interrupted);
+        } else {
+            self.keep(talk.ask, exchange, failure.as_ref());
+        }
+        talk.call.is_wanted((talk.is_wanted)());
+        self.prepare_next(talk);
     }
 }
 

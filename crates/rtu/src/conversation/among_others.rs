@@ -24,7 +24,7 @@ const CHOICE: usize = 8;
 const LENGTHS: usize = MAX_WORDS as usize;
 
 /// Of so many shapes it is remembered that nobody else asks for them; what is forgotten is found out again.
-const PROVEN: usize = 24;
+const PROVEN: usize = 32;
 
 /// What is remembered of one unit for telling its answers apart.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,7 +35,7 @@ pub(super) struct Watched {
     met: bool,
     /// What was found to be asked by nobody else, while somebody was there.
     proven: [Option<Shape>; PROVEN],
-    /// The place of the next.
+    /// How many were proven, which says where the next is kept.
     next: u8,
 }
 
@@ -59,7 +59,7 @@ impl Watched {
     fn proves(&mut self, shape: Shape) {
         if !self.is_proven(shape) {
             self.proven[usize::from(self.next) % PROVEN] = Some(shape);
-            self.next = (self.next + 1) % PROVEN as u8;
+            self.next = self.next.wrapping_add(1);
         }
     }
 }

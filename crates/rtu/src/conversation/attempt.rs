@@ -10,6 +10,26 @@ use super::probes::{Probe, Tried};
 use super::{Conversation, State, Urgency};
 use crate::{Agreement, Attribution, Instant, Request, Table, UnitAddress};
 
+/// What one attempt has to remember.
+#[derive(Debug, Clone)]
+pub(super) struct Attempt {
+    pub(super) tried: Tried,
+    /// Whether the question may be put in another length.
+    pub(super) apart: bool,
+    /// Whether the next question counts: one that is repeated until the answers agree counts once.
+    asks: bool,
+    /// How often it was asked before.
+    pub(super) asked_before: u32,
+}
+
+impl Attempt {
+    /// One of a question that was asked so often before.
+    pub(super) fn new(verify: bool, asked_before: u32) -> Self {
+        // Whatever else is repeated would be done twice, and what is verified is asked as it is.
+        Self { tried: Tried::default(), apart: !verify, asks: true, asked_before }
+    }
+}
+
 impl<'r> Conversation<'r> {
     /// Others have gone first, where they were more urgent.
     pub(super) fn passed<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) {
@@ -29,7 +49,7 @@ impl<'r> Conversation<'r> {
         let in_time = self.course.is_in_time(now);
         if !self.course.sends() {
             let result = match &self.course.hearing {
-                Some(Hearing { asked, .. }) if self.tried.failure.is_none() => {
+                Some(Hearing { asked, .. }) if self.attempt.tried.failure.is_none() => {
                     let why = Unanswered::Disagreeing { asked: *asked };
                     Err(self.slip(why, None, now))
                 }
@@ -58,7 +78,7 @@ impl<'r> Conversation<'r> {
             return;
         }
         let can_look_up = self.write.as_ref().is_some_and(|write| !write.is_reading());
-        match known.next(now, &ask, self.words, &self.tried, in_time, self.apart) {
+        match known.next(now, &ask, self.words, &self.attempt.tried, in_time, self.attempt.apart) {
             Next::Ask(attribution) => self.ask_sure(now, known, ask, attribution, false),
             Next::AskApart(count) => self.ask_apart(now, known, ask, count, false),
             Next::OthersAsk => {
@@ -67,7 +87,7 @@ impl<'r> Conversation<'r> {
             }
             Next::LookForEcho => match known.look(now, &ask, is_stop) {
                 Some(request) => {
-                    self.tried.looks += 1;
+                    self.attempt.tried.looks += 1;
                     self.send(now, known, Ask { request, in_doubt: true, ..ask }, Purpose::Look);
                 }
                 None => self.state = State::Passing,
@@ -80,7 +100,7 @@ impl<'r> Conversation<'r> {
             }
             Next::AskUntold => self.put(now, known, ask, Purpose::Untold),
             Next::Overtaken(until) => {
-                self.tried = Tried::default(); // others will have asked the unit meanwhile
+                self.attempt.tried = Tried::default(); // others will have asked the unit meanwhile
                 self.state = State::Pausing(until);
             }
             Next::Wait(until) => self.state = State::Pausing(until),
@@ -93,7 +113,7 @@ impl<'r> Conversation<'r> {
 
     /// What is said where nothing that was tried made sure of the unit.
     fn none_settled(&mut self, now: Instant) -> Slip {
-        match self.tried.failure.take() {
+        match self.attempt.tried.failure.take() {
             Some((slip, came)) if !slip.why.is_refused() => {
                 self.came = came;
                 slip
@@ -126,7 +146,7 @@ impl<'r> Conversation<'r> {
         if !self.go_on_hearing(known, &ask, attribution) {
             return self.put(now, known, ask, Purpose::Plain);
         }
-        if core::mem::take(&mut self.asks) {
+        if core::mem::take(&mut self.attempt.asks) {
             self.course.asks(now);
         }
         if let Some(hearing) = &mut self.course.hearing {
@@ -233,7 +253,7 @@ impl<'r> Conversation<'r> {
                 Err(_) => return self.state = State::Passing,
             },
         };
-        self.tried.note(probe);
+        self.attempt.tried.note(probe);
         self.counts.resyncs += 1;
         self.send(now, known, Ask { request, ..ask }, Purpose::Probe(probe));
     }

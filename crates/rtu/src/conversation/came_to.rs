@@ -126,7 +126,7 @@ impl<'r> Conversation<'r> {
         known: &mut Known<U, P>,
         result: Result<Times, Slip>,
     ) {
-        let is_last = self.tried.looks >= LOOKS;
+        let is_last = self.attempt.tried.looks >= LOOKS;
         if known.echo != OwnEcho::Unknown {
             self.state = State::Passing;
             return;
@@ -166,11 +166,11 @@ impl<'r> Conversation<'r> {
                     record.probing.silent_on_echo();
                 }
             }
-            self.tried.failure = Some((slip, self.came));
+            self.attempt.tried.failure = Some((slip, self.came));
         }
         // Who polls comes again: the others wait for one time-out at a time.
         let is_poll = self.question.urgency == Urgency::Poll;
-        match self.tried.failure.take_if(|(slip, _)| is_poll && slip.why.is_silence()) {
+        match self.attempt.tried.failure.take_if(|(slip, _)| is_poll && slip.why.is_silence()) {
             Some((slip, came)) => {
                 self.came = came;
                 self.end_attempt(now, known, Err(slip));
@@ -293,7 +293,7 @@ impl<'r> Conversation<'r> {
         } else if why.is_refusal() && (!self.asks_again(why) || known.others) {
             // It may be meant for something else that was asked, or for the words that nobody asked for:
             // by whatever code, where the name is wrong in which it is read.
-            self.apart = false;
+            self.attempt.apart = false;
             self.course.asks_otherwise();
             self.state = State::Passing;
             return;

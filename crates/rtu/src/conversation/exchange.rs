@@ -116,14 +116,14 @@ impl<'r> Conversation<'r> {
                 flight.sent = Some(now);
                 return Polled::Send;
             }
-            None => match known.master.deadline() {
-                Some(until) => return Polled::Listen(until),
-                // It was handed out, and nobody said that it is on its way; or somebody else used the line.
-                None => {
-                    known.master.abort(now);
-                    Some(Unanswered::Misused)
+            None => {
+                if let Some(until) = known.master.deadline() {
+                    return Polled::Listen(until);
                 }
-            },
+                // It was handed out, and nobody said that it is on its way; or somebody else used the line.
+                known.master.abort(now);
+                Some(Unanswered::Misused)
+            }
             Some(Event::Answer(answer @ Answer::Exception { function, code, .. })) => {
                 // An exception is known by its two bytes: the frame that came is the one that is made here.
                 match unit {

@@ -6,7 +6,7 @@ use std::thread;
 use drivebus_rtu::{FreshWords, OwnEcho, Question, Request, SerialFormat, UnitAddress};
 
 use super::*;
-use crate::line::Line;
+
 use crate::turns::order::Priority;
 use crate::turns::queue::Waiter;
 
