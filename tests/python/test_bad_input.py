@@ -225,6 +225,28 @@ def test_the_machines_side_is_checked_too(virtual: Simulator) -> None:
         virtual.drive(3)
 
 
+TIMES: dict[str, Callable[[Simulator, Bus, float], object]] = {
+    "timeout of a bus": lambda simulator, _, time: Bus(simulator, timeout=time),
+    "timeout of a read": lambda _, bus, time: bus.read(1, 0x2103, timeout=time),
+    "timeout of a write": lambda _, bus, time: bus.write(1, 0x800B, 1, timeout=time),
+    "timeout of a unit": lambda _, bus, time: bus.configure(1, timeout=time),
+    "gap of a unit": lambda _, bus, time: bus.configure(1, gap=time),
+    "sleep": lambda _, bus, time: bus.sleep(time),
+    "listen": lambda _, bus, time: bus.listen(time),
+    "advance": lambda simulator, _, time: simulator.advance(time),
+}
+
+
+@pytest.mark.parametrize("what", TIMES)
+@pytest.mark.parametrize("time", [-1.0, -1e-9, -math.inf, math.inf, math.nan, 1e300])
+def test_no_time_is_longer_than_a_clock_counts_or_none_at_all(virtual: Simulator, what: str, time: float) -> None:
+    with Bus(virtual) as bus:
+        requests = bus.stats()["requests"]
+        with pytest.raises(NotAllowed, match=r"timeout|gap|second|time"):
+            TIMES[what](virtual, bus, time)
+        assert bus.stats()["requests"] == requests, "nothing was sent"
+
+
 def test_a_closed_bus_says_so(virtual: Simulator) -> None:
     bus = Bus(virtual)
     bus.close()
