@@ -29,6 +29,7 @@ fn main() {
         measured::find_a_frame_whole(&mut Framer::new(Duration::from_micros(1_750)), answer.as_bytes());
         measured::find_a_frame_byte_by_byte(&mut Framer::new(Duration::from_micros(1_750)), answer.as_bytes());
         measured::master_reads_16_words(&mut Master::new(&SerialFormat::DEFAULT), answer.as_bytes());
+        one_exchange_in_its_steps(answer.as_bytes());
         let profile = Profile::builtin("gd350").unwrap();
         let entries: Vec<&Entry> = profile.monitor().collect();
         measured::plan_the_monitor_list(&profile, &entries);
@@ -41,6 +42,17 @@ fn main() {
         measured::bus_reads_from_the_simulator(&simulated);
         measured::bus_reads_alone(&alone);
     }
+}
+
+/// Each call of a master that has a UART and no thread, with a master for each time that it is counted.
+fn one_exchange_in_its_steps(wire: &[u8]) {
+    let masters = &mut vec![Master::new(&SerialFormat::DEFAULT); STEPS];
+    let (last, first) = wire.split_last().unwrap();
+    measured::master_begins_a_read(masters);
+    measured::master_hands_out_the_request(masters);
+    measured::master_polls_in_vain(masters);
+    measured::master_takes_36_bytes_one_by_one(masters, first.try_into().unwrap());
+    measured::master_takes_the_last_byte(masters, *last);
 }
 
 /// What begins and ends with a name of `measured` is counted, so what those functions pass on stands here.
@@ -75,6 +87,10 @@ mod measured {
         Adu, Arc, Bus, Duration, Entry, Event, Frame, Framer, Instant, Master, Profile, ReadPlan, Request, STEPS,
         UnitAddress, black_box, copy, found, read_16_words,
     };
+
+    const AT: Instant = Instant::from_nanos(0);
+    /// The line has been silent for long by then.
+    const LATER: Instant = Instant::from_nanos(1_000_000_000);
 
     #[inline(never)]
     pub(super) fn crc_of_8_bytes(data: &[u8]) {
@@ -161,6 +177,52 @@ mod measured {
             master.sent(now);
             master.receive(now, black_box(wire));
             assert!(matches!(master.poll(now), Some(Event::Answer(_))));
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn master_begins_a_read(masters: &mut [Master]) {
+        black_box(line!());
+        for master in masters {
+            let request = Request::read(black_box(0x3000), 16).unwrap();
+            master.begin(AT, UnitAddress::MIN.into(), &request, Duration::from_millis(500)).unwrap();
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn master_hands_out_the_request(masters: &mut [Master]) {
+        black_box(line!());
+        for master in masters {
+            assert!(matches!(master.poll(LATER), Some(Event::Transmit(_))));
+            master.sent(LATER);
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn master_polls_in_vain(masters: &mut [Master]) {
+        black_box(line!());
+        for master in masters {
+            assert!(black_box(master.poll(black_box(LATER))).is_none());
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn master_takes_36_bytes_one_by_one(masters: &mut [Master], bytes: &[u8; 36]) {
+        black_box(line!());
+        for master in masters {
+            for byte in bytes.chunks(1) {
+                master.receive(LATER, black_box(byte));
+                assert!(black_box(master.poll(LATER)).is_none());
+            }
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn master_takes_the_last_byte(masters: &mut [Master], byte: u8) {
+        black_box(line!());
+        for master in masters {
+            master.receive(LATER, black_box(&[byte]));
+            assert!(matches!(master.poll(LATER), Some(Event::Answer(_))));
         }
     }
 

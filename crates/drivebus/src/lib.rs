@@ -41,7 +41,21 @@
 //!
 //! # Features
 //!
-//! `serial`, `tcp`, `sim` and `builtin-profiles`, all of them on by default.
+//! All on by default:
+//!
+//! | feature | what it brings |
+//! | --- | --- |
+//! | `serial` | serial ports of this machine |
+//! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
+//! | `share` | ports that programs of one user share, on systems with Unix sockets |
+//! | `sim` | simulated lines (`sim://`); it needs `builtin-profiles` |
+//! | `builtin-profiles` | the shipped profiles as part of the program |
+//!
+//! # Limits
+//!
+//! - It has words and values, and no operations of a drive: what runs, stops and proves that it stopped is in the Python
+//!   package. A program that moves motors from here writes the words and confirms them itself.
+//! - It is no safety function. An emergency stop is a wire.
 
 #![forbid(unsafe_code)]
 

@@ -32,6 +32,16 @@
 //! A family is a folder: `profile.toml` holds the rules, `registers.csv`, `parameters.csv` and `faults.csv` the long
 //! tables, each row with its source. Shipped profiles are part of the program; [`Profile::builtin_names`] lists them.
 //!
+//! # Features
+//!
+//! `builtin-profiles`, on by default: the shipped profiles are part of the program. Without it [`Profile::load`] is the only
+//! way to one.
+//!
+//! # Limits
+//!
+//! - A profile says what manuals say. What no manual prints is unknown here, and `evidence` says how well the rest is proved.
+//! - A value takes one word or two. Texts and longer values of some drives have no form here.
+//!
 //! # Rooms
 //!
 //! Each rests on those before it.

@@ -30,7 +30,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The rooms, each on those before it:
+//! # Features
+//!
+//! All on by default; `default-features = false` leaves a bus over any [`Line`] of your own.
+//!
+//! | feature | what it brings |
+//! | --- | --- |
+//! | `serial` | serial ports of this machine |
+//! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
+//! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
+//!
+//! # Limits
+//!
+//! - It is tested on Linux. RS-485 by the kernel's driver, the low latency of USB adapters and their identity are Linux's alone.
+//! - A silence is as exact as the system's clock and its scheduler: never shorter than it must be, often some tens of
+//!   microseconds longer.
+//! - One request at a time on a line, also over Modbus TCP.
+//! - Nothing here is a safety function, and nothing knows what a word means: that is `drivebus-drives`.
+//!
+//! # Rooms
+//!
+//! Each rests on those before it.
+//!
 //!
 //! | room | what is in it |
 //! | --- | --- |

@@ -61,6 +61,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Features
+//!
+//! None. Pseudo-terminals and the ear are Linux's, RTU over TCP is Unix's; the line in process runs everywhere.
+//!
+//! # Limits
+//!
+//! It is a line and drives as manuals describe them, typed with the assumptions below. That a program works here proves nothing
+//! about a motor.
+//!
 //! # Where it differs from hardware
 //!
 //! - Assumption: a unit takes a request as it is after exactly 3.5 characters of silence. A gap of more than 1.5
