@@ -176,7 +176,7 @@ impl Shared {
         turn: Turn<'_, Errand>,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Option<Result<Done, Box<CallError>>> {
-        let request = errand.request()?;
+        let request = errand.request(|| self.words.next())?;
         let ask = self.ask(errand.destination, &request, &errand.options);
         let mut call = Call::new(self, ask, errand.options).while_wanted(&*errand.wanted);
         Some(call.run_in(turn, &mut || self.is_shut(), take))
