@@ -186,8 +186,8 @@ impl Requests {
         let to = unit_address(unit)?.into();
         let options = CallOptions::default();
         Ok(match word {
-            Some(word) => self.ask(to, &Request::echo(word), options, round_trip),
-            None => self.send(round_trip, |then| Errand::echo(to, options, then)),
+            Some(word) => self.ask(to, &Request::echo(word), options, round_trip()),
+            None => self.send(round_trip(), |then| Errand::echo(to, options, then)),
         })
     }
 
@@ -296,9 +296,11 @@ where
 }
 
 /// How long the answer took, in seconds.
-fn round_trip(py: Python<'_>, reply: Reply, _: UnixClock) -> PyResult<Bound<'_, PyAny>> {
-    let Reply { done, .. } = reply;
-    Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64().into_pyobject(py)?.into_any())
+fn round_trip() -> impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResult<Bound<'py, PyAny>> + Send {
+    |py, reply, _| {
+        let time = reply.done.ended.saturating_duration_since(reply.done.sent).as_secs_f64();
+        Ok(time.into_pyobject(py)?.into_any())
+    }
 }
 
 /// A link, as the program gets it.
