@@ -41,7 +41,15 @@
 //!
 //! # Features
 //!
-//! `serial`, `tcp`, `sim` and `builtin-profiles`, all of them on by default.
+//! All of them are on by default.
+//!
+//! | feature | what it brings |
+//! | --- | --- |
+//! | `serial` | serial ports of this machine |
+//! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
+//! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
+//! | `sim` | simulated lines with simulated drives (`sim://`), and with it `builtin-profiles` |
+//! | `builtin-profiles` | the shipped profiles are part of the program |
 
 #![forbid(unsafe_code)]
 
