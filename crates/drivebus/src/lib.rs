@@ -41,13 +41,13 @@
 //!
 //! # Features
 //!
-//! All on by default:
+//! All of them are on by default.
 //!
 //! | feature | what it brings |
 //! | --- | --- |
 //! | `serial` | serial ports of this machine |
 //! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
-//! | `share` | ports that programs of one user share, on systems with Unix sockets |
+//! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
 //! | `sim` | simulated lines (`sim://`); it needs `builtin-profiles` |
 //! | `builtin-profiles` | the shipped profiles as part of the program |
 //!

@@ -206,7 +206,8 @@ impl Bus {
         }
     }
 
-    /// Of the last ten exchanges with `unit`, how many brought an answer.
+    /// Of the last ten exchanges with `unit`, how many brought an answer. Where another program has the port, it is asked, a
+    /// second at most; one that does not answer leaves what this bus saw itself.
     pub fn link(&self, unit: UnitAddress) -> Link {
         if !self.port().is_of_this_process() {
             return Link::default(); // a thread of the parent's may have held it
@@ -214,7 +215,17 @@ impl Bus {
         self.shared.link(unit)
     }
 
-    /// A word that no echo still under way carries: for [`Request::echo`].
+    /// As [`link`](Self::link), for who waits for nobody: `None` where another program has the port, and would be asked.
+    pub fn link_if_here(&self, unit: UnitAddress) -> Option<Link> {
+        if !self.shared.port.is_of_this_process() {
+            return Some(Link::default());
+        }
+        let is_elsewhere = self.shared.sharing.as_ref().is_some_and(|sharing| sharing.is_guest());
+        (!is_elsewhere).then(|| self.shared.port.figures.link(unit))
+    }
+
+    /// A word that no echo still under way carries: for [`Request::echo`]. Where another program has the port, it is asked, a
+    /// second at most; [`Errand::echo`](crate::Errand::echo) does not wait for that.
     pub fn fresh_word(&self) -> u16 {
         self.shared.fresh_word()
     }
@@ -243,7 +254,8 @@ impl Bus {
         }
     }
 
-    /// What has happened so far; nothing in a forked child, whose parent's it is.
+    /// What has happened so far; nothing in a forked child, whose parent's it is. Where another program has the port, it is
+    /// asked, a second at most.
     pub fn stats(&self) -> Stats {
         if !self.port().is_of_this_process() {
             return Stats::default(); // a thread of the parent's may have held it
@@ -252,6 +264,8 @@ impl Bus {
     }
 
     /// How often the port was opened again after it was lost, or was another program's and changed hands.
+    ///
+    /// Nobody is asked: another program that has the port says so with each answer, and whenever it opens it again.
     pub fn reconnects(&self) -> u64 {
         if self.port().is_of_this_process() { self.shared.reconnects() } else { 0 }
     }

@@ -332,7 +332,8 @@ mod tests {
 
         fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
             let at = |moment| Instant::ZERO + Duration::from_millis(moment);
-            let Some((_, bytes)) = self.pieces.pop_front_if(|(moment, _)| at(*moment) <= until) else {
+            let is_due = self.pieces.front().is_some_and(|(moment, _)| at(*moment) <= until);
+            let Some((_, bytes)) = is_due.then(|| self.pieces.pop_front()).flatten() else {
                 self.now = self.now.max(until);
                 return Ok(0);
             };

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use drivebus_line::{Bus as CoreBus, CallOptions, Errand, Reply, Running};
+use drivebus_line::{Bus as CoreBus, CallError, CallOptions, Errand, Link, Reply, Running};
 use drivebus_rtu::{Answer, Destination, Expected, Request};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -29,6 +29,9 @@ pub(crate) struct Requests {
     virtual_ahead: Option<f64>,
     inbox: Arc<Inbox>,
 }
+
+/// Who is told what came of an errand.
+type Then = Box<dyn FnOnce(Result<Reply, Box<CallError>>) + Send>;
 
 /// Something that was asked, and under which number its answer will come.
 #[pyclass(frozen, module = "drivebus._native")]
@@ -180,11 +183,13 @@ impl Requests {
 
     #[pyo3(signature = (unit, word = None, /))]
     fn echo(&self, unit: &Bound<'_, PyAny>, word: Option<&Bound<'_, PyAny>>) -> PyResult<Asked> {
-        let word = word.map_or_else(|| Ok(self.core.fresh_word()), |word| one_word("word", word))?;
-        Ok(self.ask(unit_address(unit)?.into(), &Request::echo(word), CallOptions::default(), |py, reply, _| {
-            let time = reply.done.ended.saturating_duration_since(reply.done.sent).as_secs_f64();
-            Ok(time.into_pyobject(py)?.into_any())
-        }))
+        let word = word.map(|word| one_word("word", word)).transpose()?;
+        let to = unit_address(unit)?.into();
+        let options = CallOptions::default();
+        Ok(match word {
+            Some(word) => self.ask(to, &Request::echo(word), options, round_trip()),
+            None => self.send(round_trip(), |then| Errand::echo(to, options, then)),
+        })
     }
 
     #[pyo3(signature = (unit, pdu, reply_length = None, /))]
@@ -198,9 +203,14 @@ impl Requests {
 
     #[pyo3(signature = (unit, /))]
     fn link(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        let (link, number) = (self.core.link(unit_address(unit)?), self.inbox.number());
-        self.inbox.post(number, move |py| Ok((link.good, link.asked).into_pyobject(py)?.into_any()));
-        Ok(Asked { number, how: How::Errand(None) })
+        let unit = unit_address(unit)?;
+        if let Some(link) = self.core.link_if_here(unit) {
+            let number = self.inbox.number();
+            self.inbox.post(number, shown(link));
+            return Ok(Asked { number, how: How::Errand(None) });
+        }
+        let core = Arc::clone(&self.core);
+        apart(&self.inbox, move |_| shown(core.link(unit)))
     }
 
     #[pyo3(signature = (seconds, /))]
@@ -254,14 +264,23 @@ impl Requests {
         options: CallOptions,
         make: impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
     ) -> Asked {
+        self.send(make, |then| Errand::new(to, request, options, then))
+    }
+
+    /// Leaves what `errand` makes with the bus: it is handed who is told what came of it.
+    fn send(
+        &self,
+        make: impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
+        errand: impl FnOnce(Then) -> Errand,
+    ) -> Asked {
         let (number, inbox) = (self.inbox.number(), Arc::clone(&self.inbox));
         let clock = UnixClock::of(&self.core, self.virtual_ahead);
-        let errand = Errand::new(to, request, options, move |result| {
+        let errand = errand(Box::new(move |result| {
             inbox.post(number, move |py| match result {
                 Ok(reply) => make(py, reply, clock),
                 Err(error) => Err(call_error(&error, clock)),
             });
-        });
+        }));
         Asked { number, how: How::Errand(self.core.send(errand)) }
     }
 }
@@ -275,6 +294,19 @@ where
     let (inbox, asked) = (Arc::clone(inbox), Arc::clone(&wanted));
     thread::Builder::new().name(String::from("drivebus-apart")).spawn(move || inbox.post(number, work(&asked)))?;
     Ok(Asked::apart(number, wanted))
+}
+
+/// How long the answer took, in seconds.
+fn round_trip() -> impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResult<Bound<'py, PyAny>> + Send {
+    |py, reply, _| {
+        let time = reply.done.ended.saturating_duration_since(reply.done.sent).as_secs_f64();
+        Ok(time.into_pyobject(py)?.into_any())
+    }
+}
+
+/// A link, as the program gets it.
+fn shown(link: Link) -> impl for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send {
+    move |py| Ok((link.good, link.asked).into_pyobject(py)?.into_any())
 }
 
 /// The words of the reply to a read, as many as were asked for.

@@ -256,7 +256,10 @@ class BusFace:
 
     @property
     def reconnects(self) -> int:
-        """How often the port was opened again after it was lost. Another drive may answer behind it."""
+        """How often the port was opened again after it was lost. Another drive may answer behind it.
+
+        Nobody is asked. Another program that has the port says so with each answer, and when it opens it again.
+        """
         return self._core().reconnects
 
     def stats(self) -> Stats:
@@ -264,5 +267,8 @@ class BusFace:
 
         `hints` says in words what the figures most likely mean and what to do; it is empty for a sound line.
         `wills` says what this bus did for programs that are gone, such as to halt what one of them ran.
+
+        Where another program has the port, it is asked, and waited for, a second at most: an event loop stands still
+        meanwhile.
         """
         return Stats(self._core().stats())

@@ -8,11 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll};
 use std::thread;
 
-use drivebus_line::{Bus as Core, CallOptions, Errand, Reply, Running};
+use drivebus_line::{Bus as Core, CallError, CallOptions, Errand, Reply, Running};
 use drivebus_rtu::{Destination, Request};
 
 use super::slot::Slot;
 use crate::error::Error;
+
+/// Who is told what came of an errand.
+type Then = Box<dyn FnOnce(Result<Reply, Box<CallError>>) + Send>;
 
 /// What was asked of a bus: a future of its answer.
 ///
@@ -46,9 +49,28 @@ impl<T: Send + 'static> Asked<T> {
         options: CallOptions,
         make: impl FnOnce(Reply) -> T + Send + 'static,
     ) -> Self {
+        Self::left(core, make, |then| Errand::new(to, request, options, then))
+    }
+
+    /// An echo of a word that no other one carries, from `to`; `make` makes of the reply what the program gets.
+    pub(super) fn echo(
+        core: &Arc<Core>,
+        to: Destination,
+        options: CallOptions,
+        make: impl FnOnce(Reply) -> T + Send + 'static,
+    ) -> Self {
+        Self::left(core, make, |then| Errand::echo(to, options, then))
+    }
+
+    /// What `errand` makes of who is told what came of it.
+    fn left(
+        core: &Arc<Core>,
+        make: impl FnOnce(Reply) -> T + Send + 'static,
+        errand: impl FnOnce(Then) -> Errand,
+    ) -> Self {
         let slot = Slot::new();
         let result = Arc::clone(&slot);
-        let errand = Errand::new(to, request, options, move |reply| result.put(reply.map(make).map_err(Error::from)));
+        let errand = errand(Box::new(move |reply| result.put(reply.map(make).map_err(Error::from))));
         Self { slot, state: State::Begins(Start::Errand(Arc::clone(core), errand)) }
     }
 

@@ -92,9 +92,11 @@ impl Bus {
 
     /// How long `unit` takes to send a word back: as [`Bus::echo`](crate::Bus::echo).
     pub fn echo(&self, unit: u8) -> Asked<Duration> {
-        let request = Request::echo(self.0.core.fresh_word());
-        let checked = checks::unit(unit).map(|unit| (unit.into(), request, LineOptions::default()));
-        self.ask(checked, |reply| reply.done.ended.saturating_duration_since(reply.done.sent))
+        let time = |reply: Reply| reply.done.ended.saturating_duration_since(reply.done.sent);
+        match checks::unit(unit) {
+            Ok(unit) => Asked::echo(&self.0.core, unit.into(), LineOptions::default(), time),
+            Err(error) => Asked::refused(error),
+        }
     }
 
     /// Sends any PDU: as [`Bus::transact`](crate::Bus::transact).

@@ -19,6 +19,8 @@ pub struct Errand {
     pub(super) destination: Destination,
     /// The whole request frame.
     frame: Vec<u8>,
+    /// Whether it is an echo whose word is chosen when its turn has come.
+    is_fresh_echo: bool,
     /// For a request that is carried as it is.
     answer: Option<AnswerLength>,
     pub(super) options: CallOptions,
@@ -55,11 +57,26 @@ impl Errand {
             _ => None,
         };
         let wanted = Arc::new(AtomicBool::new(true));
-        Self { destination, frame, answer, options, wanted, then: Some(Box::new(then)) }
+        Self { destination, frame, is_fresh_echo: false, answer, options, wanted, then: Some(Box::new(then)) }
     }
 
-    /// What is asked. Always there: it was made of a request.
-    pub(super) fn request(&self) -> Option<Request<'_>> {
+    /// As [`new`](Self::new), for an echo of a word that no echo still under way carries. Which one that is, is known where
+    /// the line is: it is asked there when its turn has come, and who leaves the errand does not wait for that.
+    pub fn echo(
+        destination: Destination,
+        options: CallOptions,
+        then: impl FnOnce(Result<Reply, Box<CallError>>) + Send + 'static,
+    ) -> Self {
+        let mut errand = Self::new(destination, &Request::echo(0), options, then);
+        errand.is_fresh_echo = true;
+        errand
+    }
+
+    /// What is asked; an echo carries `fresh`, unless its word was given. Always there: it was made of a request.
+    pub(super) fn request(&self, fresh: impl FnOnce() -> u16) -> Option<Request<'_>> {
+        if self.is_fresh_echo {
+            return Some(Request::echo(fresh()));
+        }
         let pdu = Frame::parse(&self.frame).ok()?.pdu();
         match self.answer {
             Some(length) => Request::custom(pdu, length),

@@ -79,6 +79,8 @@ struct Inside {
     connections: u64,
     /// To end them.
     streams: BTreeMap<u64, Arc<Kept<UnixStream>>>,
+    /// To say over them that the port was opened again.
+    watching: BTreeMap<u64, Channel>,
     programs: Vec<Arc<Entry>>,
 }
 
@@ -152,6 +154,17 @@ impl Guests {
         for stream in self.lock().streams.values() {
             // One that is ended already need not be.
             let _ = stream.shutdown(Shutdown::Read);
+        }
+    }
+
+    /// Tells who wants to know that the port was opened again, `reconnects` times by now. Nobody is waited for: who has left
+    /// that much unread is cut off, and comes back.
+    pub(super) fn reopened(&self, reconnects: u64) {
+        for channel in self.lock().watching.values_mut() {
+            if !channel.say_in_passing(&Told::Reconnects(reconnects)).unwrap_or(false) {
+                // One that is ended already need not be.
+                let _ = channel.end().shutdown(Shutdown::Both);
+            }
         }
     }
 
@@ -236,9 +249,24 @@ struct Visit {
     is_for_a_stop: bool,
 }
 
+impl Visit {
+    /// From now on it is said over `channel` when the port was opened again; first, how often it was by now.
+    fn watches(&self, channel: &Channel, port: &Port) -> Option<()> {
+        let mut inside = self.guests.lock();
+        let mut voice = channel.voice();
+        // Asked under the lock that who opens the port takes after it has counted: no opening falls between.
+        let is_said = voice.say_in_passing(&Told::Reconnects(port.figures.reconnects())).ok()?;
+        inside.watching.insert(self.number, voice);
+        is_said.then_some(())
+    }
+}
+
 impl Drop for Visit {
     fn drop(&mut self) {
-        self.guests.lock().streams.remove(&self.number);
+        let mut inside = self.guests.lock();
+        inside.streams.remove(&self.number);
+        inside.watching.remove(&self.number);
+        drop(inside);
         self.entry.connections.fetch_sub(1, Ordering::Relaxed);
     }
 }
@@ -351,7 +379,12 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<
             Told::Link { good: link.good, asked: link.asked }
         }
         Wish::FreshWord => Told::Word(port.words.next()),
-        Wish::Reconnects => Told::Reconnects(port.figures.reconnects()),
+        Wish::Reconnects => {
+            visit.watches(&channel.borrow(), &port)?;
+            drop(port);
+            // Whatever else is said there ends it.
+            return hear(&mut channel.borrow_mut()).and(None);
+        }
         Wish::Wills => {
             port.wills.look_soon();
             Told::Wills

@@ -94,7 +94,7 @@ impl Shared {
         turn: Turn<'_, Errand>,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Option<Result<Done, Box<CallError>>> {
-        let request = errand.request()?;
+        let request = errand.request(|| self.port.words.next())?;
         let ask = self.port.ask(errand.destination, &request, &errand.options);
         let mut call = Call::new(&self.port, ask, errand.options).while_wanted(&*errand.wanted);
         Some(call.run_in(turn, &mut || self.port.is_shut(), take))

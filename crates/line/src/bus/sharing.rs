@@ -109,9 +109,21 @@ impl Sharing {
     }
 
     /// Opens the port by `open`, or finds who has it.
-    fn opener(self: &Arc<Self>, mut open: Opener) -> Opener {
+    fn opener(self: &Arc<Self>, open: Opener) -> Opener {
         let sharing = Arc::clone(self);
+        let mut open = self.telling(open);
         Box::new(move || sharing.open(&mut open))
+    }
+
+    /// `open`, which tells who is in that the port was opened again, before anything is asked over it.
+    fn telling(self: &Arc<Self>, mut open: Opener) -> Opener {
+        let sharing = Arc::clone(self);
+        Box::new(move || {
+            let line = open()?;
+            let reconnects = sharing.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects;
+            sharing.guests.reopened(reconnects);
+            Ok(line)
+        })
     }
 
     /// The line; or an error, and a [`guest`](Self::guest) where another program serves the port.
@@ -201,11 +213,11 @@ impl Sharing {
         let _ = thread::Builder::new().name("drivebus-waits".to_owned()).spawn(move || {
             loop {
                 match guest.waits() {
-                    Wait::Kept(vigil) => {
+                    Wait::Kept(mut vigil) => {
                         if !both().is_some_and(|(_, sharing)| sharing.keeps(&vigil, &guest)) {
                             return;
                         }
-                        vigil.keep();
+                        vigil.keep(&guest);
                     }
                     Wait::Ended => {}
                     Wait::Impossible => return,

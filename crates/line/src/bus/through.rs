@@ -209,7 +209,7 @@ impl Shared {
             // It waits where the line is, and the next one here need not wait for that.
             drop(turn);
         }
-        let request = errand.request()?;
+        let request = errand.request(|| self.fresh_word())?;
         let mut give_up = || self.port.is_shut() || !errand.is_wanted();
         Some(self.call_shared(errand.destination, &request, errand.options, &mut give_up, take))
     }
@@ -337,14 +337,8 @@ impl Shared {
     }
 
     pub(super) fn reconnects(&self) -> u64 {
-        let count = |guest: &Guest, told| match told {
-            Told::Reconnects(there) => {
-                guest.saw(there);
-                Some(guest.reconnects())
-            }
-            _ => None,
-        };
-        self.told_at_once(&Wish::Reconnects, count).unwrap_or_else(|| self.port.figures.reconnects())
+        let guest = self.sharing.as_ref().and_then(|sharing| sharing.guest());
+        guest.map_or_else(|| self.port.figures.reconnects(), |guest| guest.reconnects())
     }
 }
 

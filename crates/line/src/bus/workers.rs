@@ -46,7 +46,7 @@ impl Bus {
         } else if self.is_shut() {
             Failure::Closed
         } else {
-            match errand.request() {
+            match errand.request(|| 0) {
                 Some(request) if self.options().read_only && request.is_write() => {
                     Failure::ReadOnly { function: request.function() }
                 }

@@ -154,6 +154,12 @@ impl Channel {
         !matches!(poll(&mut descriptors, Some(&now)), Ok(1..)) && !self.other.is_gone()
     }
 
+    /// The same connection, for who only says something there; who has this one says nothing any more.
+    pub(crate) fn voice(&self) -> Self {
+        let (stream, other) = (Arc::clone(&self.stream), Arc::clone(&self.other));
+        Self { stream, other, came: Vec::new(), unsent: Vec::new(), most: self.most }
+    }
+
     /// The same connection, to end it from elsewhere.
     pub(crate) fn end(&self) -> Arc<Kept<UnixStream>> {
         Arc::clone(&self.stream)

@@ -10,7 +10,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
-use rustix::event::{PollFd, PollFlags, poll};
 
 use crate::share::channel::Channel;
 use crate::share::message::{GREETING, Hello, LET_IN, SENT_AWAY, Told, VERSION, Welcome, Wish};
@@ -29,6 +28,8 @@ const LETS_GO: Duration = Duration::from_secs(2);
 /// is still to come: then it hangs. Who wants a stop has less time.
 const SILENT: Duration = Duration::from_secs(2);
 const SILENT_ON_A_STOP: Duration = Duration::from_secs(1);
+/// How long nothing may be heard of a port that is not opened again, until it is listened on: any time would do.
+const A_LOOK: Duration = Duration::from_secs(3_600);
 
 /// A port that another program has, as this one uses it.
 #[derive(Debug)]
@@ -70,11 +71,11 @@ impl std::fmt::Display for Host {
     }
 }
 
-/// A connection over which nothing is said: it ends when the program that has the port has closed it, or is gone.
+/// A connection over which it is said when the port was opened again. It ends when the program that has the port has closed
+/// it, or is gone.
 #[derive(Debug)]
 pub(crate) struct Vigil {
-    connection: Arc<Kept<UnixStream>>,
-    life: Arc<Life>,
+    channel: Channel,
     /// The other end, where the program that has the port has none: only its life is watched then.
     _own: Option<Kept<UnixStream>>,
 }
@@ -90,21 +91,20 @@ pub(crate) enum Wait {
 }
 
 impl Vigil {
-    /// Waits for its end.
-    pub(crate) fn keep(&self) {
+    /// Waits for its end; until then `guest` learns how often the port was opened again.
+    pub(crate) fn keep(&mut self, guest: &Guest) {
         loop {
-            let connection = PollFd::new(&**self.connection, PollFlags::RDHUP);
-            let life = self.life.end().map(|end| PollFd::from_borrowed_fd(end, PollFlags::IN));
-            let mut ends: Vec<_> = std::iter::once(connection).chain(life).collect();
-            if !matches!(poll(&mut ends, None), Err(rustix::io::Errno::INTR)) {
-                return;
+            match self.channel.hear(monotonic() + A_LOOK) {
+                Ok(Some(Told::Reconnects(there))) => guest.saw(there),
+                Ok(_) => {}
+                Err(_) => return,
             }
         }
     }
 
     /// How to end it from here.
     pub(crate) fn connection(&self) -> Arc<Kept<UnixStream>> {
-        Arc::clone(&self.connection)
+        self.channel.end()
     }
 }
 
@@ -191,14 +191,18 @@ impl Guest {
     pub(crate) fn waits(&self) -> Wait {
         let life = Arc::clone(&self.life);
         match self.connect(&self.hello, SILENT) {
-            Ok(channel) => Wait::Kept(Vigil { connection: channel.end(), life, _own: None }),
-            Err(Greeting::Gone) => Wait::Ended,
-            Err(Greeting::SentAway(_) | Greeting::Silent(_)) => match UnixStream::pair() {
-                Ok((one, other)) if life.end().is_some() => {
-                    Wait::Kept(Vigil { connection: Arc::new(Kept::new(one)), life, _own: Some(Kept::new(other)) })
-                }
-                _ => Wait::Impossible,
+            Ok(mut channel) => match channel.say(&Wish::Reconnects) {
+                Ok(()) => Wait::Kept(Vigil { channel, _own: None }),
+                Err(_) => Wait::Ended,
             },
+            Err(Greeting::Gone) => Wait::Ended,
+            Err(Greeting::SentAway(_) | Greeting::Silent(_)) if life.end().is_none() => Wait::Impossible,
+            Err(Greeting::SentAway(_) | Greeting::Silent(_)) => {
+                let kept = UnixStream::pair().and_then(|(one, other)| {
+                    Ok(Vigil { channel: Channel::new(one, MOST, life)?, _own: Some(Kept::new(other)) })
+                });
+                kept.map_or(Wait::Impossible, Wait::Kept)
+            }
         }
     }
 
@@ -225,7 +229,7 @@ impl Guest {
         self.gone.load(Ordering::Acquire)
     }
 
-    /// How often this program has seen the port opened again.
+    /// How often this program has seen the port opened again: known without asking, for it is told.
     pub(crate) fn reconnects(&self) -> u64 {
         self.before + self.seen.load(Ordering::Acquire).saturating_sub(self.began)
     }

@@ -22,7 +22,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 4;
+pub(crate) const VERSION: u8 = 5;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -86,6 +86,8 @@ pub(crate) enum Wish {
     Stats,
     Link(u8),
     FreshWord,
+    /// To be told how often the port was opened again: now, and each time that it is, until the connection ends. Nothing else
+    /// is wished over that one any more.
     Reconnects,
     /// A last will was left: it is to be watched from now on.
     Wills,
@@ -305,5 +307,20 @@ impl Told {
             ended: error.ended.map(Instant::as_nanos),
             reconnects,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By the specification of postcard's wire format: the place of the variant in its list, then what is in it; numbers in
+    /// groups of seven bits, the lowest first.
+    #[test]
+    fn what_is_said_of_reconnects_has_these_bytes() {
+        assert_eq!(postcard::to_stdvec(&Wish::Reconnects).unwrap(), [6]);
+        assert_eq!(postcard::to_stdvec(&Told::Reconnects(0)).unwrap(), [8, 0]);
+        assert_eq!(postcard::to_stdvec(&Told::Reconnects(300)).unwrap(), [8, 0xAC, 0x02]);
+        assert_eq!(postcard::from_bytes::<Told>(&[8, 0xAC, 0x02]).unwrap(), Told::Reconnects(300));
     }
 }
