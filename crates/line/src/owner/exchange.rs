@@ -64,8 +64,9 @@ fn follow(
     let mut buffer = [0; 256];
     // The end of the request.
     let mut out = None;
-    // What is queued already is no answer, and the line was not silent while it came: read without waiting.
-    let mut until = now;
+    // What is queued already is no answer, and the line was not silent while it came. Who waits for the silence finds it at
+    // once; where it was silent for long enough, it is looked for without waiting.
+    let mut until = master.deadline().map_or(now, |silent| silent.min(now + LOOK_UP));
     // The end of the time-out, when the request is out; whether nobody was looking since the last bytes came.
     let (mut limit, mut slept) = (now, false);
     loop {
