@@ -24,7 +24,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model oldest packages soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke \
         pictures matrix semver
 
@@ -36,6 +36,7 @@ help: ## what can be made
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
+	@echo "make schedules   each wake-up of the queue left out once, which the search of orders of threads must notice"
 	@echo "make matrix  every case of the tests of which make test runs a sample"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"
@@ -226,6 +227,10 @@ fuzz-corpus: $(FUZZ_NEEDS) ## adds what reaches code that nothing in fuzz/corpus
 	    $(FUZZ_RUN); \
 	    $$run fuzz/corpus/$$target $(FUZZ_FOUND)/$$target $$then -merge=1 -use_counters=0; \
 	done
+
+# Every wake-up of the queue left out once in a copy, which `make rust-test`'s search of orders of threads must notice.
+schedules: $(VENV)/.created ## some minutes; see tests/schedules/README.md
+	$(BIN)/python tools/check_schedules.py
 
 # Further than `make rust-test` searches, and every rule broken once in a copy: make model THREADS=4
 THREADS ?= 2

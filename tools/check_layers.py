@@ -460,7 +460,16 @@ def copy(root: Path, to: Path) -> None:
     to.mkdir(parents=True)
     for name in ("Cargo.toml", "Cargo.lock"):
         shutil.copy(root / name, to / name)
-    for name in ("crates", "python", "tests/rust", "tests/soak", "tests/model", "benches/rust", "fuzz"):
+    for name in (
+        "crates",
+        "python",
+        "tests/rust",
+        "tests/soak",
+        "tests/model",
+        "tests/schedules",
+        "benches/rust",
+        "fuzz",
+    ):
         ignored = shutil.ignore_patterns("__pycache__", "target", "*.so", "corpus")
         shutil.copytree(root / name, to / name, ignore=ignored)
 

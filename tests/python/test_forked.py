@@ -67,10 +67,12 @@ with open_bus() as bus:
         say("a child", slack())
         os._exit(0)
     os.waitpid(child, 0)
+say("closed", slack())
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has timer slack")
-def test_waits_leave_nothing_behind_for_children() -> None:
+def test_a_thread_that_waited_has_its_slack_again_in_children_and_when_it_closed_the_bus() -> None:
     with line("native") as there, there.start(SLACK) as program:
-        assert program.ends() == (0, ["asked for statistics 77000", "waited 77000", "a child 77000"], "")
+        said = ["asked for statistics 77000", "waited 1", "a child 77000", "closed 77000"]
+        assert program.ends() == (0, said, "")

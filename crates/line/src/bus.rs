@@ -50,6 +50,7 @@ use crate::health::stats::Stats;
 use crate::line::Opener;
 use crate::options::{BusOptions, CallOptions, LastWill, UnitOptions};
 use crate::ports::key::PortKey;
+use crate::system::punctual;
 use crate::trace::Watch;
 
 /// One line and its owner.
@@ -337,6 +338,7 @@ impl Drop for Bus {
             if self.shared.sharing.is_some() {
                 self.port().close();
             }
+            punctual::put_back();
         }
     }
 }

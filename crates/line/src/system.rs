@@ -9,3 +9,4 @@ pub(crate) mod inherited;
 mod listed;
 pub(crate) mod process;
 pub(crate) mod punctual;
+pub(crate) mod sync;

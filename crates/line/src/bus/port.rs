@@ -134,6 +134,7 @@ impl Port {
         if let Some(other) = self.ends.get() {
             other.end();
         }
+        punctual::put_back();
     }
 
     /// Ends the crew; what waits ends with [`Failure::Closed`].

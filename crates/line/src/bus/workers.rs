@@ -12,7 +12,7 @@ use crate::bus::shared::Shared;
 use crate::error::Failure;
 use crate::turns::crew::Employer;
 use crate::turns::order::{Priority, Ticket};
-use crate::turns::queue::{NoTurn, Queue, Turn};
+use crate::turns::queue::{NoTurn, Turn};
 
 /// An errand on its way.
 #[derive(Debug)]
@@ -110,22 +110,12 @@ fn work(bus: &Weak<Bus>) {
     }) else {
         return;
     };
-    let _member = Member(&queue);
-    while let Some((turn, errand)) = queue.next_work() {
+    queue.serve(|turn, errand| {
         // Where the bus is gone, dropping the errand tells so.
         if let Some(bus) = bus.upgrade() {
             carry_out(errand, &bus.shared, turn);
         }
-    }
-}
-
-/// Leaves the crew however its thread ends.
-struct Member<'a>(&'a Queue<Errand>);
-
-impl Drop for Member<'_> {
-    fn drop(&mut self) {
-        self.0.leave_crew();
-    }
+    });
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
-//! What a forked child does before anything else: it gives up what its parent has open (`listed`).
+//! What a forked child does before anything else: it gives up what its parent has open (`listed`), and has its own timer slack
+//! again (`punctual`).
 //!
 //! One of the two files of this project with `unsafe`: no crate offers `pthread_atfork` in safe Rust, since what runs there is
-//! bound as a signal handler is. It takes no lock, allocates nothing, and calls `dup3` alone (elsewhere than on Linux `dup2` and
-//! `fcntl`).
+//! bound as a signal handler is. It takes no lock, allocates nothing, and calls `dup3` and `prctl` alone (elsewhere than on Linux
+//! `dup2` and `fcntl`).
 //!
 //! Whoever forks by `fork` runs it, in C, Python or Rust. Nobody does who asks the system without the library: a bare `clone`, or
 //! `_Fork` of glibc, which is there to run no handlers.
@@ -12,7 +13,7 @@ use std::os::fd::RawFd;
 use std::sync::Once;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::system::listed;
+use crate::system::{listed, punctual};
 
 static ASKED: Once = Once::new();
 /// How many forks were begun, and are over, in this process.
@@ -66,6 +67,7 @@ extern "C" fn in_child() {
     listed::each(|nothing, number| {
         put(nothing, number);
     });
+    punctual::put_back();
 }
 
 /// Puts `nothing` in the place of `number`: nothing is unlocked, shut down or said, since that would be done to the parent's.

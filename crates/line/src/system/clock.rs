@@ -8,7 +8,9 @@ use std::thread;
 
 use drivebus_rtu::{Duration, Instant};
 
-use crate::system::punctual::{PUNCTUAL, Wait};
+#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+use crate::system::at_fork;
+use crate::system::punctual::{self, PUNCTUAL};
 
 /// How often somebody who waits looks up to see whether it should still wait.
 pub(crate) const LOOK_UP: Duration = Duration::from_millis(50);
@@ -34,9 +36,20 @@ pub fn monotonic() -> Instant {
 pub fn sleep_until(until: Instant) {
     let left = until.saturating_duration_since(monotonic());
     if left > PUNCTUAL {
-        let wait = Wait::begin();
-        thread::sleep(left.saturating_sub(wait.spin()));
+        thread::sleep(left.saturating_sub(spin()));
     }
+    spin_until(until);
+}
+
+/// How long before its moment a wait of this thread leaves the kernel and spins.
+fn spin() -> Duration {
+    // A child that is forked while this thread has less slack than its own has that again.
+    #[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+    at_fork::give_up_in_children();
+    punctual::spin()
+}
+
+fn spin_until(until: Instant) {
     while monotonic() < until {
         std::hint::spin_loop();
     }
@@ -66,17 +79,19 @@ pub(crate) fn wait_for_any<const COUNT: usize>(
     /// Longest single wait in the kernel; a later moment is waited for in turns. Some systems take at most 24 days.
     const TURN: Duration = Duration::from_secs(3_600);
 
-    let mut wait = None;
     loop {
         let left = until.saturating_duration_since(monotonic());
-        let in_kernel = if left > PUNCTUAL {
-            left.saturating_sub(wait.get_or_insert_with(Wait::begin).spin()).min(TURN)
-        } else {
+        let is_last = left <= PUNCTUAL;
+        let in_kernel = if is_last {
+            // On the clock alone, and one look at its end: to look all the while would be a system call each time.
+            spin_until(until);
             Duration::ZERO
+        } else {
+            left.saturating_sub(spin()).min(TURN)
         };
         let timeout = Timespec::try_from(in_kernel).unwrap_or_default(); // cannot fail: at most an hour
         match poll(descriptors, Some(&timeout)) {
-            Ok(0) if left.is_zero() => return Ok(None),
+            Ok(0) if is_last => return Ok(None),
             Ok(0) | Err(rustix::io::Errno::INTR) => {}
             Ok(_) => return Ok(Some(std::array::from_fn(|place| descriptors[place].revents()))),
             Err(error) => return Err(error.into()),

@@ -1,5 +1,6 @@
 //! What a thread asks of the system so that its waits end on time.
 
+use std::cell::Cell;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -19,31 +20,47 @@ pub(crate) fn note() -> Option<String> {
     REFUSED.get().cloned().flatten()
 }
 
-/// A wait of this thread, for which it has the least timer slack. Afterwards its earlier settings are restored: threads and
-/// programs that it starts inherit its slack, and keep it for good.
-#[derive(Debug)]
-pub(crate) struct Wait {
-    former: Option<slack::Slack>,
+/// What became of asking for the least timer slack.
+#[derive(Debug, Clone, Copy)]
+enum Asked {
+    NotYet,
+    /// It was granted; the thread had this before.
+    Granted(slack::Slack),
+    Refused,
 }
 
-impl Wait {
-    pub(crate) fn begin() -> Self {
-        let asked = slack::least();
-        REFUSED.get_or_init(|| asked.as_ref().err().cloned());
-        Self { former: asked.ok() }
-    }
-
-    /// How long before its moment it leaves the kernel and spins.
-    pub(crate) fn spin(&self) -> Duration {
-        if self.former.is_some() { PUNCTUAL } else { AS_USUAL }
-    }
+thread_local! {
+    static ASKED: Cell<Asked> = const { Cell::new(Asked::NotYet) };
 }
 
-impl Drop for Wait {
-    fn drop(&mut self) {
-        if let Some(former) = self.former.take() {
-            slack::put_back(former);
-        }
+/// How long before its moment a wait of this thread leaves the kernel and spins.
+///
+/// The first wait of a thread asks for the least timer slack, and the thread keeps it: to ask for each wait and to give it
+/// back costs three system calls, and a read has four waits. What the thread sets itself later is left alone. It has its own
+/// slack again after [`put_back`], which it calls where it closes a bus; so does a forked child. A thread that it begins, and
+/// a program that it runs meanwhile, inherits what it has.
+pub(crate) fn spin() -> Duration {
+    let asked = match ASKED.get() {
+        Asked::NotYet => ask(),
+        asked => asked,
+    };
+    if matches!(asked, Asked::Granted(_)) { PUNCTUAL } else { AS_USUAL }
+}
+
+#[cold]
+fn ask() -> Asked {
+    let answer = slack::least();
+    REFUSED.get_or_init(|| answer.as_ref().err().cloned());
+    let asked = answer.map_or(Asked::Refused, Asked::Granted);
+    ASKED.set(asked);
+    asked
+}
+
+/// This thread has the slack again that it had before its first wait, until it waits again. It takes no lock and allocates
+/// nothing: a forked child begins with it.
+pub(crate) fn put_back() {
+    if let Asked::Granted(former) = ASKED.replace(Asked::NotYet) {
+        slack::put_back(former);
     }
 }
 
@@ -56,11 +73,13 @@ mod slack {
     /// Nanoseconds by which waits of the calling thread may end late.
     pub(super) type Slack = u64;
 
+    const LEAST: u64 = 1;
+
     /// Asks for the least, and returns what it was.
     pub(super) fn least() -> Result<Slack, String> {
         let ask = || {
             let former = current_timer_slack()?;
-            set_current_timer_slack(NonZeroU64::new(1)).map(|()| former)
+            set_current_timer_slack(NonZeroU64::new(LEAST)).map(|()| former)
         };
         ask().map_err(|error| {
             format!(
@@ -70,9 +89,12 @@ mod slack {
         })
     }
 
+    /// Unless the thread has set another one meanwhile.
     pub(super) fn put_back(former: Slack) {
-        // What was in force before is not refused.
-        let _ = set_current_timer_slack(NonZeroU64::new(former));
+        if current_timer_slack() == Ok(LEAST) {
+            // What was in force before is not refused.
+            let _ = set_current_timer_slack(NonZeroU64::new(former));
+        }
     }
 }
 
@@ -110,22 +132,45 @@ pub(crate) fn go_first() -> Result<(), String> {
 
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
-    use super::*;
+    use std::num::NonZeroU64;
+    use std::thread;
 
+    use rustix::thread::{current_timer_slack, set_current_timer_slack};
+
+    use super::*;
     use crate::system::clock::{monotonic, sleep_until};
-    use rustix::thread::current_timer_slack;
+
+    fn wait() {
+        sleep_until(monotonic() + Duration::from_millis(1));
+    }
 
     #[test]
-    fn a_thread_has_no_slack_while_it_waits_and_its_own_afterwards() {
-        std::thread::spawn(|| {
+    fn a_thread_has_no_slack_from_its_first_wait_on_and_its_own_when_that_is_put_back() {
+        thread::spawn(|| {
             let own = current_timer_slack().unwrap();
             assert_ne!(own, 1, "this machine starts programs without slack, so nothing is seen here");
-            let wait = Wait::begin();
-            assert_eq!((current_timer_slack(), wait.spin()), (Ok(1), PUNCTUAL));
-            drop(wait);
+            wait();
+            assert_eq!((current_timer_slack(), spin(), note()), (Ok(1), PUNCTUAL, None));
+            put_back();
             assert_eq!(current_timer_slack(), Ok(own));
-            sleep_until(monotonic() + Duration::from_millis(1));
-            assert_eq!((current_timer_slack(), note()), (Ok(own), None));
+            put_back();
+            assert_eq!(current_timer_slack(), Ok(own));
+            wait();
+            assert_eq!(current_timer_slack(), Ok(1));
+        })
+        .join()
+        .unwrap();
+    }
+
+    #[test]
+    fn a_thread_is_asked_for_once_and_what_it_sets_itself_is_left_alone() {
+        thread::spawn(|| {
+            wait();
+            set_current_timer_slack(NonZeroU64::new(7_000)).unwrap();
+            (0..3).for_each(|_| wait());
+            assert_eq!(current_timer_slack(), Ok(7_000));
+            put_back();
+            assert_eq!(current_timer_slack(), Ok(7_000));
         })
         .join()
         .unwrap();

@@ -7,11 +7,11 @@ mod work;
 
 use std::collections::HashSet;
 use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, Thread, ThreadId};
 
 use crate::system::clock::{LOOK_UP, monotonic};
+use crate::system::sync::atomic::{AtomicU64, Ordering};
+use crate::system::sync::thread::{self, Thread, ThreadId};
+use crate::system::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use crate::turns::crew::Crew;
 use crate::turns::order::{Claim, Order, Priority, Ticket};
 

@@ -105,9 +105,10 @@ impl<'r> Conversation<'r> {
             _ => u16::MAX,
         };
         let State::InFlight(flight) = &mut self.state else { return Polled::Over };
-        // What is queued already is no answer, and the line was not silent while it came.
+        // What is queued already is no answer, and the line was not silent while it came. Who waits for the silence finds it at
+        // once; where it was silent for long enough, it is looked for without waiting.
         if !flight.listened {
-            return Polled::Listen(now);
+            return Polled::Listen(known.master.deadline().unwrap_or(now));
         }
         let (unit, expected) = (unit_of(&flight.ask), flight.ask.request.expected());
         let (timeout, sent) = (flight.timeout, flight.sent);

@@ -1,11 +1,11 @@
 //! Whether the line goes from hand to hand, for who waits for it in another program: a thread that hangs with it is told.
 
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
 use crate::system::clock::monotonic;
+use crate::system::sync::atomic::Ordering;
 use crate::turns::order::Ticket;
 use crate::turns::queue::Queue;
 

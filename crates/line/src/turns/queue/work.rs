@@ -1,9 +1,7 @@
 //! Work that waits in the queue without a thread, in the same order as everybody: it is left there, taken back, and carried
 //! out by one of the crew when its turn comes.
 
-use std::sync::{MutexGuard, PoisonError};
-use std::thread;
-
+use crate::system::sync::{MutexGuard, PoisonError, thread};
 use crate::turns::crew::{Crew, Employer};
 use crate::turns::order::{Claim, Ticket};
 use crate::turns::queue::{NoTurn, Queue, State, Turn, Waiter};
@@ -53,7 +51,7 @@ impl<W> Queue<W> {
     }
 
     /// For one of the crew: waits for work whose turn has come. `None` when it is no longer needed.
-    pub(crate) fn next_work(&self) -> Option<(Turn<'_, W>, W)> {
+    fn next_work(&self) -> Option<(Turn<'_, W>, W)> {
         let mut state = self.lock();
         let mut waited = false;
         loop {
@@ -73,11 +71,13 @@ impl<W> Queue<W> {
         }
     }
 
-    /// One of the crew ends. Whoever is next may have counted on it.
-    pub(crate) fn leave_crew(&self) {
-        let mut state = self.lock();
-        state.crew.has_left();
-        self.call_next(state);
+    /// For one of the crew, from its beginning to its end: carries out what is next, until nothing comes for a while or the
+    /// crew is dismissed.
+    pub(crate) fn serve(&self, mut carry_out: impl FnMut(Turn<'_, W>, W)) {
+        let _member = Member(self);
+        while let Some((turn, work)) = self.next_work() {
+            carry_out(turn, work);
+        }
     }
 
     /// Calls one of the crew to the work that is next.
@@ -96,6 +96,18 @@ impl<W> Queue<W> {
             drop(state);
             drop(refused);
         }
+    }
+}
+
+/// Leaves the crew however its thread ends.
+struct Member<'a, W>(&'a Queue<W>);
+
+impl<W> Drop for Member<'_, W> {
+    /// Whoever is next may have counted on it.
+    fn drop(&mut self) {
+        let mut state = self.0.lock();
+        state.crew.has_left();
+        self.0.call_next(state);
     }
 }
 
