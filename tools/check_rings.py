@@ -199,7 +199,7 @@ BREAKS: list[tuple[str, str, set[str]]] = [
 HARMLESS: list[tuple[str, str]] = [
     ("crates/rtu/src/crc.rs", '// use crate::frame::Frame;\nconst F: &str = "crate::frame::Frame";\n'),
     ("crates/rtu/src/crc.rs", "#[cfg(test)]\nmod more { use crate::frame::Frame; }\n"),
-    ("crates/line/src/bus/call/course.rs", "use crate::bus::call::Call;\n"),
+    ("crates/rtu/src/conversation/course.rs", "use crate::conversation::Conversation;\n"),
 ]
 
 

@@ -13,9 +13,11 @@
 //! | `longer_reads` | how many words a read asks for, so that its answer is told apart |
 //! | `among_others` | the same where other masters' answers come, too |
 //! | `first_contact` | a stop's reads on a line that was just opened |
-//! | `echo` | adapters that send our own bytes back |
+//! | `adapter`, `echo` | whether the adapter sends our own bytes back |
+//! | `units`, `watched` | what is remembered of each unit |
 //! | `dead_units` | units that do not answer |
 
+mod adapter;
 mod among_others;
 mod attempt;
 mod came_to;
@@ -31,6 +33,7 @@ mod outcome;
 mod probes;
 mod question;
 mod units;
+mod watched;
 mod write_back;
 
 use core::time::Duration;

@@ -15,6 +15,7 @@
 use super::known::{Ask, Known, Next};
 use super::longer_reads::{Shape, shape};
 use super::probes::{MAX_WORDS, Probe};
+use super::watched::Watched;
 use crate::{Attribution, Destination, FIRST_CONTACT, Instant, Request, Table, UnitAddress};
 
 /// Of so many lengths, the shortest that are free, one is chosen by chance: two that do the same must not do it in step.
@@ -22,47 +23,6 @@ const CHOICE: usize = 8;
 
 /// Lengths that are looked at: all that a read may be asked for in.
 const LENGTHS: usize = MAX_WORDS as usize;
-
-/// Of so many shapes it is remembered that nobody else asks for them; what is forgotten is found out again.
-const PROVEN: usize = 32;
-
-/// What is remembered of one unit for telling its answers apart.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Watched {
-    /// What it was asked last, and until when an answer to that may still come which was not taken.
-    last: Option<(Shape, Instant)>,
-    /// A read of it was proven since the line was opened.
-    met: bool,
-    /// What was found to be asked by nobody else, while somebody was there.
-    proven: [Option<Shape>; PROVEN],
-    /// How many were proven, which says where the next is kept.
-    next: u8,
-}
-
-impl Watched {
-    /// At `now` `ask` is over; whether it was refused.
-    #[cold]
-    pub(super) fn asked(&mut self, now: Instant, ask: &Ask<'_>, refused: bool) {
-        self.last = Some((shape(&ask.request), now + ask.timeout));
-        self.met |= refused && matches!(ask.request, Request::Read { .. });
-    }
-
-    /// Whether the answer to what it was asked before could come for that to `shape`.
-    fn may_be_behind(&self, now: Instant, shape: Shape) -> bool {
-        self.last.is_some_and(|(last, until)| last == shape && now < until)
-    }
-
-    fn is_proven(&self, shape: Shape) -> bool {
-        self.proven.contains(&Some(shape))
-    }
-
-    fn proves(&mut self, shape: Shape) {
-        if !self.is_proven(shape) {
-            self.proven[usize::from(self.next) % PROVEN] = Some(shape);
-            self.next = self.next.wrapping_add(1);
-        }
-    }
-}
 
 /// A few lengths, shortest first.
 #[derive(Default)]
@@ -118,7 +78,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
             return theirs.filter(|_| !in_quarantine).map(|_| Next::AskUntold);
         }
         let (watched, has_others) = (self.watched(unit), self.master.has_others(now, unit));
-        let is_watched = has_others || !watched.met;
+        let is_watched = has_others || !watched.has_met();
         let is_behind = watched.may_be_behind(now, shape(&ask.request));
         if theirs.is_none() && !(is_watched && apart) {
             let parts = is_behind && !in_quarantine;
@@ -222,8 +182,8 @@ impl<const U: usize, const P: usize> Known<U, P> {
         let has_others = self.master.has_others(now, unit);
         let watched = &mut self.units.of(unit).watched;
         if !has_others {
-            watched.proven = [None; PROVEN];
-            return !watched.met;
+            watched.forgets_what_was_proven();
+            return !watched.has_met();
         }
         !watched.is_proven(shape(request))
     }
@@ -234,7 +194,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
         if is_ours {
             let has_others = self.master.has_others(now, unit);
             let watched = &mut self.units.of(unit).watched;
-            watched.met = true;
+            watched.meets();
             if has_others {
                 watched.proves(shape(request));
             }

@@ -2,8 +2,7 @@
 
 use core::time::Duration;
 
-use super::units::Units;
-use crate::{Instant, UnitAddress};
+use crate::Instant;
 
 /// After so many calls in a row that brought silence a unit counts as dead. One may be a single bad moment.
 const DEAD_AFTER: u32 = 2;
@@ -42,50 +41,39 @@ pub(super) struct Life {
 }
 
 impl Life {
-    fn is_dead(&self) -> bool {
-        self.silent >= DEAD_AFTER
+    /// It answered at `now`, or refused.
+    pub(super) fn answered(&mut self, now: Instant) {
+        *self = Self { answered: Some(now), ..Self::default() };
     }
 
-    fn is_alive(&self, now: Instant) -> bool {
-        !self.is_dead() && self.answered.is_some_and(|then| now.saturating_duration_since(then) < ALIVE)
-    }
-}
-
-/// The verdict holds for who has the line: of two who asked for it while they waited, the second would be told the same.
-impl<const N: usize> Units<N> {
-    /// `unit` answered at `now`, or refused.
-    pub(super) fn answered(&mut self, unit: UnitAddress, now: Instant) {
-        self.of(unit).life = Life { answered: Some(now), ..Life::default() };
-    }
-
-    /// A call to `unit`, with all its attempts, brought silence, and ended at `now`.
-    pub(super) fn silent(&mut self, unit: UnitAddress, now: Instant) {
-        let shared = self.is_shared(now);
-        let life = &mut self.of(unit).life;
-        life.silent = life.silent.saturating_add(1);
-        life.since = now;
+    /// A call to it, with all its attempts, brought silence, and ended at `now`. `shared`: others who answer use the line.
+    pub(super) fn silent(&mut self, now: Instant, shared: bool) {
+        self.silent = self.silent.saturating_add(1);
+        self.since = now;
         // Only a wait that was waited makes the next one longer. After a power cut all units come back within a second.
-        life.period = match life.silent {
+        self.period = match self.silent {
             0..=DEAD_AFTER => FIRST_PERIOD,
-            _ if shared => (2 * life.period).min(LONGEST_PERIOD),
-            _ => life.period,
+            _ if shared => (2 * self.period).min(LONGEST_PERIOD),
+            _ => self.period,
         };
     }
 
-    /// Whether `unit` may be asked at `now`.
-    pub(super) fn verdict(&self, unit: UnitAddress, now: Instant) -> Verdict {
-        match self.get(unit).map(|unit| &unit.life) {
-            Some(life) if life.is_dead() && self.is_shared(now) => {
-                let until = life.since + life.period;
-                if now < until { Verdict::Wait(until) } else { Verdict::AskOnce }
-            }
-            _ => Verdict::Ask,
+    /// Whether it may be asked at `now`, where others who answer use the line.
+    pub(super) fn verdict(&self, now: Instant) -> Verdict {
+        let until = self.since + self.period;
+        match self.is_dead() {
+            false => Verdict::Ask,
+            true if now < until => Verdict::Wait(until),
+            true => Verdict::AskOnce,
         }
     }
 
-    /// Whether anybody who answers uses the line.
-    fn is_shared(&self, now: Instant) -> bool {
-        self.iter().any(|unit| unit.life.is_alive(now))
+    pub(super) fn is_dead(&self) -> bool {
+        self.silent >= DEAD_AFTER
+    }
+
+    pub(super) fn is_alive(&self, now: Instant) -> bool {
+        !self.is_dead() && self.answered.is_some_and(|then| now.saturating_duration_since(then) < ALIVE)
     }
 }
 
@@ -96,6 +84,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::UnitAddress;
+    use crate::conversation::units::Units;
 
     type All = Units<247>;
 

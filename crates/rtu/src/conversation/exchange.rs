@@ -212,7 +212,7 @@ impl<'r> Conversation<'r> {
         let others = known.others;
         let record = known.units.of(unit);
         if others {
-            record.watched.asked(ended, &Ask { timeout: flight.timeout, ..*ask }, refused);
+            record.watched.asked(ended, &ask.request, flight.timeout, refused);
         }
         if flight.is_met && (failure.is_none() || refused) {
             record.met.answered();

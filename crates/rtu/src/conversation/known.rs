@@ -289,7 +289,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         match attribution {
             Attribution::Wait(until) => Next::Overtaken(until),
             Attribution::Others(_) => Next::OthersAsk,
-            sure => Next::Ask(sure),
+            sure @ (Attribution::Certain | Attribution::Repeat { .. }) => Next::Ask(sure),
         }
     }
 

@@ -1,10 +1,10 @@
 //! What is known of each unit, in a table without a heap.
 
-use super::among_others::Watched;
-use super::dead_units::Life;
+use super::dead_units::{Life, Verdict};
 use super::first_contact::Met;
 use super::probes::Probing;
-use crate::UnitAddress;
+use super::watched::Watched;
+use crate::{Instant, UnitAddress};
 
 /// Everything that is known of one unit.
 #[derive(Debug, Clone, Copy, Default)]
@@ -64,6 +64,32 @@ impl<const N: usize> Units<N> {
     /// The same, to be changed.
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Unit> {
         self.records.iter_mut()
+    }
+
+    /// `unit` answered at `now`, or refused.
+    pub(super) fn answered(&mut self, unit: UnitAddress, now: Instant) {
+        self.of(unit).life.answered(now);
+    }
+
+    /// A call to `unit`, with all its attempts, brought silence, and ended at `now`.
+    pub(super) fn silent(&mut self, unit: UnitAddress, now: Instant) {
+        let shared = self.is_shared(now);
+        self.of(unit).life.silent(now, shared);
+    }
+
+    /// Whether `unit` may be asked at `now`.
+    ///
+    /// It holds for who has the line: of two who asked for it while they waited, the second would be told the same.
+    pub(super) fn verdict(&self, unit: UnitAddress, now: Instant) -> Verdict {
+        match self.get(unit).map(|unit| &unit.life) {
+            Some(life) if life.is_dead() && self.is_shared(now) => life.verdict(now),
+            _ => Verdict::Ask,
+        }
+    }
+
+    /// Whether anybody who answers uses the line.
+    fn is_shared(&self, now: Instant) -> bool {
+        self.iter().any(|unit| unit.life.is_alive(now))
     }
 
     const fn has_all() -> bool {
