@@ -232,9 +232,6 @@ impl Owner {
                 _ => {}
             }
         });
-        if matches!(failure, Some(Failure::Port(_))) {
-            self.close();
-        }
     }
 
     /// How long the unit took: from the last character of the request to the first of the answer.

@@ -46,8 +46,11 @@ impl<'a, 'r> Talk<'a, 'r> {
         Self { call, ask, is_wanted, cuts: [None, None] }
     }
 
-    /// It is cut short at `now` by `failure`.
+    /// It is cut short at `now` by `failure`. A port that failed is opened again by who asks next.
     pub(crate) fn cut_short(&mut self, owner: &mut Owner, now: Instant, failure: Failure) {
+        if matches!(failure, Failure::Port(_)) {
+            owner.close();
+        }
         let cut = match &failure {
             Failure::Port(PortError { kind: PortErrorKind::Lost, .. }) => Cut::Lost,
             Failure::Port(_) => Cut::Unusable,
