@@ -69,7 +69,7 @@ pub(crate) enum Does {
     Refuses(u8),
     /// These bytes come in the place of an answer.
     Says(Vec<u8>),
-    /// It answers right, and behind that these bytes come.
+    /// It answers right, and at once behind that these bytes come.
     And(Vec<u8>),
 }
 use Does::{And, Damaged, DoneUnsaid, Late, Nothing, Refuses, Right, Says};
@@ -279,7 +279,7 @@ impl Rig {
                     }
                     And(more) => {
                         self.wire.push_back((then, answer));
-                        self.wire.push_back((then + ms(5), more));
+                        self.wire.push_back((then, more));
                     }
                     _ => self.wire.push_back((then, answer)),
                 }
