@@ -5,11 +5,13 @@ use drivebus_rtu::*;
 use crate::rig::Does::{And, Refuses, Right};
 use crate::rig::*;
 
-const OTHERS: Opened = Opened::new().may_echo(false).may_have_others(true);
+fn others() -> Opened {
+    Opened::new().may_echo(false).may_have_others(true)
+}
 
 /// Such a line, with nothing in doubt.
 fn rig() -> Rig {
-    let mut rig = Rig::opened(OTHERS, OwnEcho::Absent);
+    let mut rig = Rig::opened(others(), OwnEcho::Absent);
     rig.now = at(5_000);
     rig
 }
@@ -117,7 +119,7 @@ fn others_that_fall_silent_are_forgotten_with_time() {
     let mut rig = rig();
     assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]));
     theirs(&mut rig, &words(&[0x77]));
-    rig.now = rig.now + 2 * drivebus_rtu::OTHERS;
+    rig.now = rig.now + 2 * OTHERS;
     let told = rig.run(ask(9, 1));
     assert_eq!(told.end, End::Words(vec![9]));
     assert_eq!(told.sent[0], read(9, 1));

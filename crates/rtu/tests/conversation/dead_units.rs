@@ -28,7 +28,7 @@ fn a_dead_unit_is_not_asked_while_others_use_the_line() {
     let mut rig = rig();
     let began = rig.now;
     let told = rig.run(ask(7, 1).retries(2));
-    let left = Duration::from_secs(1) - 3 * TIMEOUT;
+    let left = ms(700);
     assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::NotAsked { left }), 0));
     assert_eq!(told.stood_by, [began + 3 * TIMEOUT], "off the line, for as long as it would have been silent");
 }

@@ -126,11 +126,9 @@ fn many_words_and_coils_are_read_back_as_they_were_written() {
     assert_eq!((told.end, told.sent[2].clone()), (End::Done, read(9, 2)));
     let told = Rig::settled().always(16, DoneUnsaid).always(3, Says(words(&[5, 7]))).run(question);
     assert_eq!(told.end, End::Failed(Unanswered::NotTaken { times: 1 }));
-    for (on, shown, end) in [
-        (true, 1, End::Done),
-        (false, 0, End::Done),
-        (true, 0, End::Failed(Unanswered::NotTaken { times: 1 })),
-    ] {
+    for (on, shown, end) in
+        [(true, 1, End::Done), (false, 0, End::Done), (true, 0, End::Failed(Unanswered::NotTaken { times: 1 }))]
+    {
         let question = Question::new(UNIT.into(), Request::write_coil(9, on), TIMEOUT).read_back(Some(9));
         let mut rig = Rig::settled().always(5, Nothing);
         rig.registers.insert(9, shown);
