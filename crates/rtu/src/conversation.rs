@@ -43,7 +43,7 @@ use crate::{Destination, Instant, Request, UnitAddress};
 use attempt::Attempt;
 use course::Course;
 use dead_units::Verdict;
-use exchange::Flight;
+use exchange::{Flight, Purpose};
 use known::Ask;
 use outcome::{Bytes, Kept, Slip};
 use write_back::Write;
@@ -279,14 +279,15 @@ impl<'r> Conversation<'r> {
     ///
     /// # Errors
     ///
-    /// [`OutOfTurn`]: nothing was to be sent.
+    /// [`OutOfTurn`]: nothing was to be sent, or it was said before.
     pub fn sent<const U: usize, const P: usize>(
         &mut self,
         known: &mut Known<U, P>,
         end: Instant,
     ) -> Result<Instant, OutOfTurn> {
-        match &self.state {
-            State::InFlight(flight) if flight.sent.is_some() => {
+        match &mut self.state {
+            State::InFlight(flight) if flight.sent.is_some() && !flight.is_out && flight.is_begun_last(known) => {
+                flight.is_out = true;
                 known.master.sent(end);
                 Ok(end + flight.timeout)
             }
@@ -298,15 +299,19 @@ impl<'r> Conversation<'r> {
     ///
     /// # Errors
     ///
-    /// [`OutOfTurn`]: it does not listen.
+    /// [`OutOfTurn`]: it does not listen, or `now` is before the last moment that it was told.
     pub fn heard<const U: usize, const P: usize>(
         &mut self,
         now: Instant,
         known: &mut Known<U, P>,
         bytes: &[u8],
     ) -> Result<usize, OutOfTurn> {
+        if now < self.latest {
+            return Err(OutOfTurn);
+        }
+        self.latest = now;
         match &mut self.state {
-            State::InFlight(flight) => {
+            State::InFlight(flight) if flight.is_begun_last(known) => {
                 flight.listened = true;
                 Ok(known.master.receive(now, bytes))
             }
@@ -334,7 +339,7 @@ impl<'r> Conversation<'r> {
         let why = Unanswered::CutShort(why);
         match self.state {
             State::InFlight(flight) => {
-                known.master.abort(now);
+                flight.give_up(now, known);
                 self.came.clear();
                 self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
             }
@@ -356,7 +361,7 @@ impl<'r> Conversation<'r> {
     /// The unit has been quiet for so long at `now`, and whoever is more urgent waits: it is waited for no longer.
     pub fn give_way<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, quiet: Duration) {
         if let State::InFlight(flight) = self.state {
-            known.master.abort(now);
+            flight.give_up(now, known);
             self.came.clear();
             let why = Unanswered::NoAnswer { timeout: quiet, attempts: 1 };
             self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
@@ -392,13 +397,31 @@ impl<'r> Conversation<'r> {
         Slip { why, sent, ended }
     }
 
+    /// When what the caller asks went out last, as far as it did.
+    fn question_sent(&self) -> Option<Instant> {
+        let before = self.write.as_ref().and_then(Write::before);
+        match &self.state {
+            _ if before.is_some() => before,
+            State::InFlight(flight) | State::Over(flight, _) | State::Heard(flight, _) => match flight.purpose {
+                Purpose::LookAfter { times } | Purpose::Proof { times, .. } => Some(times.sent),
+                Purpose::Look | Purpose::Probe(_) => None,
+                _ => flight.sent,
+            },
+            State::Proving { times, .. } => Some(times.sent),
+            _ => None,
+        }
+    }
+
     #[cold]
     fn misused<const U: usize, const P: usize>(&mut self, known: &mut Known<U, P>) {
-        if !matches!(self.state, State::Done(_)) {
-            known.master.abort(self.latest);
-            let slip = self.slip(Unanswered::Misused, None, self.latest);
-            self.state = State::Done(Err(slip));
+        let sent = self.question_sent();
+        match &self.state {
+            State::Done(_) => return,
+            State::InFlight(flight) => flight.give_up(self.latest, known),
+            _ => {}
         }
+        let slip = self.slip(Unanswered::Misused, sent, self.latest);
+        self.state = State::Done(Err(slip));
     }
 
     /// How long a unit that was silent may keep its caller waiting: no longer than it would by staying silent again. Who

@@ -60,10 +60,28 @@ pub(super) struct Flight<'r> {
     pub(super) sent: Option<Instant>,
     /// Whether what came before it was taken in: that is no answer.
     pub(super) listened: bool,
+    /// Whether it was said that it is on its way.
+    pub(super) is_out: bool,
+    /// Which request on its line it is.
+    number: u32,
     /// Whether its unit may still answer another program.
     is_met: bool,
     /// What was seen beside its answer.
     tally: Tally,
+}
+
+impl Flight<'_> {
+    /// Whether nothing was begun on its line since.
+    pub(super) fn is_begun_last<const U: usize, const P: usize>(&self, known: &Known<U, P>) -> bool {
+        self.number == known.begun
+    }
+
+    /// It is waited for no longer.
+    pub(super) fn give_up<const U: usize, const P: usize>(&self, now: Instant, known: &mut Known<U, P>) {
+        if self.is_begun_last(known) {
+            known.master.abort(now);
+        }
+    }
 }
 
 impl<'r> Conversation<'r> {
@@ -86,11 +104,24 @@ impl<'r> Conversation<'r> {
             }
             _ => ask.timeout,
         };
-        let flight = Flight { ask, purpose, timeout, sent: None, listened: false, is_met, tally: Tally::default() };
+        let flight = Flight {
+            ask,
+            purpose,
+            timeout,
+            sent: None,
+            listened: false,
+            is_out: false,
+            number: known.begun.wrapping_add(1),
+            is_met,
+            tally: Tally::default(),
+        };
         known.master.keep_gap(self.question.gap);
         let begin = if ask.in_doubt { Master::begin_in_doubt } else { Master::begin };
         match begin(&mut known.master, now, ask.destination, &ask.request, timeout) {
-            Ok(()) => self.state = State::InFlight(flight),
+            Ok(()) => {
+                known.begun = flight.number;
+                self.state = State::InFlight(flight);
+            }
             Err(error) => {
                 let slip = self.slip(Unanswered::NotBegun(error), None, now);
                 self.over(known, flight, Err(slip));
@@ -105,6 +136,13 @@ impl<'r> Conversation<'r> {
             _ => u16::MAX,
         };
         let State::InFlight(flight) = &mut self.state else { return Polled::Over };
+        if !flight.is_begun_last(known) {
+            let slip = Slip { why: Unanswered::Misused, sent: flight.sent, ended: now };
+            let flight = *flight;
+            self.came.clear();
+            self.over(known, flight, Err(slip));
+            return Polled::Over;
+        }
         // What is queued already is no answer, and the line was not silent while it came. Who waits for the silence finds it at
         // once; where it was silent for long enough, it is looked for without waiting.
         if !flight.listened {
@@ -123,6 +161,7 @@ impl<'r> Conversation<'r> {
                 }
                 // It was handed out, and nobody said that it is on its way; or somebody else used the line.
                 known.master.abort(now);
+                self.came.clear();
                 Some(Unanswered::Misused)
             }
             Some(Event::Answer(answer @ Answer::Exception { function, code, .. })) => {

@@ -109,6 +109,8 @@ pub struct Known<const UNITS: usize = 247, const PLACES: usize = 1024> {
     openings: u32,
     /// Which connection it is, as the caller counts them.
     connection: u64,
+    /// How many requests were begun.
+    pub(super) begun: u32,
     pub(super) chance: u64,
     /// What came while nothing was asked.
     strays: Tally,
@@ -129,6 +131,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             is_open: false,
             openings: 0,
             connection: 0,
+            begun: 0,
             // Of zero nothing but zero comes.
             chance: chance | 1,
             strays: Tally::EMPTY,

@@ -64,6 +64,11 @@ impl<'r> Write<'r> {
         Some(Self { read, times: 0, before: None, left: retries.saturating_mul(2), looking: None })
     }
 
+    /// When it went out last, once it is known what came of that.
+    pub(super) const fn before(&self) -> Option<Instant> {
+        self.before
+    }
+
     /// Whether it is read back now.
     pub(super) const fn is_reading(&self) -> bool {
         self.looking.is_some()

@@ -1,0 +1,16 @@
+//! One call from its first thought to its end, on paper: what is asked of a scripted unit, in which order, and what the caller
+//! is told. Each test holds one rule that `src/conversation/` states.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+
+mod among_others;
+mod dead_units;
+mod echo;
+mod first_contact;
+mod longer_reads;
+mod misuse;
+mod port;
+mod probes;
+mod retries;
+mod rig;
+mod verified;
+mod write_back;
