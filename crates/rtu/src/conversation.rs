@@ -213,6 +213,12 @@ impl<'r> Conversation<'r> {
         }
     }
 
+    /// From now on probes take their words from `words`: for who carries several conversations on from one, each as if there
+    /// were no other.
+    pub const fn take_words_from(&mut self, words: &'r FreshWords) {
+        self.words = words;
+    }
+
     /// From the next request on a read waits no longer for the first character of its answer than `longest`, and the time that
     /// its characters take on top: what the unit's answers have taught.
     pub const fn expect_within(&mut self, longest: Option<Duration>) {
