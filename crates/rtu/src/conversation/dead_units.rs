@@ -11,12 +11,12 @@ const DEAD_AFTER: u32 = 2;
 /// The first wait: who switches a drive on sees it answer within a second.
 const FIRST_PERIOD: Duration = Duration::from_secs(1);
 
-/// The longest wait: a time-out of half a second takes 6 % of the line then.
-const LONGEST_PERIOD: Duration = Duration::from_secs(8);
+/// The longest wait, in times of the first: a time-out of half a second takes 6 % of the line then.
+const LONGEST: u8 = 8;
 
 /// How long an answer shows that its unit is alive. No shorter than the longest period: units are often asked only
 /// every few seconds, and the line is shared with them all the same.
-const ALIVE: Duration = LONGEST_PERIOD;
+const ALIVE: Duration = FIRST_PERIOD.saturating_mul(LONGEST as u32);
 
 /// Whether a unit may be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +37,8 @@ pub(super) struct Life {
     silent: u32,
     /// When the last of them ended.
     since: Instant,
-    /// For how long it is not asked then.
-    period: Duration,
+    /// For how long it is not asked then, in times of the first period.
+    periods: u8,
 }
 
 impl Life {
@@ -65,10 +65,10 @@ impl<const N: usize> Units<N> {
         life.silent = life.silent.saturating_add(1);
         life.since = now;
         // Only a wait that was waited makes the next one longer. After a power cut all units come back within a second.
-        life.period = match life.silent {
-            0..=DEAD_AFTER => FIRST_PERIOD,
-            _ if shared => (2 * life.period).min(LONGEST_PERIOD),
-            _ => life.period,
+        life.periods = match life.silent {
+            0..=DEAD_AFTER => 1,
+            _ if shared => (2 * life.periods).min(LONGEST),
+            _ => life.periods,
         };
     }
 
@@ -76,7 +76,7 @@ impl<const N: usize> Units<N> {
     pub(super) fn verdict(&self, unit: UnitAddress, now: Instant) -> Verdict {
         match self.get(unit).map(|unit| &unit.life) {
             Some(life) if life.is_dead() && self.is_shared(now) => {
-                let until = life.since + life.period;
+                let until = life.since + FIRST_PERIOD * life.periods.into();
                 if now < until { Verdict::Wait(until) } else { Verdict::AskOnce }
             }
             _ => Verdict::Ask,
