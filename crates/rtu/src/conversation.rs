@@ -318,6 +318,11 @@ impl<'r> Conversation<'r> {
             }
             // The unit has said what it does, whoever waits for that.
             State::Over(..) | State::Heard(..) | State::Done(_) => {}
+            // Nothing of it has begun.
+            State::Sparing { .. } => {
+                let slip = self.slip(why, None, now);
+                self.finish(known, Err(slip));
+            }
             _ => {
                 let slip = self.slip(why, None, now);
                 self.end_attempt(now, known, Err(slip));

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use drivebus_rtu::{Agreement, Framer, Master, Slave, Sniffer};
+use drivebus_rtu::{Agreement, Conversation, Framer, Known, Master, Slave, Sniffer};
 
 fn read(path: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
@@ -30,6 +30,10 @@ fn table(title: &str) -> BTreeMap<String, usize> {
 fn the_readme_says_the_bytes_of_each_state_machine() {
     let sizes = [
         ("Master", size_of::<Master>()),
+        ("Known<1, 16>", size_of::<Known<1, 16>>()),
+        ("Known<4, 16>", size_of::<Known<4, 16>>()),
+        ("Known<247, 1024>", size_of::<Known<247, 1024>>()),
+        ("Conversation", size_of::<Conversation<'static>>()),
         ("Slave", size_of::<Slave>()),
         ("Framer", size_of::<Framer>()),
         ("Sniffer", size_of::<Sniffer>()),

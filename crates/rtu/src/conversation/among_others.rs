@@ -25,13 +25,14 @@ const CHOICE: usize = 8;
 const LENGTHS: usize = MAX_WORDS as usize;
 
 /// A few lengths, shortest first.
-#[derive(Default)]
 struct Lengths {
     of: [(u16, Shape); LENGTHS],
     len: usize,
 }
 
 impl Lengths {
+    const NONE: Self = Self { of: [(0, Shape::NONE); LENGTHS], len: 0 };
+
     fn push(&mut self, words: u16, shape: Shape) {
         if let Some(free) = self.of.get_mut(self.len) {
             *free = (words, shape);
@@ -86,7 +87,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
                 return parts.then(|| self.parts(now, unit, &ask.request)).flatten();
             }
         }
-        let mut free = Lengths::default();
+        let mut free = Lengths::NONE;
         for (words, read) in self.longer.lengths(unit, &ask.request) {
             if !free.has(shape(&read)) && self.is_told(now, unit, &read, in_quarantine) {
                 free.push(words, shape(&read));
@@ -101,7 +102,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
                 None => None,
             };
         }
-        let mut ahead = Lengths::default();
+        let mut ahead = Lengths::NONE;
         for &(words, shape) in free.all() {
             if !watched.may_be_behind(now, shape) {
                 ahead.push(words, shape);
@@ -137,7 +138,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
     pub(super) fn other_length(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<u16> {
         let Request::Read { table, address, count, .. } = *request else { return None };
         let is_free = |read: &Request<'_>| shape(read) != shape(request) && self.is_told(now, unit, read, false);
-        let mut free = Lengths::default();
+        let mut free = Lengths::NONE;
         let fewer = (1..count).filter_map(|words| Some((words, Request::read_of(table, address, words).ok()?)));
         for (words, read) in fewer.filter(|(_, read)| is_free(read)).take(CHOICE) {
             free.push(words, shape(&read));

@@ -194,6 +194,11 @@ impl<'r> Conversation<'r> {
         };
         let other = known.other_length(now, unit, &ask.request);
         match other.and_then(|words| Request::read_of(table, address, words).ok()) {
+            // What cannot be proven any more may be another's.
+            Some(_) if !self.course.sends() => {
+                let slip = self.slip(Unanswered::OthersAsk, Some(times.sent), times.ended);
+                self.end_attempt(now, known, Err(slip));
+            }
             Some(request) => {
                 self.counts.resyncs += 1;
                 let purpose = Purpose::Proof { of: ask.request, count, times };

@@ -10,12 +10,12 @@ const DEAD_AFTER: u32 = 2;
 /// The first wait: who switches a drive on sees it answer within a second.
 const FIRST_PERIOD: Duration = Duration::from_secs(1);
 
-/// The longest wait: a time-out of half a second takes 6 % of the line then.
-const LONGEST_PERIOD: Duration = Duration::from_secs(8);
+/// The longest wait, in times of the first: a time-out of half a second takes 6 % of the line then.
+const LONGEST: u8 = 8;
 
 /// How long an answer shows that its unit is alive. No shorter than the longest period: units are often asked only
 /// every few seconds, and the line is shared with them all the same.
-const ALIVE: Duration = LONGEST_PERIOD;
+const ALIVE: Duration = FIRST_PERIOD.saturating_mul(LONGEST as u32);
 
 /// Whether a unit may be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,8 +36,8 @@ pub(super) struct Life {
     silent: u32,
     /// When the last of them ended.
     since: Instant,
-    /// For how long it is not asked then.
-    period: Duration,
+    /// For how long it is not asked then, in times of the first period.
+    periods: u8,
 }
 
 impl Life {
@@ -51,16 +51,16 @@ impl Life {
         self.silent = self.silent.saturating_add(1);
         self.since = now;
         // Only a wait that was waited makes the next one longer. After a power cut all units come back within a second.
-        self.period = match self.silent {
-            0..=DEAD_AFTER => FIRST_PERIOD,
-            _ if shared => (2 * self.period).min(LONGEST_PERIOD),
-            _ => self.period,
+        self.periods = match self.silent {
+            0..=DEAD_AFTER => 1,
+            _ if shared => (2 * self.periods).min(LONGEST),
+            _ => self.periods,
         };
     }
 
     /// Whether it may be asked at `now`, where others who answer use the line.
     pub(super) fn verdict(&self, now: Instant) -> Verdict {
-        let until = self.since + self.period;
+        let until = self.since + FIRST_PERIOD * self.periods.into();
         match self.is_dead() {
             false => Verdict::Ask,
             true if now < until => Verdict::Wait(until),

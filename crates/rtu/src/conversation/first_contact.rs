@@ -133,7 +133,7 @@ impl Met {
             None => {
                 let input = Request::read_of(Table::Input, address, 1).ok()?;
                 let function = input.expected().function();
-                let is_new = !self.has_read(|(asked, _)| asked == function)
+                let is_new = !self.has_read(|asked| asked.function() == function)
                     && master.attribution(now, unit, &input) == Attribution::Certain;
                 is_new.then_some(Put::BehindInput)
             }

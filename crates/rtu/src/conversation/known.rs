@@ -84,13 +84,8 @@ impl Opened {
 /// What is known of a line, without a heap: of `UNITS` units, and of `PLACES` places where longer reads were refused.
 ///
 /// With fewer units than are asked a call to one more ends with [`Unanswered::NoRoom`](crate::Unanswered::NoRoom); with
-/// fewer places more is asked that was refused before. 247 and 1024 is what a computer keeps.
-///
-/// | of | bytes on 64 bits |
-/// | --- | --- |
-/// | 1 unit, 16 places | 4 312 |
-/// | 4 units, 16 places | 5 368 |
-/// | 247 units, 1024 places | 105 000 |
+/// fewer places more is asked that was refused before. 247 and 1024 is what a computer keeps. How many bytes that takes is told
+/// under "RAM" in the crate's description.
 #[derive(Debug, Clone)]
 pub struct Known<const UNITS: usize = 247, const PLACES: usize = 1024> {
     pub(super) master: Master,

@@ -4,6 +4,8 @@
 //! asks for the next registers too, and what was not asked for is cut off. Not every unit has a register there, and none
 //! known here gives more than 16 words: what was refused is remembered, and is not asked for again.
 
+use core::num::NonZeroU16;
+
 use super::probes::MAX_WORDS;
 use crate::{Instant, Master, Request, Table, UnitAddress};
 
@@ -26,13 +28,29 @@ struct Limit {
     silent: u16,
 }
 
-/// What answers to a read look like: function and bytes on the wire, 0 where their number is not known.
-pub(super) type Shape = (u8, u16);
+/// What answers to a read look like: function and bytes on the wire, 0 where their number is not known. Two bytes, as many are
+/// kept of each unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape(NonZeroU16);
+
+impl Shape {
+    /// How many bits hold the bytes on the wire, 256 at most; above them is the function, 1 to 127.
+    const LEN_BITS: u32 = 9;
+
+    /// None of these has it: it has no function.
+    pub(super) const NONE: Self = Self(NonZeroU16::MIN);
+
+    /// By which function.
+    pub(super) const fn function(self) -> u8 {
+        (self.0.get() >> Self::LEN_BITS).to_be_bytes()[1]
+    }
+}
 
 /// The shape of the answers to `request`.
 pub(super) fn shape(request: &Request<'_>) -> Shape {
     let expected = request.expected();
-    (expected.function(), expected.adu_len().and_then(|len| u16::try_from(len).ok()).unwrap_or(0))
+    let len = expected.adu_len().and_then(|len| u16::try_from(len).ok()).unwrap_or(0);
+    NonZeroU16::new(u16::from(expected.function()) << Shape::LEN_BITS | len).map_or(Shape::NONE, Shape)
 }
 
 impl<const N: usize> Longer<N> {

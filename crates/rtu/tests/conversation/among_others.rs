@@ -2,7 +2,7 @@
 
 use drivebus_rtu::*;
 
-use crate::rig::Does::{And, Refuses, Right};
+use crate::rig::Does::{And, AndBefore, Refuses, Right};
 use crate::rig::*;
 
 fn others() -> Opened {
@@ -130,4 +130,14 @@ fn a_line_of_ones_own_has_no_others() {
     let rig = Rig::settled();
     assert!(!rig.known.may_have_others());
     assert!(self::rig().known.may_have_others());
+}
+
+#[test]
+fn what_proves_an_answer_counts_as_a_request_of_the_call() {
+    for retries in 0..3 {
+        let mut rig = rig();
+        rig.then = AndBefore;
+        let told = rig.run(ask(9, 1).retries(retries));
+        assert!(told.sent.len() <= 8 * (retries as usize + 1), "{} for {retries}: {:?}", told.sent.len(), told.end);
+    }
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 mod among_others;
+mod anything;
 mod dead_units;
 mod echo;
 mod first_contact;

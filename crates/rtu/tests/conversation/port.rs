@@ -36,6 +36,18 @@ fn a_port_that_cannot_be_used_ends_the_call() {
     assert!(told.sent.is_empty());
 }
 
+#[test]
+fn a_call_that_is_cut_short_before_it_began_is_over() {
+    for cut in [Cut::Lost, Cut::Unusable, Cut::GivenUp] {
+        let mut rig = Rig::settled();
+        let fresh = FreshWords::beginning_at(1);
+        let mut call = Conversation::new(set(7, 1).retries(3), &fresh);
+        call.cut_short(rig.now, &mut rig.known, cut);
+        let told = rig.carry_out(&mut call);
+        assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(cut)), 0));
+    }
+}
+
 /// Asks until the request is on the wire, and loses the port there.
 fn lost_in_flight(rig: &mut Rig, call: &mut Conversation<'_>) {
     loop {

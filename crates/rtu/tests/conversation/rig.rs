@@ -71,8 +71,10 @@ pub(crate) enum Does {
     Says(Vec<u8>),
     /// It answers right, and at once behind that these bytes come.
     And(Vec<u8>),
+    /// It answers right, and at once behind that comes what it answered to the request before, once more.
+    AndBefore,
 }
-use Does::{And, Damaged, DoneUnsaid, Late, Nothing, Refuses, Right, Says};
+use Does::{And, AndBefore, Damaged, DoneUnsaid, Late, Nothing, Refuses, Right, Says};
 
 /// What was done with a call, and what it came to.
 #[derive(Debug)]
@@ -116,6 +118,8 @@ pub(crate) struct Rig {
     pub(crate) echoes: bool,
     /// What happens when others may go first, in order.
     pub(crate) passes: VecDeque<Cut>,
+    /// What it said last.
+    before: Vec<u8>,
     /// What is on its way.
     wire: VecDeque<(Instant, Vec<u8>)>,
 }
@@ -136,6 +140,7 @@ impl Rig {
             registers: BTreeMap::new(),
             echoes: false,
             passes: VecDeque::new(),
+            before: Vec::new(),
             wire: VecDeque::new(),
         }
     }
@@ -266,8 +271,9 @@ impl Rig {
             Nothing => {}
             Refuses(code) => say(then, sealed(&[frame[0], function | 0x80, code])),
             Says(bytes) => say(then, bytes),
-            Right | DoneUnsaid | Late(_) | Damaged | And(_) => {
+            Right | DoneUnsaid | Late(_) | Damaged | And(_) | AndBefore => {
                 let mut answer = self.answer(frame);
+                let before = std::mem::replace(&mut self.before, answer.clone());
                 match does {
                     DoneUnsaid => return,
                     Late(later) => return self.comes(later, answer),
@@ -281,6 +287,7 @@ impl Rig {
                         self.wire.push_back((then, answer));
                         self.wire.push_back((then, more));
                     }
+                    AndBefore => self.wire.extend([(then, answer), (then, before)]),
                     _ => self.wire.push_back((then, answer)),
                 }
             }
