@@ -1,10 +1,9 @@
 //! Whether each doubt ends within its stated time. Asked of every state that is reached, so that what has to happen some
 //! time is a question about one state.
 
-use drivebus_rtu::{Adu, Answer, Attribution, Event, Instant, Request};
+use drivebus_rtu::{Adu, Answer, Attribution, Event, Instant, OwnEcho, Request};
 
 use crate::frames::Kind;
-use crate::program::Knowledge;
 use crate::scenario::{LONGEST, PATIENCE, STRANGERS_COME_FOR};
 use crate::world::{State, TICK, Unit, address};
 
@@ -13,7 +12,7 @@ const FRESH: u16 = 0xFFFE;
 
 /// What outlasts its time about a unit; `None` where all is well.
 pub fn overdue(state: &State) -> Option<&'static str> {
-    if state.program.in_flight().is_some() {
+    if state.program.is_sending() || state.program.in_flight().is_some() {
         return None;
     }
     (0..state.units.len()).find_map(|unit| {
@@ -31,7 +30,7 @@ pub fn overdue(state: &State) -> Option<&'static str> {
 fn is_uncertain(state: &State, unit: usize, at: Instant) -> bool {
     [Kind::Read(1), Kind::Read(2), Kind::Run]
         .iter()
-        .any(|kind| state.master.attribution(at, address(unit), &kind.request()) != Attribution::Certain)
+        .any(|kind| state.master().attribution(at, address(unit), &kind.request()) != Attribution::Certain)
 }
 
 /// Whether the doubt about `unit`, if it never returned an echo, goes on when first contact is over and it has owed nothing
@@ -46,16 +45,16 @@ fn outlasts_its_time(state: &State, unit: usize) -> bool {
 
 /// Whether the echo of a fresh word does not end the doubt about `unit`.
 fn outlasts_an_echo(state: &State, unit: usize) -> bool {
-    if !state.is_doubted(unit) || state.program.knowledge == Knowledge::Auto {
+    if !state.is_doubted(unit) || state.known.echo() == OwnEcho::Unknown {
         return false;
     }
-    let (mut master, unit, now) = (state.master.clone(), address(unit), state.now);
+    let (mut master, unit, now) = (state.master().clone(), address(unit), state.now);
     let echo = Request::echo(FRESH);
     let went_out =
         master.begin(now, unit.into(), &echo, 2 * TICK).is_ok() && matches!(master.poll(now), Some(Event::Transmit(_)));
     master.sent(now);
     let request = Adu::request(unit.into(), &echo);
-    if state.program.knowledge == Knowledge::Present {
+    if state.known.echo() == OwnEcho::Present {
         master.receive(now, request.as_bytes());
         if master.poll(now).is_some() {
             return true;

@@ -3,7 +3,7 @@
 //! All units have equal registers, all reads begin at the same one, and all commands are the same word. So answers differ
 //! by their shape alone, which is the worst case: whatever can be mistaken is mistaken.
 
-use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, UnitAddress, function};
+use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, Table, UnitAddress, function};
 
 /// Where reads begin.
 const STATE: u16 = 0x2100;
@@ -15,42 +15,75 @@ const STOP: u16 = 5;
 /// What the registers hold, before and after they have changed.
 const VALUES: [u16; 2] = [0x0003, 0x0008];
 
-/// What a request is.
+/// The most words that are read here.
+const LONGEST: usize = 16;
+
+/// What a request is: of the program, or of what comes before and behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
-    /// So many words are read, 1 or 2.
+    /// So many words are read.
     Read(u16),
+    /// One word is read to see whether a motor stands, with the urgency of a stop.
+    Watch,
+    /// One input register is read. No program asks that here.
+    Input,
     /// A command that moves something: sent once.
     Run,
     /// A stop: sent at once, in doubt or not.
     Stop,
+    /// A value is written that can be read back: what the registers hold after they have changed.
+    Set,
     /// A word is sent to come back.
     Echo(u16),
-    /// One word is read to see whether the adapter sends requests back; what is answered does not matter.
-    Look,
 }
 
 impl Kind {
     /// As it is asked.
     pub fn request(self) -> Request<'static> {
+        self.request_at(STATE)
+    }
+
+    /// The same, where it is a read, from `place` on.
+    pub fn request_at(self, place: u16) -> Request<'static> {
         match self {
-            // Two words from a register in the middle: no range is left.
-            Self::Read(count) => Request::read(STATE, count).unwrap_or(Request::echo(count)),
-            Self::Look => Self::Read(1).request(),
+            // A few words from a register in the middle: no range is left.
+            Self::Read(count) => Request::read(place, count).unwrap_or(Request::echo(count)),
+            Self::Watch => Self::Read(1).request_at(place),
+            Self::Input => Request::read_of(Table::Input, place, 1).unwrap_or(Request::echo(1)),
             Self::Run => Request::write(COMMAND, RUN),
             Self::Stop => Request::write(COMMAND, STOP),
+            Self::Set => Request::write(STATE, VALUES[1]),
             Self::Echo(word) => Request::echo(word),
         }
     }
 
-    /// Whether words are read for their own sake.
+    /// What `frame` asks, and from where it reads.
+    pub fn sent(frame: &[u8]) -> Option<(Self, u16)> {
+        let [_, pdu @ .., _, _] = frame else { return None };
+        Some(match Request::parse(pdu).ok()? {
+            Request::Read { table: Table::Holding, address, count, .. } => (Self::Read(count), address),
+            Request::Read { table: Table::Input, address, count: 1, .. } => (Self::Input, address),
+            Request::WriteSingle { address: COMMAND, value: RUN, .. } => (Self::Run, 0),
+            Request::WriteSingle { address: COMMAND, value: STOP, .. } => (Self::Stop, 0),
+            Request::WriteSingle { address: STATE, .. } => (Self::Set, 0),
+            Request::Echo { data, .. } => (Self::Echo(data), 0),
+            _ => return None,
+        })
+    }
+
+    /// Where the words of a write can be read back.
+    pub fn read_back(self) -> Option<u16> {
+        (self == Self::Set).then_some(STATE)
+    }
+
+    /// Whether words are read.
     pub const fn is_read(self) -> bool {
-        matches!(self, Self::Read(_))
+        matches!(self, Self::Read(_) | Self::Watch | Self::Input)
     }
 
     /// Whether the unit does something.
     pub const fn is_write(self) -> bool {
-        matches!(self, Self::Run | Self::Stop)
+        matches!(self, Self::Run | Self::Stop | Self::Set)
     }
 }
 
@@ -59,6 +92,8 @@ impl Kind {
 pub enum Content {
     /// So many words, from before or after the registers changed.
     Words(u16, bool),
+    /// The word of an input register, from before or after it changed.
+    Input(bool),
     /// The unit has done it.
     Done(Kind),
     /// The word came back.
@@ -72,8 +107,13 @@ impl Content {
     pub fn adu(self, unit: UnitAddress) -> Adu {
         match self {
             Self::Words(count, changed) => {
-                let words = [VALUES[usize::from(changed)]; 2];
-                let answer = Answer::read(&words[..usize::from(count.clamp(1, 2))]);
+                let words = [VALUES[usize::from(changed)]; LONGEST];
+                let answer = Answer::read(&words[..usize::from(count).clamp(1, LONGEST)]);
+                answer.map_or_else(|_| Adu::new(), |answer| Adu::answer(unit, &answer))
+            }
+            Self::Input(changed) => {
+                let words = [VALUES[usize::from(changed)]];
+                let answer = Answer::read_of(Table::Input, &words);
                 answer.map_or_else(|_| Adu::new(), |answer| Adu::answer(unit, &answer))
             }
             Self::Done(kind) => {
@@ -108,6 +148,8 @@ pub struct Coming {
     pub asker: Asker,
     /// What it says.
     pub content: Content,
+    /// Where was read, if something was.
+    pub place: u16,
     /// When its request ended without it.
     pub given_up: Option<Instant>,
     /// When it arrived damaged, if it has.

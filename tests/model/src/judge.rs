@@ -1,10 +1,10 @@
-//! What the program makes of the end of a request, and whether it is true.
+//! Whether what a call makes of what comes is true.
 
-use drivebus_rtu::{AnswerError, Event, Instant};
+use drivebus_rtu::{Answer, AnswerError, Exchange, Instant, Outcome, Unanswered};
 
 use crate::frames::{Coming, Content, Kind};
-use crate::program::{Call, Knowledge, Standing};
-use crate::scenario::{Adapter, PATIENCE, Scenario, Sight};
+use crate::program::{Call, Flight};
+use crate::scenario::{PATIENCE, Scenario, Sight};
 use crate::world::{State, Wrong, address};
 
 /// Where what arrives comes from.
@@ -18,23 +18,35 @@ pub enum Source {
     Nowhere,
 }
 
-/// How a request ended.
+/// What a call came to, as its caller hears it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ended {
-    /// With an answer.
-    Answered {
-        /// Whether the unit refused.
-        refused: bool,
-        /// Whether it came often enough.
-        agreed: bool,
-    },
-    /// Without one.
-    Unanswered {
-        /// Whether no byte came.
-        silent: bool,
-        /// Whether a refusal came that may be meant for another.
-        refused: bool,
-    },
+pub(crate) enum Came {
+    /// An answer, with so many words.
+    Answer(Option<usize>),
+    /// It is done, and that was seen otherwise.
+    Shown,
+    /// The unit refused.
+    Refused,
+    /// The unit shows something else than what was written.
+    NotTaken,
+    /// Nothing that says what the unit did; whether anything went out.
+    Nothing { went_out: bool },
+}
+
+impl From<Outcome<'_>> for Came {
+    fn from(outcome: Outcome<'_>) -> Self {
+        match outcome {
+            Outcome::Answered { answer: Some(Answer::Read { words, .. }), .. } => {
+                Self::Answer(Some(words.iter().count()))
+            }
+            Outcome::Answered { answer: Some(_), .. } => Self::Answer(None),
+            Outcome::Answered { .. } => Self::Shown,
+            Outcome::Failed { why: Unanswered::Refused { .. }, .. } => Self::Refused,
+            Outcome::Failed { why: Unanswered::NotTaken { .. }, .. } => Self::NotTaken,
+            Outcome::Failed { sent, .. } => Self::Nothing { went_out: sent.is_some() },
+            _ => Self::Nothing { went_out: true },
+        }
+    }
 }
 
 /// A step under way, and what was seen in it.
@@ -44,87 +56,34 @@ pub struct Step<'a> {
     pub scenario: &'a Scenario,
     /// What was seen.
     pub sights: Vec<Sight>,
+    /// Whether the unit that is asked was in doubt when it began.
+    pub doubted: bool,
 }
 
 impl State {
-    /// `bytes` arrive from `source`; none, where only time has passed.
-    pub(crate) fn receive(&mut self, step: &mut Step<'_>, bytes: &[u8], source: Source) {
-        let doubted = self.program.call().is_some_and(|call| self.is_doubted(call.unit));
-        self.master.receive(self.now, bytes);
-        let ended = match self.master.poll(self.now) {
-            None => return self.note(step),
-            Some(Event::Answer(answer)) => {
-                let refused = matches!(answer, drivebus_rtu::Answer::Exception { .. });
-                Ended::Answered { refused, agreed: self.program.hears(&answer) }
-            }
-            Some(Event::NoAnswer { bytes }) => Ended::Unanswered { silent: bytes.is_empty(), refused: false },
-            Some(Event::Transmit(_)) => {
-                self.wrong = Some(Wrong::SentTwice);
+    /// A request of `call` has come to `exchange`, at which the bytes came from `source`.
+    pub(crate) fn request_is_over(
+        &mut self,
+        step: &mut Step<'_>,
+        call: &mut Call,
+        exchange: &Exchange<'_>,
+        source: Source,
+    ) {
+        if exchange.tally.late > 0 {
+            step.sights.push(Sight::Late);
+        }
+        // One that could not be begun is nobody's.
+        let Some(flight) = call.flight.take() else { return };
+        self.ended(flight.number);
+        let refused = match exchange.failure {
+            None => false,
+            Some(Unanswered::Refused { .. }) => true,
+            Some(why) => {
+                let is_refusal = matches!(why, Unanswered::Wrong(AnswerError::Refusal { .. }));
+                self.told.outcome = Some(if is_refusal { "it may refuse another: left open" } else { "left open" });
+                self.left_open(call.unit, flight.kind);
                 return;
             }
-            Some(Event::Wrong { error: AnswerError::Refusal { .. }, .. }) => {
-                Ended::Unanswered { silent: false, refused: true }
-            }
-            Some(_) => Ended::Unanswered { silent: false, refused: false },
-        };
-        if let Standing::InFlight(call) = std::mem::replace(&mut self.program.standing, Standing::Free) {
-            self.ended(call.latest);
-            self.learn(step, &call, ended);
-            self.conclude(step, call, ended, source, doubted);
-        }
-    }
-
-    /// Counts what was seen while nothing ended.
-    fn note(&mut self, step: &mut Step<'_>) {
-        // What the adapter sent back is asked for when the request ends.
-        if step.scenario.adapter == Adapter::Known && self.master.take_tally().late > 0 {
-            step.sights.push(Sight::Late);
-            self.told.outcome = Some("known to be late");
-        }
-    }
-
-    /// What `call` has shown of the adapter (`Owner::learn` in `crates/line/src/owner/echo.rs`).
-    fn learn(&mut self, step: &mut Step<'_>, call: &Call, ended: Ended) {
-        let tally = self.master.take_tally();
-        if tally.late > 0 {
-            step.sights.push(Sight::Late);
-        }
-        if step.scenario.adapter == Adapter::Known {
-            return;
-        }
-        if tally.own_echo > 0 {
-            self.program.knowledge = Knowledge::Present;
-            self.master.strip_echo(true);
-            step.sights.push(Sight::AdapterFound);
-            return;
-        }
-        let request = call.kind.request();
-        if self.program.knowledge == Knowledge::Absent || request.expected().may_repeat_request() {
-            return;
-        }
-        let few = usize::try_from(tally.noise).is_ok_and(|noise| 4 * noise <= request.adu_len());
-        let clean = few && !matches!(ended, Ended::Unanswered { silent: false, .. });
-        match self.program.knowledge {
-            Knowledge::Auto if clean => self.program.knowledge = Knowledge::Absent,
-            Knowledge::Present if clean && matches!(ended, Ended::Answered { refused: false, .. }) => {
-                self.program.knowledge = Knowledge::Auto;
-                self.master.strip_echo(false);
-            }
-            _ => {}
-        }
-    }
-
-    fn conclude(&mut self, step: &mut Step<'_>, call: Call, ended: Ended, source: Source, doubted: bool) {
-        let Ended::Answered { refused, agreed } = ended else {
-            let is_refusal = matches!(ended, Ended::Unanswered { refused: true, .. });
-            self.told.outcome = Some(if is_refusal { "it may refuse another: left open" } else { "left open" });
-            self.left_open(call.unit, call.kind);
-            if let Some(truth) = call.stop_before {
-                self.confirm_stop(step, &call, truth);
-            } else if call.kind.is_read() && call.is_immediate && !(is_refusal && call.apart) {
-                self.program.standing = Standing::LeftOpen(call);
-            }
-            return;
         };
         let came = match source {
             Source::Unit(came) => Some(came),
@@ -133,35 +92,21 @@ impl State {
         // If it was an earlier one's, its own is owed from now on.
         let unit = &mut self.units[call.unit];
         unit.touched = unit.touched.map(|_| self.now);
-        match call.kind {
-            Kind::Read(_) => self.read_was_answered(step, call, came, refused, agreed, doubted),
-            Kind::Run => {
-                self.told.outcome = Some("taken for the answer");
-                if came.is_none_or(|came| !came.is_since(call.first)) {
-                    self.wrong = Some(Wrong::NotDone);
-                }
-                step.sights.push(if refused { Sight::Refused } else { Sight::Commanded });
-            }
-            Kind::Stop => {
-                // The answer may be that to a stop before, but of the same kind, and not to something else.
-                let own = if refused { Content::Refused(Kind::Stop) } else { Content::Done(Kind::Stop) };
-                let own = came.is_some_and(|came| came.content == own);
-                let truth = if own { Ok(()) } else { Err(Wrong::NotDone) };
-                self.told.outcome = Some("taken for the answer");
-                if self.program.knowledge == Knowledge::Auto && !refused {
-                    self.told.outcome = Some("taken for the answer, unless the adapter sent it");
-                    self.program.standing = Standing::MustLook(call, truth);
-                } else {
-                    self.wrong = truth.err();
-                    step.sights.push(if refused { Sight::Refused } else { Sight::Stopped });
+        self.told.outcome = Some("taken for the answer");
+        match flight.kind {
+            Kind::Echo(word) => self.echo_was_answered(step, call.unit, word, came, refused),
+            Kind::Read(_) | Kind::Watch | Kind::Input => {
+                self.read_was_answered(step, call, flight, came, refused);
+                // At first contact it may have been another program's, and it counts as owed until that is known.
+                if call.kind == Kind::Watch && self.opened.is_some() {
+                    self.left_open(call.unit, call.kind);
                 }
             }
-            Kind::Echo(word) => self.echo_was_answered(step, &call, word, came, refused, doubted),
-            Kind::Look => {
-                self.told.outcome = Some("it tells of the adapter");
-                if let Some(truth) = call.stop_before {
-                    self.confirm_stop(step, &call, truth);
-                }
+            kind => {
+                let content = if refused { Content::Refused(kind) } else { Content::Done(kind) };
+                // The answer to a stop may be that to a stop before, but of the same kind, and not to something else.
+                let is_own = |came: &Coming| came.is_since(call.first) || kind == Kind::Stop;
+                call.truth.confirmed = Some(came.is_some_and(|came| came.content == content && is_own(&came)));
             }
         }
     }
@@ -169,60 +114,33 @@ impl State {
     fn read_was_answered(
         &mut self,
         step: &mut Step<'_>,
-        mut call: Call,
+        call: &mut Call,
+        flight: Flight,
         came: Option<Coming>,
         refused: bool,
-        agreed: bool,
-        doubted: bool,
     ) {
         let Some(came) = came else {
             self.wrong = Some(Wrong::Misattributed);
             return;
         };
-        let own = came.is_since(call.first);
-        let before = call.row.filter(|(content, _)| alike(*content, came.content)).is_some_and(|(_, own)| own);
-        call.row = Some((came.content, own || before));
-        if call.ends_doubt && !refused {
+        let is_own = came.is_since(call.first) && came.place == flight.place;
+        let before = call.truth.row.filter(|(content, ..)| alike(*content, came.content));
+        let (times, was_own) = before.map_or((0, false), |(_, times, own)| (times, own));
+        call.truth.row = Some((came.content, times + 1, is_own || was_own));
+        if flight.ends_doubt && !refused {
             if self.is_doubted(call.unit) {
                 self.wrong = Some(Wrong::Unended);
-            } else if doubted {
+            } else if step.doubted {
                 step.sights.push(Sight::EndedByRead);
                 let unit = &mut self.units[call.unit];
                 // Echoes that may still come are counted on.
                 unit.silent_echoes = if unit.echo_open.is_some() { unit.silent_echoes } else { 0 };
             }
         }
-        if refused && call.apart {
-            self.told.outcome = Some("a refusal, which is not believed");
-        } else if agreed {
-            self.told.outcome = Some("taken for the answer");
-            if !(own || before) {
-                self.wrong = Some(Wrong::Misattributed);
-            }
-            step.sights.push(match (refused, call.asked) {
-                (true, _) => Sight::Refused,
-                (false, 1) => Sight::ReadAtOnce,
-                (false, _) => Sight::Agreed,
-            });
-        } else if call.asked < call.agreement.longest() {
-            self.told.outcome = Some("heard, and not believed yet");
-            self.program.standing = Standing::Hearing(call);
-        } else {
-            self.told.outcome = Some("heard; the answers do not agree");
-        }
     }
 
-    fn echo_was_answered(
-        &mut self,
-        step: &mut Step<'_>,
-        call: &Call,
-        word: u16,
-        came: Option<Coming>,
-        refused: bool,
-        doubted: bool,
-    ) {
-        let after = self.is_doubted(call.unit);
-        let in_first_contact = self.opened.is_some();
+    fn echo_was_answered(&mut self, step: &mut Step<'_>, unit: usize, word: u16, came: Option<Coming>, refused: bool) {
+        let after = self.is_doubted(unit);
         if !refused {
             self.told.outcome = Some("the word came back");
             if came.is_none_or(|came| came.content != Content::Echoed(word)) {
@@ -230,36 +148,70 @@ impl State {
             } else if after {
                 self.wrong = Some(Wrong::Unended);
             }
-            let unit = &mut self.units[call.unit];
+            let unit = &mut self.units[unit];
             (unit.echoed, unit.silent_echoes, unit.echo_open) = (true, 0, None);
-            step.sights.extend(doubted.then_some(Sight::EndedByEcho));
-        } else if in_first_contact || self.units[call.unit].echo_open.is_some_and(|at| self.now < at + PATIENCE) {
+            step.sights.extend(step.doubted.then_some(Sight::EndedByEcho));
+        } else if self.opened.is_some() || self.units[unit].echo_open.is_some_and(|at| self.now < at + PATIENCE) {
             // It may be the refusal of the echo before, or of another program's.
             self.told.outcome = Some("refused, which proves nothing");
-            self.left_open(call.unit, call.kind);
+            self.left_open(unit, Kind::Echo(word));
         } else {
             self.told.outcome = Some("refused, and with it everything before is answered");
             if after {
                 self.wrong = Some(Wrong::Unended);
             }
-            step.sights.extend(doubted.then_some(Sight::EndedByRefusal));
+            step.sights.extend(step.doubted.then_some(Sight::EndedByRefusal));
         }
     }
 
-    /// The look has shown whether a stop before was confirmed by the adapter (`Owner::unless_echoed`).
-    fn confirm_stop(&mut self, step: &mut Step<'_>, look: &Call, truth: Result<(), Wrong>) {
-        if self.program.knowledge == Knowledge::Absent {
-            self.wrong = truth.err();
-            step.sights.push(Sight::Stopped);
-        } else {
-            self.stop_is_still_owed(step.scenario, look.unit);
-        }
-    }
-
-    /// Nobody knows whether `unit` confirmed its stop, or the adapter did (`Owner::unless_echoed`).
-    pub(crate) fn stop_is_still_owed(&mut self, scenario: &Scenario, unit: usize) {
-        self.master.still_owed(self.now, address(unit), &Kind::Stop.request(), scenario.timeout);
-        self.left_open(unit, Kind::Stop);
+    /// `call` is over, and this is what its caller hears.
+    pub(crate) fn call_is_over(&mut self, step: &mut Step<'_>, call: &Call, came: Came) {
+        let truth = call.truth;
+        let confirmed = truth.confirmed == Some(true);
+        let wrong = match (call.kind, came) {
+            (Kind::Echo(_), Came::Answer(_) | Came::Refused) => None,
+            (kind, Came::Answer(words)) if kind.is_read() => {
+                let asked = if let Kind::Read(count) = kind { usize::from(count) } else { 1 };
+                let is_own = truth.row.is_some_and(|(.., own)| own) && words == Some(asked);
+                step.sights.push(match truth.row {
+                    Some((_, times, _)) if times > 1 => Sight::Agreed,
+                    _ => Sight::ReadAtOnce,
+                });
+                (!is_own).then_some(Wrong::Misattributed)
+            }
+            (kind, Came::Refused) if kind.is_read() => {
+                step.sights.push(Sight::Refused);
+                (!truth.row.is_some_and(|(.., own)| own)).then_some(Wrong::Misattributed)
+            }
+            (kind, Came::Answer(_)) => {
+                step.sights.push(if kind == Kind::Stop { Sight::Stopped } else { Sight::Commanded });
+                (!confirmed).then_some(Wrong::NotDone)
+            }
+            (_, Came::Refused) => {
+                step.sights.push(Sight::Refused);
+                (!confirmed).then_some(Wrong::NotDone)
+            }
+            (_, Came::Shown) => {
+                step.sights.push(Sight::ReadBack);
+                (!truth.shown).then_some(Wrong::NotDone)
+            }
+            (_, Came::NotTaken) => (!truth.hidden).then_some(Wrong::NotDone),
+            (_, Came::Nothing { went_out }) => {
+                // Nobody knows whether the unit confirmed it, or the adapter did: it is owed.
+                if truth.confirmed.is_some() && went_out {
+                    self.left_open(call.unit, call.kind);
+                }
+                (truth.went_out && !went_out).then_some(Wrong::Denied)
+            }
+        };
+        self.wrong = self.wrong.or(wrong);
+        self.told.call = Some(match came {
+            Came::Answer(_) => "the call is answered",
+            Came::Shown => "the unit shows what was written: the call is done",
+            Came::Refused => "the call is refused",
+            Came::NotTaken => "the unit shows something else: the call is not done",
+            Came::Nothing { .. } => "the call is given up",
+        });
     }
 
     /// Whether unit `index` is in quarantine.
@@ -268,7 +220,15 @@ impl State {
     }
 
     pub(crate) fn is_doubted_at(&self, at: Instant, index: usize) -> bool {
-        self.master.in_quarantine(at, address(index))
+        self.master().in_quarantine(at, address(index))
+    }
+
+    /// Keeps what the registers hold, for who judges what a call says of them.
+    pub(crate) fn look_at_registers(&mut self) {
+        if let Some(call) = &mut self.program.call {
+            call.truth.shown |= self.changed;
+            call.truth.hidden |= !self.changed;
+        }
     }
 }
 

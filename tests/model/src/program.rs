@@ -1,31 +1,31 @@
-//! The program: what it may ask and when, and what it makes of what comes. The rules are those of `crates/line`; which of
-//! the things that they permit it does, and when it gives up, is left open.
+//! The program: it asks, and a [`Conversation`] does the rest. Which of the calls it makes, and when it gives up, is left open.
 
+use std::cell::OnceCell;
 use std::hash::{Hash, Hasher};
 
-use drivebus_rtu::{Agreement, Answer, Attribution, Duration, Instant};
+use drivebus_rtu::{Conversation, FreshWords, Instant, OwnEcho, Question, Step as Next, Urgency};
 
-use crate::fingerprint::{self, offset};
+use crate::fingerprint;
 use crate::frames::{Content, Kind};
-use crate::scenario::{Adapter, Scenario};
+use crate::judge::{Source, Step};
+use crate::scenario::{Scenario, Sight};
 use crate::world::{State, Wrong, address};
 
-/// What is known of the adapter (`crates/line/src/owner/echo.rs`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Knowledge {
-    /// Nothing yet.
-    Auto,
-    /// It sends requests back.
-    Present,
-    /// It does not.
-    Absent,
+/// Where a call takes its words from while it is not carried on. None is taken from there, so that all moments look alike.
+static NO_WORDS: FreshWords = FreshWords::beginning_at(0);
+
+thread_local! {
+    /// Where a call takes its words from while this thread carries it on. They are those of the moment, not of the thread.
+    static WORDS: OnceCell<&'static FreshWords> = const { OnceCell::new() };
 }
 
-impl Knowledge {
-    /// When a port was opened.
-    pub fn at_opening(adapter: Adapter) -> Self {
-        if adapter == Adapter::Known { Self::Absent } else { Self::Auto }
-    }
+/// Words of which the next is `word`.
+fn words_from(word: u16) -> &'static FreshWords {
+    WORDS.with(|words| {
+        let words: &'static FreshWords = words.get_or_init(|| Box::leak(Box::new(FreshWords::beginning_at(0)))); // once for each thread
+        words.begin_at(word);
+        words
+    })
 }
 
 /// One call of the program.
@@ -35,220 +35,197 @@ pub struct Call {
     pub unit: usize,
     /// What is asked.
     pub kind: Kind,
+    /// What decides about it.
+    pub conversation: Box<Conversation<'static>>,
     /// The number of its first request.
     pub(crate) first: u16,
-    /// The number of its latest.
-    pub(crate) latest: u16,
-    pub(crate) asked: u8,
-    pub(crate) agreement: Agreement,
-    /// Whether one answer is enough, so that it may be asked again as it is after silence.
-    pub(crate) is_immediate: bool,
-    /// Whether it was put so that no open answer could pass for its own. A refusal is not believed then.
-    pub(crate) apart: bool,
-    /// Whether it was asked in quarantine because its answer cannot be mistaken.
-    pub(crate) ends_doubt: bool,
-    /// What came last, and whether any of those that came alike in a row was given to this call.
-    pub(crate) row: Option<(Content, bool)>,
-    /// When it is given up.
-    pub(crate) due: Instant,
-    /// A stop before it, which is confirmed if this look shows that the adapter sends nothing back; and whether it then is
-    /// true.
-    pub(crate) stop_before: Option<Result<(), Wrong>>,
+    /// Where it stands.
+    pub(crate) standing: Standing,
+    /// Its request on the wire.
+    pub(crate) flight: Option<Flight>,
+    pub(crate) truth: Truth,
 }
 
-/// Where the program stands.
-#[derive(Debug, Clone)]
+/// Where a call stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Standing {
-    /// It may ask anything.
-    Free,
-    /// Its request is on the wire.
-    InFlight(Call),
-    /// A read was answered, and once is not enough.
-    Hearing(Call),
-    /// A read that owes only this call's answer was left open.
-    LeftOpen(Call),
-    /// A stop was confirmed, perhaps by the adapter: that has to be looked for.
-    MustLook(Call, Result<(), Wrong>),
+    /// It is about to send.
+    Sending,
+    /// It waits for bytes until then.
+    Listening(Instant),
+    /// It leaves the line to others until then.
+    StandingBy(Instant),
 }
 
-/// How a question may be put.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Question {
-    /// At once, whatever is in doubt.
-    InDoubt,
-    /// As it is, because no open answer could pass for its own.
-    Apart,
-    /// As it is, with what its answer will be worth.
-    Plain(Attribution),
+/// A request on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Flight {
+    /// What is asked.
+    pub kind: Kind,
+    /// From where it reads.
+    pub(crate) place: u16,
+    /// Its number.
+    pub number: u16,
+    /// Whether it was asked in quarantine, and its answer cannot be mistaken.
+    pub(crate) ends_doubt: bool,
+}
+
+/// What is true of a call, which it cannot know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(crate) struct Truth {
+    /// What came last in place of an answer to a read, how often in a row, and whether any of these was given to this call.
+    pub(crate) row: Option<(Content, u8, bool)>,
+    /// What was taken last for the answer to a write: whether it was given to this call, or may count as such.
+    pub(crate) confirmed: Option<bool>,
+    /// Whether its write went out.
+    pub(crate) went_out: bool,
+    /// Whether the registers held what it writes, at any time of the call.
+    pub(crate) shown: bool,
+    /// Whether they held something else, at any time since it was written last.
+    pub(crate) hidden: bool,
 }
 
 /// The program.
 #[derive(Debug, Clone)]
 pub struct Program {
-    pub(crate) standing: Standing,
-    heeds: bool,
-    /// What is known of the adapter.
-    pub knowledge: Knowledge,
+    /// The call under way.
+    pub call: Option<Call>,
 }
 
 impl Program {
-    pub(crate) fn new(scenario: &Scenario) -> Self {
-        let knowledge = Knowledge::at_opening(scenario.adapter);
-        Self { standing: Standing::Free, heeds: scenario.heeds, knowledge }
+    /// The request on the wire.
+    pub fn in_flight(&self) -> Option<Flight> {
+        self.call.as_ref().and_then(|call| call.flight)
     }
 
-    /// Unit, kind and number of the request in flight.
-    pub fn in_flight(&self) -> Option<(usize, Kind, u16)> {
-        match &self.standing {
-            Standing::InFlight(call) => Some((call.unit, call.kind, call.latest)),
-            _ => None,
-        }
-    }
-
-    /// The call that is not over.
-    pub fn call(&self) -> Option<&Call> {
-        match &self.standing {
-            Standing::Free => None,
-            Standing::InFlight(call)
-            | Standing::Hearing(call)
-            | Standing::LeftOpen(call)
-            | Standing::MustLook(call, _) => Some(call),
-        }
-    }
-
-    /// The first request of the call that is not over.
-    pub fn first(&self) -> Option<u16> {
-        self.call().map(|call| call.first)
-    }
-
-    /// Whether a stop was confirmed, and it has to be seen first whether the adapter did it.
-    pub(crate) fn must_look(&self) -> bool {
-        matches!(self.standing, Standing::MustLook(..))
-    }
-
-    /// The unit whose stop was confirmed, where it is not known yet whether the adapter did it.
-    pub(crate) fn stop_to_look_for(&self) -> Option<usize> {
-        match &self.standing {
-            Standing::MustLook(call, _) => Some(call.unit),
-            Standing::InFlight(look) if look.stop_before.is_some() => Some(look.unit),
-            _ => None,
-        }
-    }
-
-    /// Whatever was asked is not waited for any more.
-    pub(crate) fn forget_call(&mut self) {
-        self.standing = Standing::Free;
-    }
-
-    /// How `kind` may be asked of `unit` now, if it may (`Owner::next` in `crates/line/src/owner.rs`).
-    pub fn may_ask(&self, state: &State, unit: usize, kind: Kind) -> Option<Question> {
-        if let Standing::MustLook(call, _) = &self.standing {
-            return (kind == Kind::Look && call.unit == unit).then_some(Question::InDoubt);
-        }
-        let (now, unit, request) = (state.now, address(unit), kind.request());
-        match kind {
-            Kind::Stop => return Some(Question::InDoubt),
-            Kind::Look => return (self.knowledge == Knowledge::Auto).then_some(Question::InDoubt),
-            _ if !self.heeds => return Some(Question::InDoubt),
-            _ => {}
-        }
-        let in_quarantine = state.master.in_quarantine(now, unit);
-        let attribution = state.master.attribution(now, unit, &request);
-        let is_apart = state.master.tells_apart(now, unit, &request);
-        if kind.is_read() && is_apart && (in_quarantine || attribution.may_be_mistaken()) {
-            return Some(Question::Apart);
-        }
-        let must_look = request.expected().may_repeat_request() || in_quarantine;
-        if self.knowledge == Knowledge::Auto && must_look {
-            return None;
-        }
-        match attribution {
-            Attribution::Wait(_) | Attribution::Others(_) => None,
-            sure => Some(Question::Plain(sure)),
-        }
-    }
-
-    /// Whether the same may be asked once more: because once is not enough (`Call::hear`), or because all that the unit owes
-    /// is the answer to it (`Course::owes_only_this`). Whether it then goes out in doubt.
-    pub fn may_repeat(&self) -> Option<bool> {
-        match &self.standing {
-            Standing::LeftOpen(_) => Some(true),
-            Standing::Hearing(_) => Some(false),
-            _ => None,
-        }
-    }
-
-    /// Until when `unit` cannot be asked something, where only time helps.
-    pub fn waits_until(&self, state: &State, unit: usize, scenario: &Scenario) -> Vec<Instant> {
-        let until = |kind: &Kind| match state.master.attribution(state.now, address(unit), &kind.request()) {
-            Attribution::Wait(until) => Some(until),
-            _ => None,
-        };
-        scenario.kinds.iter().filter_map(until).collect()
-    }
-
-    /// After the latest request has asked `unit` something new.
-    pub(crate) fn asked(&self, state: &State, unit: usize, kind: Kind, put: Question, timeout: Duration) -> Self {
-        let number = state.requests;
-        let sure = if let Question::Plain(sure) = put { sure } else { Attribution::Certain };
-        let agreement = Agreement::new(sure, 1);
-        let stop_before = match &self.standing {
-            Standing::MustLook(_, wrong) => Some(*wrong),
-            _ => None,
-        };
-        let call = Call {
-            unit,
-            kind,
-            first: number,
-            latest: number,
-            asked: 1,
-            is_immediate: agreement.is_immediate(),
-            apart: put == Question::Apart,
-            agreement,
-            ends_doubt: ends_doubt(state, unit, kind),
-            due: state.now + timeout,
-            row: None,
-            stop_before,
-        };
-        Self { standing: Standing::InFlight(call), ..*self }
-    }
-
-    /// After the latest request has asked the same once more.
-    pub(crate) fn asked_again(&self, state: &State, timeout: Duration) -> Self {
-        let standing = match self.standing.clone() {
-            Standing::Hearing(call) | Standing::LeftOpen(call) => Standing::InFlight(Call {
-                latest: state.requests,
-                asked: call.asked + 1,
-                ends_doubt: ends_doubt(state, call.unit, call.kind),
-                due: state.now + timeout,
-                ..call
-            }),
-            other => other,
-        };
-        Self { standing, ..*self }
-    }
-
-    /// Hears `answer`, which the master takes for the call's, and says whether it came often enough.
-    pub(crate) fn hears(&mut self, answer: &Answer<'_>) -> bool {
-        match &mut self.standing {
-            Standing::InFlight(call) => call.agreement.hear(address(call.unit), answer),
-            _ => false,
-        }
+    /// Whether a call is about to send.
+    pub(crate) fn is_sending(&self) -> bool {
+        self.call.as_ref().is_some_and(|call| call.standing == Standing::Sending)
     }
 
     pub(crate) fn hash_at<H: Hasher>(&self, now: Instant, hasher: &mut H) {
-        std::mem::discriminant(&self.standing).hash(hasher);
-        self.knowledge.hash(hasher);
-        if let Some(call) = self.call() {
-            (call.unit, call.kind, call.asked, call.is_immediate, call.apart, call.ends_doubt, call.row).hash(hasher);
-            (offset(now, call.due), call.stop_before).hash(hasher);
-            fingerprint::of(now, &call.agreement).hash(hasher);
-        }
+        let Some(call) = &self.call else { return };
+        (call.unit, call.kind, call.truth, call.flight.map(|flight| (flight.place, flight.ends_doubt))).hash(hasher);
+        fingerprint::of(now, &(call.standing, &call.conversation)).hash(hasher);
     }
 }
 
-/// Whether `kind` is asked of `unit` in quarantine, because its answer cannot be mistaken.
-fn ends_doubt(state: &State, unit: usize, kind: Kind) -> bool {
-    let (now, unit) = (state.now, address(unit));
-    state.master.in_quarantine(now, unit) && state.master.tells_apart(now, unit, &kind.request())
+/// How the program asks `kind` of `unit`.
+fn question(scenario: &Scenario, retries: u8, unit: usize, kind: Kind) -> Question<'static> {
+    let urgency = if matches!(kind, Kind::Stop | Kind::Watch) { Urgency::Stop } else { Urgency::Call };
+    Question::new(address(unit).into(), kind.request(), scenario.timeout)
+        .retries(retries.into())
+        .urgency(urgency)
+        .in_doubt(kind == Kind::Stop || !scenario.heeds)
+        .read_back(kind.read_back())
+}
+
+impl State {
+    /// The program asks `kind` of `unit`.
+    pub(crate) fn ask(&mut self, step: &mut Step<'_>, unit: usize, kind: Kind) {
+        let kind = if let Kind::Echo(_) = kind { Kind::Echo(self.fresh_word()) } else { kind };
+        let question = question(step.scenario, self.left.retries, unit, kind);
+        self.program.call = Some(Call {
+            unit,
+            kind,
+            conversation: Box::new(Conversation::new(question, &NO_WORDS)),
+            first: self.requests + 1,
+            standing: Standing::Sending,
+            flight: None,
+            truth: Truth { hidden: true, ..Truth::default() },
+        });
+        self.go_on(step, Source::Nowhere);
+    }
+
+    /// The words that `call` takes: its own, where it echoes one; else such as no echo carries that may still come.
+    fn words_for(&self, call: &Call) -> &'static FreshWords {
+        let Kind::Echo(word) = call.kind else { return words_from(self.fresh_word()) };
+        let words = words_from(word);
+        words.next();
+        words
+    }
+
+    /// Goes on with the call, as far as nothing else has to happen. What it was told last came from `source`.
+    pub(crate) fn go_on(&mut self, step: &mut Step<'_>, source: Source) {
+        let Some(mut call) = self.program.call.take() else { return };
+        let echo = self.known.echo();
+        call.conversation.take_words_from(self.words_for(&call));
+        let standing = loop {
+            match call.conversation.next(self.now, &mut self.known) {
+                Next::LetPass => {}
+                Next::StandBy(until) => break Some(Standing::StandingBy(until)),
+                Next::Listen(_) if call.flight.is_none() => break Some(Standing::Sending),
+                Next::Listen(until) => break Some(Standing::Listening(until)),
+                Next::Heard(exchange) => self.request_is_over(step, &mut call, &exchange, source),
+                Next::Done(outcome) => {
+                    let came = outcome.into();
+                    self.call_is_over(step, &call, came);
+                    break None;
+                }
+                // Nothing was said that it could send on.
+                _ => {
+                    self.wrong = Some(Wrong::SentTwice);
+                    break None;
+                }
+            }
+        };
+        if echo != OwnEcho::Present && self.known.echo() == OwnEcho::Present {
+            step.sights.push(Sight::AdapterFound);
+        }
+        let Some(standing) = standing else { return };
+        call.standing = standing;
+        call.conversation.take_words_from(&NO_WORDS);
+        call.conversation.take_counts();
+        self.program.call = Some(call);
+    }
+
+    /// Hands out what the call is about to send.
+    pub(crate) fn hand_out(&mut self) -> Option<Vec<u8>> {
+        let (now, words) = (self.now, self.program.call.as_ref().map(|call| self.words_for(call))?);
+        let call = self.program.call.as_mut()?;
+        call.conversation.take_words_from(words);
+        call.conversation.heard(now, &mut self.known, &[]).ok()?;
+        let frame = match call.conversation.next(now, &mut self.known) {
+            Next::Send(frame) => frame.to_vec(),
+            _ => return None,
+        };
+        let (kind, place) = Kind::sent(&frame)?;
+        let unit = call.unit;
+        let is_own = kind == call.kind;
+        if kind.is_write() && (!is_own || (kind == Kind::Run && call.truth.went_out)) {
+            self.wrong = Some(Wrong::SentTwice);
+        }
+        call.truth.went_out |= kind.is_write();
+        let flight = Flight { kind, place, number: self.requests, ends_doubt: false };
+        let apart = self.master().tells_apart(now, address(unit), &kind.request_at(place));
+        let ends_doubt = self.is_doubted(unit) && apart;
+        if let Some(call) = &mut self.program.call {
+            call.flight = Some(Flight { ends_doubt, ..flight });
+            call.standing = Standing::Listening(now);
+        }
+        self.told.sent = Some(kind);
+        Some(frame)
+    }
+
+    /// Gives `bytes`, which came from `source`, to who waits for some. None, where only time has passed.
+    pub(crate) fn take_in(&mut self, step: &mut Step<'_>, bytes: &[u8], source: Source) {
+        let now = self.now;
+        match &mut self.program.call {
+            // What comes before a request is sent does not make it go out.
+            Some(call) if call.standing == Standing::Sending => {
+                let _ = call.conversation.heard(now, &mut self.known, bytes);
+            }
+            Some(call) if call.flight.is_some() => {
+                let _ = call.conversation.heard(now, &mut self.known, bytes);
+                self.go_on(step, source);
+            }
+            _ => {
+                self.known.stray(now, bytes);
+                if self.known.take_strays().late > 0 {
+                    step.sights.push(Sight::Late);
+                    self.told.outcome = Some("known to be late");
+                }
+            }
+        }
+    }
 }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Instant as Clock;
 
-use drivebus_rtu::{Event, Instant};
+use drivebus_rtu::{Cut, Instant};
 use stateright::{Checker, HasDiscoveries, Model, Property};
 
 use crate::ends;
 use crate::frames::{Coming, Content, Kind};
 use crate::judge::{Source, Step};
-use crate::program::Question;
+use crate::program::{Call, Standing};
 use crate::scenario::{Budget, Damage, Scenario, Sight};
 use crate::trace;
 use crate::world::{State, TICK, Told, Wrong, address};
@@ -46,10 +46,10 @@ pub enum How {
 /// What happens next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// The program asks something.
-    Ask(usize, Kind, Heard),
-    /// It asks the same once more.
-    Repeat(Heard),
+    /// The program calls.
+    Ask(usize, Kind),
+    /// What its call is about to send goes out.
+    Send(Heard),
     /// Of what comes from a unit, the answer at this place arrives.
     Arrive(usize, usize, How),
     /// The time-out is over.
@@ -58,7 +58,7 @@ pub enum Action {
     Linger,
     /// The program gives up what it asked.
     Abort,
-    /// Nothing is asked until this moment.
+    /// Nothing is sent until this moment.
     Wait(Instant),
     /// The port is opened again, after another program asked for these answers.
     Open(&'static [Content]),
@@ -125,73 +125,62 @@ impl Search {
         }
     }
 
-    /// Sends `kind`, which `sure` or its call permits.
-    fn send(
-        &self,
-        step: &mut Step<'_>,
-        state: &mut State,
-        unit: usize,
-        kind: Kind,
-        in_doubt: bool,
-        heard: Heard,
-    ) -> Option<()> {
-        let (now, to, timeout) = (state.now, address(unit), self.scenario.timeout);
-        let request = kind.request();
-        let begun = if in_doubt {
-            state.master.begin_in_doubt(now, to.into(), &request, timeout)
-        } else {
-            state.master.begin(now, to.into(), &request, timeout)
-        };
-        begun.ok()?;
-        let frame = match state.master.poll(now) {
-            Some(Event::Transmit(frame)) => frame.to_vec(),
-            _ => return None,
-        };
-        state.told.sent = Some(state.requests);
-        if heard != Heard::Lost {
-            state.hear(unit, kind, heard == Heard::Refused);
+    /// What the call is about to send goes out, and fares as `heard` says.
+    fn send(&self, step: &mut Step<'_>, state: &mut State, heard: Heard) -> Option<()> {
+        let now = state.now;
+        state.spend(heard);
+        let frame = state.hand_out()?;
+        let (unit, flight) = state.program.call.as_ref().map(|call| call.unit).zip(state.program.in_flight())?;
+        if heard == Heard::Refused && matches!(flight.kind, Kind::Echo(_)) {
+            return None;
         }
+        // What is read and lost is as good as never answered.
+        if heard == Heard::Lost && !flight.kind.is_write() {
+            return None;
+        }
+        if let Some(call) = state.program.call.as_mut().filter(|_| flight.kind == Kind::Set) {
+            call.truth.hidden = false;
+        }
+        if heard != Heard::Lost {
+            state.hear(&self.scenario, unit, (flight.kind, flight.place), heard == Heard::Refused);
+        }
+        state.look_at_registers();
+        let State { program, known, .. } = state;
+        let call = program.call.as_mut()?;
         if heard == Heard::Broken {
-            state.master.abort(now);
-            state.give_up_what_is_asked(&self.scenario);
+            call.conversation.cut_short(now, known, Cut::Lost);
             if State::is_sent_back(&self.scenario) {
-                state.receive(step, &frame, Source::Adapter);
+                known.stray(now, &frame);
             }
+            state.open(&self.scenario, &[]);
+            state.go_on(step, Source::Nowhere);
             return Some(());
         }
-        state.master.sent(now);
+        call.conversation.sent(known, now).ok()?;
         if State::is_sent_back(&self.scenario) {
             let frame = if heard == Heard::BackDamaged { damaged(&frame) } else { frame };
-            state.receive(step, &frame, Source::Adapter);
+            state.take_in(step, &frame, Source::Adapter);
         } else {
-            state.receive(step, &[], Source::Nowhere);
+            state.go_on(step, Source::Nowhere);
         }
         Some(())
     }
 
-    fn asks(&self, state: &State, actions: &mut Vec<Action>) {
-        let ways = |kind: Kind| {
-            let (left, sent_back) = (state.left, State::is_sent_back(&self.scenario));
-            [
-                (Heard::Answered, true),
-                (Heard::Refused, left.refusals > 0 && !matches!(kind, Kind::Echo(_) | Kind::Look)),
-                // What is read and lost is as good as never answered.
-                (Heard::Lost, kind.is_write()),
-                (Heard::Broken, left.faults > 0),
-                (Heard::BackDamaged, left.faults > 0 && sent_back),
-            ]
-            .into_iter()
-            .filter_map(|(heard, may)| may.then_some(heard))
-        };
-        for unit in 0..state.units.len() {
-            for kind in self.scenario.kinds.iter().copied().chain([Kind::Look]) {
-                if state.program.may_ask(state, unit, kind).is_some() {
-                    actions.extend(ways(kind).map(|heard| Action::Ask(unit, kind, heard)));
-                }
-            }
+    /// How what is about to be sent may fare.
+    fn sends(&self, state: &State, actions: &mut Vec<Action>) {
+        let left = state.left;
+        if left.requests == 0 {
+            return;
         }
-        if let (Some(call), Some(_)) = (state.program.call(), state.program.may_repeat()) {
-            actions.extend(ways(call.kind).map(Action::Repeat));
+        actions.extend([Action::Send(Heard::Answered), Action::Send(Heard::Lost)]);
+        if left.refusals > 0 {
+            actions.push(Action::Send(Heard::Refused));
+        }
+        if left.faults > 0 {
+            actions.push(Action::Send(Heard::Broken));
+            if State::is_sent_back(&self.scenario) {
+                actions.push(Action::Send(Heard::BackDamaged));
+            }
         }
     }
 
@@ -208,20 +197,8 @@ impl Search {
 
     fn step(&self, step: &mut Step<'_>, state: &mut State, action: Action) -> Option<()> {
         match action {
-            Action::Ask(unit, kind, heard) => {
-                let put = state.program.may_ask(state, unit, kind)?;
-                let kind = if let Kind::Echo(_) = kind { Kind::Echo(state.fresh_word()) } else { kind };
-                state.spend(heard);
-                state.program = state.program.asked(state, unit, kind, put, self.scenario.timeout);
-                self.send(step, state, unit, kind, put == Question::InDoubt, heard)?;
-            }
-            Action::Repeat(heard) => {
-                let in_doubt = state.program.may_repeat()?;
-                let (unit, kind) = state.program.call().map(|call| (call.unit, call.kind))?;
-                state.spend(heard);
-                state.program = state.program.asked_again(state, self.scenario.timeout);
-                self.send(step, state, unit, kind, in_doubt, heard)?;
-            }
+            Action::Ask(unit, kind) => state.ask(step, unit, kind),
+            Action::Send(heard) => self.send(step, state, heard)?,
             Action::Arrive(unit, place, how) => {
                 let was_doubted =
                     state.units[unit].echoed && state.is_doubted(unit) && state.program.in_flight().is_none();
@@ -230,45 +207,49 @@ impl Search {
                 let frame = came.content.adu(address(unit)).as_bytes().to_vec();
                 state.left.faults -= u8::from(how != How::Whole);
                 match how {
-                    How::Whole => state.receive(step, &frame, Source::Unit(came)),
-                    How::Twice => state.receive(step, &frame.repeat(2), Source::Unit(came)),
+                    How::Whole => state.take_in(step, &frame, Source::Unit(came)),
+                    How::Twice => state.take_in(step, &frame.repeat(2), Source::Unit(came)),
                     How::Damaged => {
-                        state.receive(step, &damaged(&frame), Source::Nowhere);
+                        state.take_in(step, &damaged(&frame), Source::Nowhere);
                         if self.scenario.damage == Damage::Again {
                             state.units[unit].coming.push(Coming { damaged: Some(state.now), ..came });
                         }
                     }
-                    How::Cut => state.receive(step, &frame[..frame.len() - 2], Source::Nowhere),
+                    How::Cut => state.take_in(step, &frame[..frame.len() - 2], Source::Nowhere),
                 }
                 step.sights.extend((was_doubted && !state.is_doubted(unit)).then_some(Sight::EndedBySight));
             }
             Action::TimeOut => {
-                let due = state.program.call()?.due;
+                let due = state.program.call.as_ref().and_then(listens_until)?;
                 state.wait(&self.scenario, due);
-                state.receive(step, &[], Source::Nowhere);
+                state.take_in(step, &[], Source::Nowhere);
             }
             Action::Linger => {
                 state.left.lingers -= 1;
                 state.wait(&self.scenario, state.now + TICK);
-                state.receive(step, &[], Source::Nowhere);
+                state.take_in(step, &[], Source::Nowhere);
             }
             Action::Abort => {
                 state.left.aborts -= 1;
-                state.master.abort(state.now);
-                state.give_up_what_is_asked(&self.scenario);
+                let State { program, known, now, .. } = &mut *state;
+                program.call.as_mut()?.conversation.cut_short(*now, known, Cut::GivenUp);
+                state.go_on(step, Source::Nowhere);
             }
             Action::Wait(until) => {
                 let doubted: Vec<_> = (0..state.units.len()).map(|unit| state.is_doubted(unit)).collect();
-                state.program.forget_call();
                 state.wait(&self.scenario, until);
                 let ended = |(unit, before): (usize, bool)| before && !state.is_doubted(unit);
                 if doubted.into_iter().enumerate().any(ended) {
                     step.sights.push(Sight::EndedByTime);
                 }
+                if state.program.call.as_ref().and_then(stands_by_until).is_some_and(|until| state.now >= until) {
+                    state.go_on(step, Source::Nowhere);
+                }
             }
             Action::Open(strangers) => {
                 state.left.openings -= 1;
                 state.open(&self.scenario, strangers);
+                state.go_on(step, Source::Nowhere);
             }
             Action::Restart(unit) => {
                 state.left.restarts -= 1;
@@ -278,6 +259,7 @@ impl Search {
             Action::Change => {
                 state.left.changes -= 1;
                 state.changed = !state.changed;
+                state.look_at_registers();
             }
         }
         Some(())
@@ -307,6 +289,7 @@ impl Model for Search {
         if state.wrong.is_some() {
             return;
         }
+        let call = state.program.call.as_ref();
         let in_flight = state.program.in_flight().is_some();
         let faulty = state.left.faults > 0;
         for (unit, answers) in state.units.iter().map(|unit| &unit.coming).enumerate() {
@@ -330,32 +313,42 @@ impl Model for Search {
         if state.left.changes > 0 {
             actions.push(Action::Change);
         }
-        if let Some(due) = state.program.call().filter(|_| in_flight).map(|call| call.due) {
-            actions.push(Action::TimeOut);
-            if state.left.lingers > 0 && state.now + TICK < due {
-                actions.push(Action::Linger);
+        let may_abort = state.left.aborts > 0;
+        match call.map(|call| call.standing) {
+            Some(Standing::Sending) => self.sends(state, actions),
+            Some(Standing::Listening(due)) => {
+                actions.push(Action::TimeOut);
+                if state.left.lingers > 0 && state.now + TICK < due {
+                    actions.push(Action::Linger);
+                }
+                actions.extend(may_abort.then_some(Action::Abort));
             }
-            if state.left.aborts > 0 {
-                actions.push(Action::Abort);
-            }
-            return;
-        }
-        if state.left.requests > 0 {
-            self.asks(state, actions);
-            // The look after a stop follows at once, in the same turn.
-            if let Some(end) = state.next_end(&self.scenario).filter(|_| !state.program.must_look()) {
+            Some(Standing::StandingBy(until)) => {
+                let end = state.next_end(&self.scenario).map_or(until, |end| end.min(until));
                 actions.push(Action::Wait(end));
-                let before = Instant::from_nanos(end.as_nanos() - u64::try_from(TICK.as_nanos()).unwrap_or_default());
-                if before > state.now {
-                    actions.push(Action::Wait(before));
+                actions.extend(may_abort.then_some(Action::Abort));
+            }
+            None if state.left.requests > 0 => {
+                for unit in 0..state.units.len() {
+                    actions.extend(self.scenario.kinds.iter().map(|&kind| Action::Ask(unit, kind)));
+                }
+                if let Some(end) = state.next_end(&self.scenario) {
+                    actions.push(Action::Wait(end));
+                    let tick = u64::try_from(TICK.as_nanos()).unwrap_or_default();
+                    let before = Instant::from_nanos(end.as_nanos() - tick);
+                    if before > state.now {
+                        actions.push(Action::Wait(before));
+                    }
                 }
             }
+            None => {}
         }
     }
 
     fn next_state(&self, last: &State, action: Action) -> Option<State> {
         let mut state = State { told: Told::default(), ..last.clone() };
-        let mut step = Step { scenario: &self.scenario, sights: Vec::new() };
+        let doubted = state.program.call.as_ref().is_some_and(|call| state.is_doubted(call.unit));
+        let mut step = Step { scenario: &self.scenario, sights: Vec::new(), doubted };
         self.step(&mut step, &mut state, action)?;
         let seen = step.sights.iter().fold(0, |bits, sight| bits | 1 << *sight as u8);
         self.seen.fetch_or(seen, Ordering::Relaxed);
@@ -367,7 +360,9 @@ impl Model for Search {
             Property::always(ATTRIBUTED, |model: &Self, state: &State| {
                 model.holds(state.wrong != Some(Wrong::Misattributed))
             }),
-            Property::always(DONE, |model: &Self, state: &State| model.holds(state.wrong != Some(Wrong::NotDone))),
+            Property::always(DONE, |model: &Self, state: &State| {
+                model.holds(!matches!(state.wrong, Some(Wrong::NotDone | Wrong::Denied)))
+            }),
             Property::always(ONCE, |model: &Self, state: &State| model.holds(state.wrong != Some(Wrong::SentTwice))),
             Property::always(ENDED, |model: &Self, state: &State| {
                 model.holds(state.wrong != Some(Wrong::Unended) && ends::overdue(state).is_none())
@@ -389,6 +384,14 @@ fn finding(model: &Search, seen: &AtomicU32, began: Clock, checker: &impl Checke
         refuted: refuted.map(|(name, path)| (name, trace::told(&model.scenario, name, path.into_vec()))),
         unseen,
     }
+}
+
+fn listens_until(call: &Call) -> Option<Instant> {
+    if let Standing::Listening(until) = call.standing { Some(until) } else { None }
+}
+
+fn stands_by_until(call: &Call) -> Option<Instant> {
+    if let Standing::StandingBy(until) = call.standing { Some(until) } else { None }
 }
 
 /// `frame` with a wrong bit in what it says.

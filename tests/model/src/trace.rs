@@ -30,6 +30,7 @@ pub fn told(scenario: &Scenario, property: &str, path: Vec<(State, Option<Action
         let why = match state.wrong {
             Some(Wrong::Misattributed) => "it was not given to this request",
             Some(Wrong::NotDone) => "it was not given to this request: what is reported did not happen",
+            Some(Wrong::Denied) => "it is said not to have gone out",
             Some(Wrong::SentTwice) => "it was to be sent once",
             Some(Wrong::Unended) => "and the unit still is in doubt",
             None => ends::overdue(&state).unwrap_or("what is said does not hold"),
@@ -45,15 +46,14 @@ fn moment(at: Instant) -> String {
 }
 
 fn line(before: &State, action: Action, after: &State) -> String {
-    let number = after.told.sent.map_or(after.requests, |sent| sent);
-    let outcome = after.told.outcome.map_or(String::new(), |outcome| format!(": {outcome}"));
+    let told = [after.told.outcome, after.told.call].into_iter().flatten().collect::<Vec<_>>().join("; ");
+    let outcome = if told.is_empty() { String::new() } else { format!(": {told}") };
     match action {
-        Action::Ask(unit, kind, heard) => {
-            format!("request {number}: {} unit {}{}{outcome}", asked(kind), unit + 1, way(heard))
-        }
-        Action::Repeat(heard) => {
-            let kind = before.program.call().map_or("the same", |call| asked(call.kind));
-            format!("request {number}: once more {kind} the unit{}{outcome}", way(heard))
+        Action::Ask(unit, kind) => format!("a program is to {} unit {}{outcome}", asked(kind), unit + 1),
+        Action::Send(heard) => {
+            let what = after.told.sent.map_or("nothing to", asked);
+            let unit = before.program.call.as_ref().map_or(0, |call| call.unit + 1);
+            format!("request {}: {what} unit {unit}{}{outcome}", after.requests, way(heard))
         }
         Action::Arrive(unit, _, how) => {
             let came = after.told.came.map_or(String::new(), |came| answer(&came));
@@ -63,17 +63,17 @@ fn line(before: &State, action: Action, after: &State) -> String {
                 How::Damaged => "arrives damaged",
                 How::Cut => "arrives without its end",
             };
-            let taken = match (before.program.in_flight(), after.told.outcome) {
-                (None, _) => ", and nothing is waited for".to_owned(),
-                (Some(_), None) => ": not taken".to_owned(),
-                (Some((.., number)), Some(outcome)) => format!(", while request {number} is waited for: {outcome}"),
+            let taken = match before.program.in_flight() {
+                None => ", and nothing is waited for".to_owned(),
+                Some(_) if told.is_empty() => ": not taken".to_owned(),
+                Some(flight) => format!(", while request {} is waited for{outcome}", flight.number),
             };
             format!("  unit {}: {came} {how}{taken}", unit + 1)
         }
         Action::TimeOut => format!("  request {} times out{outcome}", before.requests),
         Action::Linger => "  half of the time-out is over".to_owned(),
-        Action::Abort => format!("  request {} is given up", before.requests),
-        Action::Wait(_) => "nothing is asked until now".to_owned(),
+        Action::Abort => format!("  the call is cut short{outcome}"),
+        Action::Wait(_) => format!("nothing is sent until now{outcome}"),
         Action::Open(strangers) => format!("the port is opened again{}", also_asked(strangers)),
         Action::Restart(unit) => format!("unit {} restarts and forgets what it was asked", unit + 1),
         Action::Change => "the registers change".to_owned(),
@@ -83,11 +83,14 @@ fn line(before: &State, action: Action, after: &State) -> String {
 const fn asked(kind: Kind) -> &'static str {
     match kind {
         Kind::Read(1) => "read 1 word of",
-        Kind::Read(_) => "read 2 words of",
+        Kind::Read(2) => "read 2 words of",
+        Kind::Read(_) => "read more words of",
+        Kind::Watch => "read 1 word, to see whether it stands, of",
+        Kind::Input => "read 1 input register of",
+        Kind::Set => "write a value that can be read back to",
         Kind::Run => "write RUN to",
         Kind::Stop => "write STOP, in doubt or not, to",
         Kind::Echo(_) => "echo a fresh word of",
-        Kind::Look => "look whether the adapter sends it back, by a read of",
     }
 }
 
@@ -114,6 +117,8 @@ fn content(content: Content) -> String {
         Content::Words(count, changed) => {
             format!("the words of {count} registers{}", if changed { ", changed" } else { "" })
         }
+        Content::Input(_) => "the word of 1 input register".to_owned(),
+        Content::Done(Kind::Set) => "the value was written".to_owned(),
         Content::Done(Kind::Stop) => "STOP was written".to_owned(),
         Content::Done(_) => "RUN was written".to_owned(),
         Content::Echoed(_) => "its word".to_owned(),

@@ -1,18 +1,21 @@
-//! The whole of one moment: the real master, the units, what is under way, the program and the time.
+//! The whole of one moment: what is really known of the line, the units, what is under way, the program and the time.
 //!
 //! Only time-outs and the rules' own times take time; what is sent and what arrives take none.
 
 use std::hash::{Hash, Hasher};
 
-use drivebus_rtu::{Duration, Instant, Master, Patience, UnitAddress};
+use drivebus_rtu::{Cut, Duration, Instant, Known, Master, Opened, OwnEcho, Patience, SerialFormat, UnitAddress};
 
 use crate::fingerprint::{self, offset};
 use crate::frames::{Asker, Coming, Content, Kind};
-use crate::program::{Knowledge, Program};
+use crate::program::Program;
 use crate::scenario::{AGAIN, Adapter, Budget, Damage, Echoing, LONGEST, MUTE, PATIENCE, STRANGERS_COME_FOR, Scenario};
 
 /// When the search begins: far from the clock's own start, which would be a special moment.
 pub const START: Instant = Instant::from_nanos(1_000_000_000_000);
+
+/// A line that nobody else asked anything on.
+const NOBODY_ELSE: Opened = Opened::new().gapless(true);
 
 /// The steps of time that matter: half a time-out.
 pub const TICK: Duration = Duration::from_millis(250);
@@ -41,8 +44,10 @@ pub struct Unit {
 pub enum Wrong {
     /// An answer was attributed to a request that it was not given to.
     Misattributed,
-    /// A write was reported as done or as refused, and was not.
+    /// A write was reported as done, as refused or as not done, and was not.
     NotDone,
+    /// A write is said not to have gone out, and it did.
+    Denied,
     /// What moves was sent twice for one call.
     SentTwice,
     /// What was to end a doubt has not ended it.
@@ -52,12 +57,14 @@ pub enum Wrong {
 /// What the last step showed, for a person to read. No part of the state.
 #[derive(Debug, Clone, Default)]
 pub struct Told {
-    /// The number of the request that was sent.
-    pub sent: Option<u16>,
+    /// The request that was sent.
+    pub sent: Option<Kind>,
     /// The answer that arrived.
     pub came: Option<Coming>,
-    /// What the master and the program made of it.
+    /// What was made of it.
     pub outcome: Option<&'static str>,
+    /// What became of the call, if it is over.
+    pub call: Option<&'static str>,
 }
 
 /// All of it.
@@ -65,13 +72,13 @@ pub struct Told {
 pub struct State {
     /// Now.
     pub now: Instant,
-    /// The code under test.
-    pub master: Box<Master>,
+    /// What is known of the line: with the call that is under way the code under test.
+    pub known: Box<Known<2, 4>>,
     /// The units.
     pub units: Vec<Unit>,
     /// Whether the order of what comes is open.
     pub overtaking: bool,
-    /// What is asked, and what is known of the adapter.
+    /// What is asked.
     pub program: Program,
     /// What may still happen.
     pub left: Budget,
@@ -104,16 +111,19 @@ impl State {
             gave_up: None,
             touched: None,
         };
-        let mut master = Master::with_silence(Duration::ZERO);
+        let echo = if scenario.adapter == Adapter::Known { OwnEcho::Absent } else { OwnEcho::Unknown };
+        let mut known = Known::new(SerialFormat::DEFAULT, echo, 1);
+        // From here on no silence has to be kept, whatever is opened later.
+        known.opened(START, &NOBODY_ELSE);
         if scenario.damage != Damage::Final {
-            master.be_patient(Some(Patience::new(Duration::ZERO, Duration::ZERO)));
+            known.be_patient(Some(Patience::new(Duration::ZERO, Duration::ZERO)));
         }
         let mut state = Self {
             now: START,
-            master: Box::new(master),
+            known: Box::new(known),
             overtaking: scenario.overtaking,
             units: scenario.units.iter().map(unit).collect(),
-            program: Program::new(scenario),
+            program: Program { call: None },
             left,
             changed: false,
             opened: None,
@@ -129,26 +139,29 @@ impl State {
 
     /// The port is opened; `strangers` is what another program's last questions to unit 1 are answered with.
     pub fn open(&mut self, scenario: &Scenario, strangers: &[Content]) {
-        self.give_up_what_is_asked(scenario);
-        self.master.opened(self.now);
-        self.program.knowledge = Knowledge::at_opening(scenario.adapter);
-        self.master.strip_echo(false);
-        self.opened = Some(self.now);
-        let coming =
-            strangers.iter().map(|&content| Coming { asker: Asker::Stranger, content, given_up: None, damaged: None });
+        let now = self.now;
+        if let Some(call) = &mut self.program.call {
+            call.conversation.cut_short(now, &mut self.known, Cut::Lost);
+        }
+        if scenario.strangers.is_empty() {
+            self.known.opened(now, &NOBODY_ELSE);
+            return;
+        }
+        self.known.opened(now, &Opened::new());
+        self.opened = Some(now);
+        let coming = strangers.iter().map(|&content| Coming {
+            asker: Asker::Stranger,
+            content,
+            place: 0,
+            given_up: None,
+            damaged: None,
+        });
         self.units[0].coming.extend(coming);
     }
 
-    /// The program waits for nothing any more; a request in flight has ended without its answer.
-    pub fn give_up_what_is_asked(&mut self, scenario: &Scenario) {
-        if let Some(unit) = self.program.stop_to_look_for() {
-            self.stop_is_still_owed(scenario, unit);
-        }
-        if let Some((unit, kind, number)) = self.program.in_flight() {
-            self.ended(number);
-            self.left_open(unit, kind);
-        }
-        self.program.forget_call();
+    /// What is owed, as far as it is known.
+    pub fn master(&self) -> &Master {
+        self.known.master()
     }
 
     /// Request `number` has ended: what still comes of it is late.
@@ -209,7 +222,6 @@ impl State {
             ends.extend(unit.coming.iter().filter_map(|coming| self.comes_until(scenario, index, coming)));
             ends.extend(unit.touched.map(|at| at + PATIENCE));
             ends.extend(unit.gave_up.map(|at| at + LONGEST));
-            ends.extend(self.program.waits_until(self, index, scenario));
         }
         ends.extend(self.opened.map(|opened| opened + STRANGERS_COME_FOR));
         ends.into_iter().filter(|&end| end > self.now).min()
@@ -224,18 +236,22 @@ impl State {
     }
 
     /// What unit `index` has taken in, answered.
-    pub fn hear(&mut self, index: usize, kind: Kind, refuses: bool) {
+    pub fn hear(&mut self, scenario: &Scenario, index: usize, (kind, place): (Kind, u16), refuses: bool) {
+        let refuses = refuses || matches!(kind, Kind::Read(count) if count > scenario.longest);
+        self.changed |= kind == Kind::Set && !refuses;
         let unit = &mut self.units[index];
         let content = match (kind, unit.echoing) {
             (Kind::Echo(_), Echoing::Silent) => return,
             (Kind::Echo(_), Echoing::Refuses) => Content::Refused(Kind::Echo(0)),
             (Kind::Echo(word), Echoing::Returns) => Content::Echoed(word),
-            (Kind::Look, _) => Content::Words(1, self.changed),
             (kind, _) if refuses => Content::Refused(kind),
             (Kind::Read(count), _) => Content::Words(count, self.changed),
-            (Kind::Run | Kind::Stop, _) => Content::Done(kind),
+            (Kind::Watch, _) => Content::Words(1, self.changed),
+            (Kind::Input, _) => Content::Input(self.changed),
+            (Kind::Run | Kind::Stop | Kind::Set, _) => Content::Done(kind),
         };
-        unit.coming.push(Coming { asker: Asker::Request(self.requests), content, given_up: None, damaged: None });
+        let asker = Asker::Request(self.requests);
+        unit.coming.push(Coming { asker, content, place, given_up: None, damaged: None });
     }
 
     /// Takes the answer at `place` of what comes of unit `index` off the line, and with it what cannot come any more.
@@ -253,12 +269,12 @@ impl State {
     }
 
     /// All of `coming` that can make a difference from now on.
-    pub fn signature(&self, coming: &Coming) -> (Content, Option<i64>, Option<i64>, bool, bool, bool) {
+    pub fn signature(&self, coming: &Coming) -> (Content, u16, Option<i64>, Option<i64>, bool, bool, bool) {
         let given_up = coming.given_up.map(|at| offset(self.now, at));
         let damaged = coming.damaged.map(|at| offset(self.now, at));
-        let in_flight = self.program.in_flight().is_some_and(|(.., number)| coming.is_since(number));
-        let current = self.program.first().is_some_and(|first| coming.is_since(first));
-        (coming.content, given_up, damaged, coming.asker == Asker::Stranger, in_flight, current)
+        let in_flight = self.program.in_flight().is_some_and(|flight| coming.is_since(flight.number));
+        let current = self.program.call.as_ref().is_some_and(|call| coming.is_since(call.first));
+        (coming.content, coming.place, given_up, damaged, coming.asker == Asker::Stranger, in_flight, current)
     }
 
     /// Whether the adapter of the line sends requests back.
@@ -271,7 +287,7 @@ impl Hash for State {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let now = self.now;
         let at = |moment: Option<Instant>| moment.map(|moment| offset(now, moment));
-        fingerprint::of(now, &self.master).hash(hasher);
+        fingerprint::of(now, &self.known).hash(hasher);
         self.program.hash_at(now, hasher);
         for unit in &self.units {
             (unit.echoing, unit.echoed, unit.silent_echoes, at(unit.echo_open)).hash(hasher);

@@ -31,8 +31,11 @@ lines! {
     refuses_echoes: "refuses-08H",
     silent_on_echoes: "silent-on-08H",
     overtaking: "overtaking",
+    overtaking_one_word_at_a_time: "overtaking-one",
     overtaking_commands: "overtaking-commands",
     overtaking_without_echo: "overtaking-no-echo",
+    values_read_back: "read-back",
+    reads_of_a_stop: "stop-reads",
     two_units: "two-units",
     adapter_that_echoes: "adapter-echoes",
     adapter_that_nobody_knows: "adapter-unknown",
@@ -51,16 +54,18 @@ fn every_line_is_searched() {
 #[test]
 fn a_program_that_heeds_nothing_is_found_out_by_the_shortest_run() {
     let scenario = Scenario { heeds: false, ..line("in-order").clone() };
-    let found = Search::new(&scenario, Budget::requests(2)).run(Order::Shortest, 1);
+    let found = Search::new(&scenario, Budget { retries: 0, ..Budget::requests(2) }).run(Order::Shortest, 1);
     let (property, trace) = found.refuted.unwrap();
     assert_eq!(property, "no answer is attributed to a request it was not sent for");
     let expected = "\
 not so: no answer is attributed to a request it was not sent for
 on the line \"in-order\": a unit that echoes and answers in order, damage, aborts, restarts
+    0.00 s  a program is to read 1 word of unit 1
     0.00 s  request 1: read 1 word of unit 1
-    0.50 s    request 1 times out: left open
+    0.50 s    request 1 times out: left open; the call is given up
+    0.50 s  a program is to read 1 word of unit 1
     0.50 s  request 2: read 1 word of unit 1
-    0.50 s    unit 1: the answer to request 1 (the words of 1 register) arrives, while request 2 is waited for: taken for the answer
+    0.50 s    unit 1: the answer to request 1 (the words of 1 register) arrives, while request 2 is waited for: taken for the answer; the call is answered
             WRONG: it was not given to this request
 ";
     assert_eq!(trace, expected);
