@@ -1,8 +1,8 @@
 //! What several threads do at one line, and what holds in whatever order they run.
 //!
 //! In each of them everybody comes to an end: a wake-up that is lost, or two who wait for each other, would keep one of them
-//! for ever, and shuttle says so. One at a time has the line ([`Line`]). What is left to be done is told of once: it was
-//! carried out, taken back, or given back ([`Told`]).
+//! for ever, and shuttle says so. One at a time has the line (`Line`). What is left to be done is told of once: it was
+//! carried out, taken back, or given back (`Told`).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
