@@ -26,6 +26,14 @@ JUDGE = "crates/rtu/src/master/judge.rs"
 MASTER = "crates/rtu/src/master.rs"
 AGREEMENT = "crates/rtu/src/agreement.rs"
 TORN = "crates/rtu/src/master/torn.rs"
+CONVERSATION = "crates/rtu/src/conversation.rs"
+ATTEMPT = "crates/rtu/src/conversation/attempt.rs"
+CAME_TO = "crates/rtu/src/conversation/came_to.rs"
+ECHO = "crates/rtu/src/conversation/echo.rs"
+FIRST_CONTACT = "crates/rtu/src/conversation/first_contact.rs"
+KNOWN = "crates/rtu/src/conversation/known.rs"
+LONGER = "crates/rtu/src/conversation/longer_reads.rs"
+WRITE_BACK = "crates/rtu/src/conversation/write_back.rs"
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,12 @@ class Break:
 
 # A damaged answer is believed to be all, from the first on.
 BELIEVED = ("self.latest[0].is_some() && now >= *self.enough.get_or_insert(now) + AGAIN", "true")
+
+# The master begins what could be mistaken, in quarantine.
+BEGUN = (
+    "if self.in_quarantine(now, unit) && !self.doubts.tells_apart(now, unit, request.expected()) =>",
+    "if false && !self.doubts.tells_apart(now, unit, request.expected()) =>",
+)
 
 BREAKS = [
     # --- first contact
@@ -83,8 +97,8 @@ BREAKS = [
     Break(
         "no stranger's answer is taken for one that was seen",
         DOUBT,
-        "if !is_new || self.is_strange(now, unit) {",
-        "if !is_new {",
+        "if self.is_strange(now, unit) {\n            return is_nobodys;",
+        "if false {\n            return is_nobodys;",
         "overtaking-no-echo --openings 1 --requests 3",
     ),
     # --- what is left open
@@ -148,10 +162,18 @@ BREAKS = [
     # --- the quarantine
     Break(
         "nothing that could be mistaken is asked in quarantine",
-        MASTER,
-        "if self.in_quarantine(now, unit) && !self.doubts.tells_apart(now, unit, request.expected()) =>",
-        "if false && !self.doubts.tells_apart(now, unit, request.expected()) =>",
+        KNOWN,
+        "_ => in_quarantine,",
+        "_ => false,",
         "first-contact --openings 0",
+        beside=(MASTER, *BEGUN),
+    ),
+    Break(
+        "the master would not begin it, but a conversation never tries to",
+        MASTER,
+        *BEGUN,
+        "first-contact --openings 0",
+        holds=True,
     ),
     Break(
         "a read of the same length tells nothing apart",
@@ -196,7 +218,9 @@ BREAKS = [
         "asked.is_none()",
         "silent-on-08H --requests 3",
     ),
-    Break("time does not end it where echoes come", DOUBT, "self.echoers.insert(unit);", "", "in-order"),
+    Break(
+        "time does not end it where echoes come", DOUBT, "self.echoers.insert(unit);", "", "in-order --retries 0"
+    ),
     Break(
         "a unit that returns none any more is one that never did", DOUBT, "self.echoers.remove(unit);", "", "replaced"
     ),
@@ -304,14 +328,14 @@ BREAKS = [
     Break(
         "not when it is the same frame again",
         DOUBT,
-        "if !is_new || self.is_strange(now, unit) {",
-        "if self.is_strange(now, unit) {",
+        "if !is_new {",
+        "if false {",
         "overtaking --requests 4 --faults 1",
     ),
     Break(
         "nor when the adapter may have sent it",
         DOUBT,
-        "Some(open) if open.expected.may_repeat_request() => return,",
+        "Some(open) if open.expected.may_repeat_request() => return is_nobodys,",
         "",
         "adapter-echoes --requests 3",
     ),
@@ -406,7 +430,106 @@ BREAKS = [
         AGREEMENT,
         "self.heard >= needed",
         "self.heard >= needed.min(1)",
-        "overtaking --requests 4 --faults 0",
+        "overtaking-one",
+    ),
+    # --- the conversation
+    Break(
+        "a question that may be mistaken is put until the answers agree",
+        ATTEMPT,
+        "self.course.hearing.is_none() && attribution == Attribution::Certain && !twice",
+        "self.course.hearing.is_none() && !twice",
+        "overtaking-one",
+    ),
+    Break(
+        "the refusal of a read put apart refuses nothing that was asked",
+        CAME_TO,
+        "self.attempt.apart = false;\n            self.course.asks_otherwise();",
+        "self.attempt.apart = false;\n            return self.end_attempt(now, known, result);",
+        "overtaking-one",
+    ),
+    Break(
+        "a read is put so that its answer is told apart",
+        LONGER,
+        "find(&|read| master.tells_apart(now, unit, read)).or_else",
+        "find(&|_| true).or_else",
+        "overtaking --requests 4",
+    ),
+    Break(
+        "a write waits until nothing open could confirm it",
+        KNOWN,
+        "Attribution::Wait(until) => Next::Overtaken(until),",
+        "Attribution::Wait(_) => Next::Ask(Attribution::Certain),",
+        "overtaking-commands --refusals 0",
+    ),
+    Break(
+        "the adapter is looked at before what it could confirm",
+        KNOWN,
+        "if self.echo == OwnEcho::Unknown && (ask",
+        "if false && (ask",
+        "adapter-echoes",
+    ),
+    Break(
+        "the adapter is looked at behind a stop that did not wait for it",
+        CAME_TO,
+        "if known.echo == OwnEcho::Unknown\n                    && unit_of(&ask).is_some()",
+        "if false\n                    && unit_of(&ask).is_some()",
+        "adapter-echoes",
+    ),
+    Break(
+        "an adapter that is found to echo then has confirmed the stop",
+        CAME_TO,
+        "let (OwnEcho::Unknown | OwnEcho::Present, Some(unit)) =",
+        "let (OwnEcho::Unknown, Some(unit)) =",
+        "adapter-echoes",
+    ),
+    Break(
+        "what is left of an echo shows no silent adapter",
+        ECHO,
+        "let clean = tally.own_remnant == 0\n            && match",
+        "let clean = true\n            && match",
+        "adapter-echoes",
+    ),
+    Break(
+        "of a program that asks one at a time two questions may be open",
+        FIRST_CONTACT,
+        "const LEFT_OPEN: u8 = 2;",
+        "const LEFT_OPEN: u8 = 1;",
+        "stop-reads",
+    ),
+    Break(
+        "the next read has a shape that was not asked for yet",
+        FIRST_CONTACT,
+        "!self.has_read(|shape| shape == asked) && !master",
+        "!master",
+        "stop-reads",
+    ),
+    Break(
+        "a write that another one's confirmation may have confirmed is looked up",
+        ATTEMPT,
+        "self.course.is_unproven();",
+        "",
+        "read-back",
+    ),
+    Break(
+        "what the unit shows is compared with what was written",
+        WRITE_BACK,
+        "let is_shown = self.shows_what_was_written();",
+        "let is_shown = true;",
+        "read-back",
+    ),
+    Break(
+        "what is read back is not asked in doubt",
+        CONVERSATION,
+        "request: write.read, timeout, in_doubt: false }",
+        "request: write.read, timeout, in_doubt: true }",
+        "read-back",
+    ),
+    Break(
+        "a write that went out once went out",
+        WRITE_BACK,
+        "Err(Slip { sent: slip.sent.or(write.before), ..slip })",
+        "Err(slip)",
+        "read-back --requests 4",
     ),
 ]
 

@@ -123,7 +123,10 @@ impl State {
             self.wrong = Some(Wrong::Misattributed);
             return;
         };
-        let is_own = came.is_since(call.first) && came.place == flight.place;
+        // Who refuses more words than were asked for has not refused what was asked.
+        let is_asked =
+            !refused || matches!(came.content, Content::Refused(kind) if kind.request() == call.kind.request());
+        let is_own = is_asked && came.is_since(call.first) && came.place == flight.place;
         let before = call.truth.row.filter(|(content, ..)| alike(*content, came.content));
         let (times, was_own) = before.map_or((0, false), |(_, times, own)| (times, own));
         call.truth.row = Some((came.content, times + 1, is_own || was_own));
