@@ -150,6 +150,36 @@ def masters() -> dict[str, bytes]:
     }
 
 
+def conversations() -> dict[str, bytes]:
+    """For `conversation`: the line, what is asked and how, then what is said to it."""
+    # 34: 5 s after the line was opened, by an adapter that does not echo. 0: what comes where it listens is a record; 5: nothing.
+    settled, fresh, others = b"\x22", b"\0", b"\x2a"
+    go = b"\5" * 4
+    answer, late = b"\0" + bytes([WORDS, 1, 1, 0, 7]), b"\0" + bytes([WORDS | LATE, 1, 1, 0, 7])
+    more = b"\0" + bytes([WORDS, 1, 2, 0, 7])
+    echo = b"\0" + bytes([ANSWER, 0, 0, 0])
+    confirmed, busy = b"\0" + bytes([TWO_WORDS, 1, 1, 0, 9, 0, 5]), b"\0" + bytes([EXCEPTION, 1, 6, 6])
+    read, twice, write, surely = b"\0\0", b"\0\x21", b"\3\1", b"\3\x41"
+    return {
+        "read": settled + read + go + answer + go,
+        "read-again": settled + b"\0\2" + go * 3 + late + go + answer + go,
+        "verified": settled + twice + go + answer + go + answer + go,
+        "write": settled + write + go + confirmed + go,
+        "write-in-silence": settled + write + go * 6,
+        "write-read-back": settled + surely + go * 3 + echo + go + more + go + confirmed + go,
+        "write-busy": settled + surely + go + busy + go + answer + go + confirmed + go,
+        "first-contact": fresh + b"\0\0" + go + answer + go + echo + go + answer,
+        "stop-at-first-contact": fresh + b"\0\x08" + (go + answer) * 6,
+        "beside-others": others + read + (go + answer + more) * 6,
+        "cut-before-it-began": settled + b"\3\3" + b"\x0a" + go * 4,
+        "out-of-turn": settled + read + b"\x09" + answer[1:] + b"\x08\7\7" + go + b"\x0e\x0d" + go,
+        "time-goes-back": settled + read + go + b"\xfe" + go,
+        "two-at-once": settled + write + b"\5\5\x0e\x0f" + go + b"\x1f" + go + confirmed,
+        "opened-under-a-request": settled + write + go + b"\x0d" + confirmed + go,
+        "broadcast": settled + b"\xf3\0" + go,
+    }
+
+
 def buses() -> dict[str, bytes]:
     """For `bus`: how many calls (and whether the adapter may echo), the calls, what comes after each transmission."""
     read, write, echo, custom = (bytes([kind, 0, 0x10, 5, 0, 1]) for kind in (0, 3, 5, 6))
@@ -347,6 +377,7 @@ def main() -> None:
     }
     corpus = {
         "bus": buses(),
+        "conversation": conversations(),
         "drive": drives(),
         "frame": frames(),
         "framer": framer,

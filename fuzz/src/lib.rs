@@ -6,6 +6,7 @@
 #![allow(clippy::missing_panics_doc, reason = "to panic is how a target says that its invariant does not hold")]
 
 mod bus;
+mod conversation;
 mod doubts;
 mod frame;
 mod framer;
@@ -20,6 +21,7 @@ mod stream;
 mod told;
 
 pub use bus::bus;
+pub use conversation::conversation;
 pub use frame::frame;
 pub use framer::framer;
 pub use guest::guest;
@@ -33,7 +35,7 @@ pub use sniffer::sniffer;
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus and of its program.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 10] = [
     ("frame", frame),
     ("framer", framer),
     ("listener", listener),
@@ -41,6 +43,7 @@ pub const TARGETS: [(&str, Target); 9] = [
     ("master", master),
     ("profile", profile),
     ("bus", bus),
+    ("conversation", conversation),
     ("guest", guest),
     ("sniffer", sniffer),
 ];
