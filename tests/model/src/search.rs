@@ -323,7 +323,7 @@ impl Model for Search {
                 }
                 actions.extend(may_abort.then_some(Action::Abort));
             }
-            Some(Standing::StandingBy(until)) => {
+            Some(Standing::AwayUntil(until)) => {
                 let end = state.next_end(&self.scenario).map_or(until, |end| end.min(until));
                 actions.push(Action::Wait(end));
                 actions.extend(may_abort.then_some(Action::Abort));
@@ -391,7 +391,7 @@ fn listens_until(call: &Call) -> Option<Instant> {
 }
 
 fn stands_by_until(call: &Call) -> Option<Instant> {
-    if let Standing::StandingBy(until) = call.standing { Some(until) } else { None }
+    if let Standing::AwayUntil(until) = call.standing { Some(until) } else { None }
 }
 
 /// `frame` with a wrong bit in what it says.
