@@ -180,8 +180,7 @@ impl Run<'_> {
                     self.now = self.now.max(until);
                 }
                 let mut rest = came;
-                loop {
-                    let Ok(count) = call.heard(self.now, &mut self.known, rest) else { break };
+                while let Ok(count) = call.heard(self.now, &mut self.known, rest) {
                     self.heard.extend_from_slice(&rest[..count]);
                     rest = &rest[count..];
                     // What there is no room for there is after looking; what is over has no use for it.
