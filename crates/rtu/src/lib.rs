@@ -5,6 +5,7 @@
 mod address;
 mod agreement;
 mod answer;
+mod assumption;
 mod conversation;
 pub mod crc;
 mod doubt;
@@ -31,6 +32,7 @@ pub use core::time::Duration;
 pub use address::{AddressError, Destination, UnitAddress};
 pub use agreement::Agreement;
 pub use answer::{Answer, AnswerError, Head};
+pub use assumption::Assumption;
 pub use conversation::{
     Conversation, Counts, Cut, Exchange, FreshWords, Known, Opened, OutOfTurn, Outcome, OwnEcho, Question, Step, Times,
     Unanswered, Urgency,

@@ -6,6 +6,7 @@
 //! [`scenario`] has the lines and how far each is searched, [`search`] what can happen and what must hold, [`ends`] when each
 //! doubt must be over, and [`trace`] tells a run in words.
 
+mod assumed;
 pub mod ends;
 pub mod fingerprint;
 pub mod frames;
@@ -16,5 +17,6 @@ pub mod search;
 pub mod trace;
 pub mod world;
 
+pub use assumed::ASSUMED;
 pub use scenario::{Budget, SCENARIOS, Scenario};
 pub use search::{Finding, Order, Search};

@@ -7,6 +7,7 @@
 //! [`run`] does it; `main` prints what came of it. Chance comes from the seed. With more than one thread the order in which
 //! they come to the line is the system's; with one, the same plan gives the same run but for the words of probes.
 
+mod assumed;
 mod chance;
 mod hand;
 mod journal;
@@ -19,6 +20,7 @@ mod watcher;
 use std::thread;
 use std::time::{Duration, Instant};
 
+pub use assumed::ASSUMED;
 pub use rig::{Rig, UNITS};
 pub use verdict::{Verdict, Wrong};
 

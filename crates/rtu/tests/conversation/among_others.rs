@@ -2,7 +2,7 @@
 
 use drivebus_rtu::*;
 
-use crate::rig::Does::{And, AndBefore, Refuses, Right};
+use crate::rig::Does::{And, AndBefore, Nothing, Refuses, Right};
 use crate::rig::*;
 
 fn others() -> Opened {
@@ -140,4 +140,29 @@ fn what_proves_an_answer_counts_as_a_request_of_the_call() {
         let told = rig.run(ask(9, 1).retries(retries));
         assert!(told.sent.len() <= 8 * (retries as usize + 1), "{} for {retries}: {:?}", told.sent.len(), told.end);
     }
+}
+
+#[test]
+fn a_length_that_was_proven_beside_others_is_asked_for_without_another_proof() {
+    let mut rig = rig();
+    assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]));
+    theirs(&mut rig, &words(&[0x77]));
+    let told = rig.run(ask(9, 1));
+    assert_eq!(
+        (told.end, told.sent.len(), told.counts.resyncs),
+        (End::Words(vec![9]), 2, 1),
+        "the question and its proof"
+    );
+    let length = told.sent[0][5];
+    rig.now = rig.now + ms(200);
+    let told = rig.run(ask(9, 1));
+    assert_eq!((told.end, told.sent.len()), (End::Words(vec![9]), 1));
+    assert_eq!(told.sent[0][5], length);
+}
+
+#[test]
+fn where_the_proof_meets_silence_nothing_is_believed() {
+    let mut rig = rig().does([Right, Nothing]);
+    let told = rig.run(ask(9, 1));
+    assert_eq!((told.end, told.sent.len()), (silence(1), 2));
 }

@@ -124,3 +124,24 @@ fn before_an_echo_to_a_unit_in_doubt_the_adapter_is_looked_at_too() {
     let told = rig.run(ask(9, 1).urgency(Urgency::Stop));
     assert_eq!(told.sent[0], read(9, 2), "before a stop in a length that the question has not");
 }
+
+#[test]
+fn a_look_behind_what_went_out_in_doubt_is_in_doubt_too() {
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Unknown);
+    let told = rig.run(set(9, 1).in_doubt(true));
+    assert_eq!((told.end, told.sent), (End::Confirmed, vec![write(9, 1), read(0, 1)]));
+}
+
+#[test]
+fn what_is_known_to_echo_is_never_a_confirmation() {
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Present);
+    (rig.echoes, rig.now, rig.then) = (true, at(5_000), Nothing);
+    assert_eq!(rig.run(set(9, 1)).end, silence(1));
+}
+
+#[test]
+fn no_look_asks_for_more_words_than_every_unit_gives() {
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Unknown);
+    let told = rig.run(ask(9, 16).urgency(Urgency::Stop));
+    assert_eq!(told.sent[0], read(9, 1));
+}

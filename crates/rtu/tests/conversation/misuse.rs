@@ -207,3 +207,72 @@ fn of_more_units_than_there_is_room_for_nothing_is_sent() {
     let all = Question::new(Destination::Broadcast, Request::write(7, 1), TIMEOUT);
     assert!(matches!(Conversation::new(all, &fresh).next(at(5_000), &mut known), Step::LetPass));
 }
+
+/// Goes on with `call` until its request number `requests` is on the wire.
+fn until_sent(rig: &mut Rig, call: &mut Conversation<'_>, requests: usize, came: &[Vec<u8>]) {
+    let (mut sent, mut came) = (0, came.iter());
+    loop {
+        match call.next(rig.now, &mut rig.known) {
+            Step::Send(_) => {
+                call.sent(&mut rig.known, rig.now).unwrap();
+                sent += 1;
+                if sent == requests {
+                    return;
+                }
+            }
+            Step::Listen(until) => {
+                let bytes = if sent > 0 { came.next() } else { None };
+                rig.now = if bytes.is_some() { rig.now } else { rig.now.max(until) };
+                call.heard(rig.now, &mut rig.known, bytes.map_or(&[], |bytes| bytes)).unwrap();
+            }
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn what_went_out_before_a_look_at_the_adapter_is_not_said_to_be_undone() {
+    let fresh = FreshWords::beginning_at(1);
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Unknown);
+    rig.now = at(5_000);
+    let mut call = Conversation::new(set(9, 1).in_doubt(true), &fresh);
+    until_sent(&mut rig, &mut call, 2, &[write(9, 1)]);
+    rig.now = at(1);
+    let told = rig.carry_out(&mut call);
+    is_misused(&told);
+    assert_eq!(told.last_sent, Some(at(5_000)));
+}
+
+#[test]
+fn a_probe_is_not_the_question() {
+    let fresh = FreshWords::beginning_at(1);
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Absent);
+    let mut call = Conversation::new(set(9, 1), &fresh);
+    until_sent(&mut rig, &mut call, 1, &[]);
+    rig.now = Instant::ZERO;
+    let told = rig.carry_out(&mut call);
+    is_misused(&told);
+    assert_eq!(told.last_sent, None);
+}
+
+#[test]
+fn the_later_of_two_cuts_counts_and_a_refusal_stays_one() {
+    let fresh = FreshWords::beginning_at(1);
+    let mut rig = Rig::settled();
+    let mut call = Conversation::new(ask(9, 1).retries(3), &fresh);
+    until_sent(&mut rig, &mut call, 1, &[]);
+    call.cut_short(rig.now, &mut rig.known, Cut::Lost);
+    call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
+    let told = rig.carry_out(&mut call);
+    assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::GivenUp)), 0));
+    let mut rig = Rig::settled();
+    let mut call = Conversation::new(ask(9, 1).retries(3), &fresh);
+    until_sent(&mut rig, &mut call, 1, &[]);
+    call.heard(rig.now, &mut rig.known, &sealed(&[1, 0x83, 2])).unwrap();
+    while !matches!(call.next(rig.now, &mut rig.known), Step::Heard(_)) {
+        call.heard(rig.now, &mut rig.known, &[]).unwrap();
+    }
+    call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
+    let refused = Unanswered::Refused { function: 3, code: ExceptionCode(2) };
+    assert_eq!(rig.carry_out(&mut call).end, End::Failed(refused), "the unit has said what it does");
+}

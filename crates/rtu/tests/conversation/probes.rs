@@ -143,3 +143,27 @@ fn a_line_that_carries_nobody_elses_answers_knows_no_first_contact() {
     let told = Rig::opened(Opened::new().gapless(true), OwnEcho::Absent).run(ask(9, 1));
     assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![read(9, 1)]));
 }
+
+#[test]
+fn an_answer_that_is_seen_late_by_other_means_ends_the_doubt() {
+    let mut rig = owes();
+    rig.known.saw_late(rig.now, &words(&[7]));
+    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1)]);
+}
+
+#[test]
+fn what_comes_while_nothing_is_asked_is_counted_once() {
+    let mut rig = owes();
+    rig.known.stray(rig.now, &words(&[7]));
+    rig.known.stray(rig.now + ms(50), &[]);
+    assert_eq!(rig.known.take_strays().late, 1);
+    assert_eq!(rig.known.take_strays(), Tally::default());
+}
+
+#[test]
+fn fresh_words_begin_where_they_are_told_to() {
+    let words = FreshWords::beginning_at(0x1234);
+    assert_eq!(words.next(), 0x1234);
+    words.begin_at(0x4321);
+    assert_eq!(words.next(), 0x4321);
+}
