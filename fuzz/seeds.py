@@ -152,7 +152,8 @@ def masters() -> dict[str, bytes]:
 
 def conversations() -> dict[str, bytes]:
     """For `conversation`: the line, what is asked and how, then what is said to it."""
-    # 34: 5 s after the line was opened, by an adapter that does not echo. 0: what comes where it listens is a record; 5: nothing.
+    # 34: 5 s after the line was opened, by an adapter that does not echo. 0: a record is what comes where it listens;
+    # 5: nothing comes.
     settled, fresh, others = b"\x22", b"\0", b"\x2a"
     go = b"\5" * 4
     answer, late = b"\0" + bytes([WORDS, 1, 1, 0, 7]), b"\0" + bytes([WORDS | LATE, 1, 1, 0, 7])

@@ -142,6 +142,7 @@ fn at_first_contact_with_a_unit_that_knows_no_echo_its_time_is_waited_for_off_th
 fn a_line_that_carries_nobody_elses_answers_knows_no_first_contact() {
     let told = Rig::opened(Opened::new().gapless(true), OwnEcho::Absent).run(ask(9, 1));
     assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![read(9, 1)]));
+    assert_eq!(told.last_sent, Some(Instant::ZERO), "nor a silence between frames");
 }
 
 #[test]
