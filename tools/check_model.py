@@ -423,7 +423,7 @@ BREAKS = [
         AGREEMENT,
         "if came == self.last { self.heard.saturating_add(1) } else { 1 };",
         "self.heard.saturating_add(1);",
-        "overtaking --requests 4 --faults 0 --changes 1",
+        "overtaking-one --changes 1",
     ),
     Break(
         "as often as it takes",
@@ -497,13 +497,6 @@ BREAKS = [
         "stop-reads",
     ),
     Break(
-        "the next read has a shape that was not asked for yet",
-        FIRST_CONTACT,
-        "!self.has_read(|shape| shape == asked) && !master",
-        "!master",
-        "stop-reads",
-    ),
-    Break(
         "a write that another one's confirmation may have confirmed is looked up",
         ATTEMPT,
         "self.course.is_unproven();",
@@ -522,14 +515,14 @@ BREAKS = [
         CONVERSATION,
         "request: write.read, timeout, in_doubt: false }",
         "request: write.read, timeout, in_doubt: true }",
-        "read-back",
+        "read-back --retries 0",
     ),
     Break(
         "a write that went out once went out",
         WRITE_BACK,
         "Err(Slip { sent: slip.sent.or(write.before), ..slip })",
         "Err(slip)",
-        "read-back --requests 4",
+        "read-back",
     ),
 ]
 
