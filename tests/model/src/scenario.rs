@@ -342,7 +342,6 @@ pub const SCENARIOS: &[Scenario] = &[
         about: "an adapter that sends requests back, which nobody knows yet",
         overtaking: true,
         adapter: Adapter::Echoes,
-        damage: Damage::Learned,
         kinds: COMMANDS,
         small: Budget { faults: 1, ..Budget::requests(3) },
         deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },

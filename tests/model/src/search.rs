@@ -327,7 +327,7 @@ impl Model for Search {
                 }
                 actions.extend(may_abort.then_some(Action::Abort));
             }
-            Some(Standing::StandingBy(until)) => {
+            Some(Standing::Aside(until)) => {
                 let end = state.next_end(&self.scenario).map_or(until, |end| end.min(until));
                 actions.push(Action::Wait(end));
                 actions.extend(may_abort.then_some(Action::Abort));
@@ -395,7 +395,7 @@ fn listens_until(call: &Call) -> Option<Instant> {
 }
 
 fn stands_by_until(call: &Call) -> Option<Instant> {
-    if let Standing::StandingBy(until) = call.standing { Some(until) } else { None }
+    if let Standing::Aside(until) = call.standing { Some(until) } else { None }
 }
 
 /// `frame` with a wrong bit in what it says.
