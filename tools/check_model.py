@@ -120,7 +120,7 @@ BREAKS = [
         JUDGE,
         "(false, ..) => self.doubts.left_open(now, unit, expected, timeout),",
         "(false, ..) => {}",
-        "overtaking --requests 3 --faults 1",
+        "first-contact --openings 0 --requests 3 --refusals 1",
     ),
     Break(
         "a request given up is left open",
@@ -217,9 +217,7 @@ BREAKS = [
         "asked.is_none()",
         "silent-on-08H --requests 3",
     ),
-    Break(
-        "time does not end it where echoes come", DOUBT, "self.echoers.insert(unit);", "", "in-order --retries 0"
-    ),
+    Break("time does not end it where echoes come", DOUBT, "self.echoers.insert(unit);", "", "in-order --retries 0"),
     Break(
         "a unit that returns none any more is one that never did", DOUBT, "self.echoers.remove(unit);", "", "replaced"
     ),
