@@ -334,7 +334,7 @@ BREAKS = [
         DOUBT,
         "Some(open) if open.expected.may_repeat_request() => return is_nobodys,",
         "",
-        "adapter-echoes --requests 3",
+        "adapter-echoes --requests 4 --retries 0",
     ),
     # --- what is forgotten
     Break(
