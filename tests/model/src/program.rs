@@ -54,7 +54,7 @@ pub(crate) enum Standing {
     /// It waits for bytes until then.
     Listening(Instant),
     /// It leaves the line to others until then.
-    AwayUntil(Instant),
+    Aside(Instant),
 }
 
 /// A request on the wire.
@@ -153,7 +153,7 @@ impl State {
         let standing = loop {
             match call.conversation.next(self.now, &mut self.known) {
                 Next::LetPass => {}
-                Next::StandBy(until) => break Some(Standing::AwayUntil(until)),
+                Next::StandBy(until) => break Some(Standing::Aside(until)),
                 Next::Listen(_) if call.flight.is_none() => break Some(Standing::Sending),
                 Next::Listen(until) => break Some(Standing::Listening(until)),
                 Next::Heard(exchange) => self.request_is_over(step, &mut call, &exchange, source),

@@ -222,7 +222,7 @@ pub const SCENARIOS: &[Scenario] = &[
         name: "in-order",
         about: "a unit that echoes and answers in order, damage, aborts, restarts",
         small: Budget { faults: 1, lingers: 1, ..Budget::requests(3) },
-        deep: Budget { faults: 1, aborts: 1, restarts: 1, lingers: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 1, aborts: 1, restarts: 1, lingers: 1, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Late, Sight::EndedByEcho, Sight::EndedByRead, Sight::EndedBySight],
         ..LINE
     },
@@ -231,7 +231,7 @@ pub const SCENARIOS: &[Scenario] = &[
         about: "the same with commands, stops and refusals",
         kinds: COMMANDS,
         small: Budget { refusals: 1, ..Budget::requests(3) },
-        deep: Budget { faults: 1, refusals: 1, lingers: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 1, refusals: 1, lingers: 1, ..Budget::requests(3) },
         sights: &[Sight::Commanded, Sight::Stopped, Sight::Refused, Sight::EndedByEcho],
         ..LINE
     },
@@ -241,7 +241,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: SOMEBODY,
         kinds: COMMANDS,
         small: Budget { openings: 1, ..Budget::requests(2) },
-        deep: Budget { openings: 1, refusals: 1, ..Budget::requests(3) },
+        deep: Budget { openings: 1, refusals: 1, ..Budget::requests(2) },
         sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::EndedByEcho, Sight::EndedByTime],
         ..LINE
     },
@@ -250,8 +250,8 @@ pub const SCENARIOS: &[Scenario] = &[
         about: "a unit that refuses echoes",
         units: &[Echoing::Refuses],
         strangers: SOMEBODY,
-        small: Budget { lingers: 1, retries: 0, ..Budget::requests(3) },
-        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        small: Budget { retries: 0, ..Budget::requests(3) },
+        deep: Budget { faults: 1, refusals: 1, retries: 0, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::EndedByRefusal, Sight::EndedByRead, Sight::EndedByTime],
         ..LINE
     },
@@ -261,7 +261,7 @@ pub const SCENARIOS: &[Scenario] = &[
         units: &[Echoing::Silent],
         strangers: SOMEBODY,
         small: Budget { lingers: 1, retries: 0, ..Budget::requests(3) },
-        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 1, refusals: 1, retries: 0, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::EndedByRead, Sight::EndedByTime],
         ..LINE
     },
@@ -270,7 +270,7 @@ pub const SCENARIOS: &[Scenario] = &[
         about: "a line on which answers overtake each other",
         overtaking: true,
         small: Budget::requests(4),
-        deep: Budget { faults: 1, ..Budget::requests(5) },
+        deep: Budget { faults: 1, ..Budget::requests(4) },
         sights: &[Sight::ReadAtOnce, Sight::Late, Sight::EndedByEcho],
         ..LINE
     },
@@ -281,7 +281,7 @@ pub const SCENARIOS: &[Scenario] = &[
         longest: 1,
         kinds: &[Kind::Read(1)],
         small: Budget { retries: 0, ..Budget::requests(5) },
-        deep: Budget { faults: 1, ..Budget::requests(6) },
+        deep: Budget { faults: 1, retries: 0, ..Budget::requests(5) },
         sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late, Sight::EndedByEcho],
         ..LINE
     },
@@ -291,7 +291,7 @@ pub const SCENARIOS: &[Scenario] = &[
         overtaking: true,
         kinds: COMMANDS,
         small: Budget { refusals: 1, ..Budget::requests(3) },
-        deep: Budget { refusals: 1, lingers: 1, ..Budget::requests(4) },
+        deep: Budget { refusals: 1, lingers: 1, ..Budget::requests(3) },
         sights: &[Sight::Commanded, Sight::Stopped, Sight::Refused, Sight::EndedByEcho],
         ..LINE
     },
@@ -302,7 +302,7 @@ pub const SCENARIOS: &[Scenario] = &[
         overtaking: true,
         strangers: SOMEBODY,
         small: Budget { faults: 1, ..Budget::requests(3) },
-        deep: Budget { refusals: 1, openings: 1, ..Budget::requests(4) },
+        deep: Budget { refusals: 1, openings: 1, ..Budget::requests(2) },
         sights: &[Sight::ReadAtOnce, Sight::EndedByTime],
         ..LINE
     },
@@ -312,7 +312,7 @@ pub const SCENARIOS: &[Scenario] = &[
         overtaking: true,
         kinds: &[Kind::Set, Kind::Read(1)],
         small: Budget { aborts: 1, changes: 1, ..Budget::requests(3) },
-        deep: Budget { aborts: 1, changes: 1, refusals: 1, ..Budget::requests(5) },
+        deep: Budget { aborts: 1, changes: 1, refusals: 1, ..Budget::requests(3) },
         sights: &[Sight::Commanded, Sight::ReadBack],
         ..LINE
     },
@@ -323,7 +323,7 @@ pub const SCENARIOS: &[Scenario] = &[
         strangers: TWO_READS,
         kinds: &[Kind::Watch],
         small: Budget { retries: 0, ..Budget::requests(4) },
-        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(7) },
+        deep: Budget { faults: 1, refusals: 1, retries: 0, ..Budget::requests(4) },
         sights: &[Sight::ReadAtOnce],
         ..LINE
     },
@@ -331,7 +331,7 @@ pub const SCENARIOS: &[Scenario] = &[
         name: "two-units",
         about: "two units with equal registers",
         units: &[Echoing::Returns, Echoing::Refuses],
-        kinds: COMMANDS,
+        kinds: &[Kind::Read(1), Kind::Run],
         small: Budget::requests(3),
         deep: Budget { faults: 1, refusals: 1, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Late, Sight::EndedByEcho, Sight::EndedByRefusal],
@@ -344,7 +344,7 @@ pub const SCENARIOS: &[Scenario] = &[
         adapter: Adapter::Echoes,
         kinds: COMMANDS,
         small: Budget { faults: 1, ..Budget::requests(3) },
-        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Stopped, Sight::AdapterFound],
         ..LINE
     },
@@ -354,7 +354,7 @@ pub const SCENARIOS: &[Scenario] = &[
         adapter: Adapter::Silent,
         kinds: COMMANDS,
         small: Budget { faults: 1, ..Budget::requests(3) },
-        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 1, refusals: 1, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Commanded, Sight::Stopped],
         ..LINE
     },
@@ -374,7 +374,7 @@ pub const SCENARIOS: &[Scenario] = &[
         overtaking: true,
         damage: Damage::Learned,
         small: Budget { faults: 2, ..Budget::requests(3) },
-        deep: Budget { faults: 3, refusals: 1, ..Budget::requests(4) },
+        deep: Budget { faults: 2, refusals: 1, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Late, Sight::EndedByEcho],
         ..LINE
     },
@@ -383,8 +383,8 @@ pub const SCENARIOS: &[Scenario] = &[
         about: "the same, and what is damaged may come again within a second",
         overtaking: true,
         damage: Damage::Again,
-        small: Budget { faults: 2, ..Budget::requests(3) },
-        deep: Budget { faults: 2, refusals: 1, ..Budget::requests(4) },
+        small: Budget { faults: 1, ..Budget::requests(3) },
+        deep: Budget { faults: 2, ..Budget::requests(3) },
         sights: &[Sight::ReadAtOnce, Sight::Late],
         ..LINE
     },

@@ -307,7 +307,8 @@ impl Model for Search {
                 actions.push(Action::Restart(unit));
             }
         }
-        if state.left.openings > 0 {
+        // What is about to be sent may as well be decided on afterwards.
+        if state.left.openings > 0 && !state.program.is_sending() {
             actions.extend(self.scenario.strangers.iter().map(|strangers| Action::Open(strangers)));
         }
         if state.left.changes > 0 {
@@ -315,7 +316,10 @@ impl Model for Search {
         }
         let may_abort = state.left.aborts > 0;
         match call.map(|call| call.standing) {
-            Some(Standing::Sending) => self.sends(state, actions),
+            Some(Standing::Sending) => {
+                self.sends(state, actions);
+                actions.extend(may_abort.then_some(Action::Abort));
+            }
             Some(Standing::Listening(due)) => {
                 actions.push(Action::TimeOut);
                 if state.left.lingers > 0 && state.now + TICK < due {
@@ -323,7 +327,7 @@ impl Model for Search {
                 }
                 actions.extend(may_abort.then_some(Action::Abort));
             }
-            Some(Standing::AwayUntil(until)) => {
+            Some(Standing::Aside(until)) => {
                 let end = state.next_end(&self.scenario).map_or(until, |end| end.min(until));
                 actions.push(Action::Wait(end));
                 actions.extend(may_abort.then_some(Action::Abort));
@@ -391,7 +395,7 @@ fn listens_until(call: &Call) -> Option<Instant> {
 }
 
 fn stands_by_until(call: &Call) -> Option<Instant> {
-    if let Standing::AwayUntil(until) = call.standing { Some(until) } else { None }
+    if let Standing::Aside(until) = call.standing { Some(until) } else { None }
 }
 
 /// `frame` with a wrong bit in what it says.
