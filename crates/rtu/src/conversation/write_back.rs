@@ -6,6 +6,7 @@
 //! | a refusal by which the unit decides nothing (06H: busy, or damaged) | the same; it counts half, as a damaged answer does |
 //! | an acknowledgement (05H: taken, and at work) | read back until it shows the words or the time is over; never sent again |
 //! | a confirmation of another value | read back once; never sent again: the unit limits what it takes |
+//! | a refusal, where that of an earlier write may come for it | read back; never sent again: where the unit shows other words, the caller is told |
 //! | any other refusal | the caller is told |
 
 use super::known::Known;
@@ -48,6 +49,8 @@ enum Came {
     Acknowledged(ExceptionCode),
     /// The unit says that it took this value.
     Limited(u16),
+    /// The unit refused this write, or one before it whose refusal came late.
+    Refused,
 }
 
 impl<'r> Write<'r> {
@@ -110,7 +113,11 @@ impl<'r> Conversation<'r> {
             }
             Err(slip) => slip,
         };
-        let (Some(came), Some(sent)) = (self.came_of(&slip), slip.sent) else {
+        let came = match self.came_of(&slip) {
+            None if is_unproven && slip.why.is_refused() => Some(Came::Refused),
+            came => came,
+        };
+        let (Some(came), Some(sent)) = (came, slip.sent) else {
             // It may not have gone out this time, but it has before.
             return self.finish(known, Err(Slip { sent: slip.sent.or(write.before), ..slip }));
         };
@@ -171,6 +178,10 @@ impl<'r> Conversation<'r> {
                 self.course.go_on_with(self.question.timeout, 0);
                 self.port_failed = None;
                 return self.begin_attempt();
+            }
+            Came::Refused => {
+                self.came = looking.raw;
+                return self.finish(known, Err(looking.slip));
             }
             Came::Nothing { .. } if looking.slip.why.means(&self.question.meanings).is_some() => {
                 self.came = looking.raw;
