@@ -70,6 +70,19 @@ fn a_decision_is_told_at_once() {
     assert_eq!(told.sent.len(), 1);
 }
 
+/// The second time it goes out although the answer to the first may still come: that may have been its refusal.
+#[test]
+fn a_refusal_that_may_be_meant_for_the_write_before_is_looked_up() {
+    let refusal = sealed(&[1, 0x86, 4]);
+    let refused = End::Failed(Unanswered::Refused { function: 6, code: ExceptionCode(4) });
+    for (shows, end, raw) in [(5, End::Done, vec![]), (1, refused, refusal.clone())] {
+        let script = [Nothing, Right, Right, Says(refusal.clone()), Says(words(&[shows]))];
+        let told = Rig::settled().does(script).run(put(5).retries(3));
+        let sent = vec![write(9, 5), echo(), read(9, 1), write(9, 5), read(9, 1)];
+        assert_eq!((told.end, told.sent, told.raw), (end, sent, raw), "it shows {shows}");
+    }
+}
+
 #[test]
 fn an_acknowledged_write_is_looked_at_until_its_words_show() {
     let told = Rig::settled()
