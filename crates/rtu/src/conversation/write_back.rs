@@ -148,8 +148,13 @@ impl<'r> Conversation<'r> {
         let sent = looking.slip.sent;
         let times = match result {
             Ok(times) => times,
-            // It is still not known whether the write was taken.
-            Err(silent) if looking.is_unproven => return self.finish(known, Err(Slip { sent, ..silent })),
+            // It is still not known whether the write was taken; that it cannot be read is no refusal of it.
+            Err(look) if looking.is_unproven && look.why.is_refused() => {
+                let why = Unanswered::NoAnswer { timeout: self.question.timeout, attempts: 1 };
+                let slip = self.slip(why, sent, look.ended);
+                return self.finish(known, Err(slip));
+            }
+            Err(look) if looking.is_unproven => return self.finish(known, Err(Slip { sent, ..look })),
             Err(_) => {
                 self.came = looking.raw;
                 self.ended_before = false;

@@ -84,6 +84,15 @@ fn a_refusal_that_may_be_meant_for_the_write_before_is_looked_up() {
 }
 
 #[test]
+fn that_it_cannot_be_read_back_is_no_refusal_of_the_write() {
+    let script = [Nothing, Right, Right, Right, Refuses(2)];
+    let told = Rig::settled().does(script).run(put(5).retries(3));
+    assert_eq!(told.sent, vec![write(9, 5), echo(), read(9, 1), write(9, 5), read(9, 1)]);
+    assert_eq!(told.end, End::Failed(Unanswered::NoAnswer { timeout: TIMEOUT, attempts: 1 }));
+    assert!(told.last_sent.is_some() && told.raw.is_empty());
+}
+
+#[test]
 fn an_acknowledged_write_is_looked_at_until_its_words_show() {
     let told = Rig::settled()
         .does([Refuses(5), Says(words(&[1])), Says(words(&[1])), Says(words(&[5]))])
