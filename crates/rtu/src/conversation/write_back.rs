@@ -6,7 +6,7 @@
 //! | a refusal by which the unit decides nothing (06H: busy, or damaged) | the same; it counts half, as a damaged answer does |
 //! | an acknowledgement (05H: taken, and at work) | read back until it shows the words or the time is over; never sent again |
 //! | a confirmation of another value | read back once; never sent again: the unit limits what it takes |
-//! | a refusal, where that of an earlier write may come for it | read back; never sent again: where the unit shows other words, the caller is told |
+//! | a refusal, where that of an earlier write may come for it | read back; never sent again: what the unit shows is told |
 //! | any other refusal | the caller is told |
 
 use super::known::Known;
@@ -184,9 +184,11 @@ impl<'r> Conversation<'r> {
                 self.port_failed = None;
                 return self.begin_attempt();
             }
+            // Which of them was refused, nobody can tell; what the unit shows is sure.
             Came::Refused => {
                 self.came = looking.raw;
-                return self.finish(known, Err(looking.slip));
+                let why = Unanswered::NotTaken { times: write.times };
+                return self.finish(known, Err(Slip { why, sent, ended: times.ended }));
             }
             Came::Nothing { .. } if looking.slip.why.means(&self.question.meanings).is_some() => {
                 self.came = looking.raw;
