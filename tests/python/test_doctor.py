@@ -207,7 +207,7 @@ class TestOtherSettings:
     @pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
     def test_a_wrong_baud_rate_is_met_without_hardware(self) -> None:
         with Simulator({1: "gd350"}, baudrate=38400, transport="pty") as simulator:
-            opened = lambda port, **options: Bus(port, **{**options, "timeout": 0.1})  # noqa: E731
+            opened = lambda port, **options: Bus(port, **{**options, "timeout": 0.3})  # noqa: E731
             findings = list(examine(simulator.port, 1, open=opened, listen=0.01))
         assert named(findings, "wrong_baud").values["baudrate"] == 38400
         assert named(findings, "answers").unit == 1
