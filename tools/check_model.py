@@ -468,8 +468,8 @@ BREAKS = [
     Break(
         "the adapter is looked at behind a stop that did not wait for it",
         CAME_TO,
-        "if known.echo == OwnEcho::Unknown\n                    && unit_of(&ask).is_some()",
-        "if false\n                    && unit_of(&ask).is_some()",
+        "if known.echo == OwnEcho::Unknown\n                    && ask.destination.unit().is_some()",
+        "if false\n                    && ask.destination.unit().is_some()",
         "adapter-echoes",
     ),
     Break(

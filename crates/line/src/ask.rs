@@ -39,10 +39,7 @@ pub struct Done {
 impl Ask<'_> {
     /// Who is asked, if it is one unit.
     pub(crate) fn unit(&self) -> Option<UnitAddress> {
-        match self.destination {
-            Destination::Unit(unit) => Some(unit),
-            Destination::Broadcast => None,
-        }
+        self.destination.unit()
     }
 
     /// The whole request frame.

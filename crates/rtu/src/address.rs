@@ -63,6 +63,14 @@ impl Destination {
         }
     }
 
+    /// The unit that is asked, if it is one.
+    pub const fn unit(self) -> Option<UnitAddress> {
+        match self {
+            Self::Unit(unit) => Some(unit),
+            Self::Broadcast => None,
+        }
+    }
+
     /// The address byte on the wire.
     pub const fn to_wire(self) -> u8 {
         match self {

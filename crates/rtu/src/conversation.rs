@@ -41,7 +41,7 @@ mod write_back;
 
 use core::time::Duration;
 
-use crate::{Destination, Instant, UnitAddress};
+use crate::{Instant, UnitAddress};
 
 use attempt::Attempt;
 use course::Course;
@@ -219,9 +219,7 @@ impl<'r> Conversation<'r> {
                 }
                 State::Passed => self.passed(now, known),
                 State::Overhearing | State::Proving { .. } => return Step::Listen(now),
-                State::Deciding => {
-                    self.decide(now, known);
-                }
+                State::Deciding => self.decide(now, known),
                 State::InFlight(_) => match self.poll(now, known) {
                     Polled::Send => return Step::Send(known.master.frame()),
                     Polled::Listen(until) => return Step::Listen(until),
@@ -305,11 +303,7 @@ impl<'r> Conversation<'r> {
     pub fn cut_short<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, why: Cut) {
         let why = Unanswered::CutShort(why);
         match self.state {
-            State::InFlight(flight) => {
-                flight.give_up(now, known);
-                self.came.clear();
-                self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
-            }
+            State::InFlight(flight) => self.give_up(now, known, flight, why),
             State::Over(flight, Err(slip)) if !slip.why.is_refused() => {
                 self.state = State::Over(flight, Err(Slip { why, ..slip }));
             }
@@ -333,11 +327,21 @@ impl<'r> Conversation<'r> {
     /// The unit has been quiet for so long at `now`, and whoever is more urgent waits: it is waited for no longer.
     pub fn give_way<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, quiet: Duration) {
         if let State::InFlight(flight) = self.state {
-            flight.give_up(now, known);
-            self.came.clear();
-            let why = Unanswered::NoAnswer { timeout: quiet, attempts: 1 };
-            self.over(known, flight, Err(Slip { why, sent: flight.sent, ended: now }));
+            self.give_up(now, known, flight, Unanswered::NoAnswer { timeout: quiet, attempts: 1 });
         }
+    }
+
+    /// The request on the wire is given up, and nothing came of it.
+    fn give_up<const U: usize, const P: usize>(
+        &mut self,
+        now: Instant,
+        known: &mut Known<U, P>,
+        flight: Flight<'r>,
+        why: Unanswered,
+    ) {
+        flight.give_up(now, known);
+        let slip = self.slip(why, flight.sent, now);
+        self.over(known, flight, Err(slip));
     }
 
     /// Whether a request of it was begun and is not over.
@@ -347,10 +351,12 @@ impl<'r> Conversation<'r> {
 
     /// Who is asked.
     fn unit(&self) -> Option<UnitAddress> {
-        match self.question.destination {
-            Destination::Unit(unit) => Some(unit),
-            Destination::Broadcast => None,
-        }
+        self.question.destination.unit()
+    }
+
+    /// Whether the unit says by `why` that it could not take a request, and may the next time.
+    fn asks_again(&self, why: Unanswered) -> bool {
+        self.unit().is_some() && why.asks_again(&self.question.meanings)
     }
 
     /// What is asked now: what the caller asks, or what was written.

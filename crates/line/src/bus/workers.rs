@@ -4,8 +4,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::thread;
 
-use drivebus_rtu::Destination;
-
 use crate::bus::Bus;
 use crate::bus::errand::{Errand, Reply, pdu_of};
 use crate::bus::shared::Shared;
@@ -59,10 +57,7 @@ impl Bus {
 
     fn enqueue(self: &Arc<Self>, is_write: bool, errand: Errand) -> Option<Running> {
         let priority = errand.options.priority.unwrap_or(if is_write { Priority::Write } else { Priority::Read });
-        let unit = match errand.destination {
-            Destination::Unit(unit) => Some(unit),
-            Destination::Broadcast => None,
-        };
+        let unit = errand.destination.unit();
         let wanted = Arc::clone(&errand.wanted);
         match self.port().queue.leave_work((priority, unit).into(), errand, || Box::new(Worked(Arc::downgrade(self)))) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),

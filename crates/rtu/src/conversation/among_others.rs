@@ -130,7 +130,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
     fn parts(&mut self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<Next> {
         let Request::Read { address, table: Table::Holding, .. } = *request else { return None };
         let count = self.other_length(now, unit, request)?;
-        Some(Next::Probe(unit, Probe::OtherRead { address, count }))
+        Some(Next::Probe(Probe::OtherRead { address, count }))
     }
 
     /// So many words from where `request` reads, as that looks like neither its answer nor anybody's: fewer than it asks for,

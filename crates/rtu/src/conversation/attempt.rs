@@ -2,13 +2,13 @@
 //! answer.
 
 use super::course::{Form, Hearing};
-use super::exchange::{Purpose, unit_of};
+use super::exchange::Purpose;
 use super::first_contact::Put;
 use super::known::{Ask, Known, Next};
 use super::outcome::{Slip, Unanswered};
 use super::probes::{Probe, Tried};
 use super::{Conversation, State, Urgency};
-use crate::{Agreement, Attribution, Instant, Request, Table, UnitAddress};
+use crate::{Agreement, Attribution, Instant, Request, Table};
 
 /// What one attempt has to remember.
 #[derive(Debug, Clone)]
@@ -92,7 +92,7 @@ impl<'r> Conversation<'r> {
                 }
                 None => self.state = State::Passing,
             },
-            Next::Probe(unit, probe) => self.probe(now, known, ask, unit, probe),
+            Next::Probe(probe) => self.probe(now, known, ask, probe),
             // Where the words can be read, what they are is known sooner than who was confirmed.
             Next::Overtaken(_) | Next::AskUntold if can_look_up => {
                 self.course.is_unproven();
@@ -169,7 +169,7 @@ impl<'r> Conversation<'r> {
         if self.course.hearing.is_none() && attribution == Attribution::Certain && !twice {
             return false;
         }
-        let asked = unit_of(ask).map(|unit| known.asked(unit));
+        let asked = ask.destination.unit().map(|unit| known.asked(unit));
         if self.course.hearing.as_ref().is_none_or(|hearing| hearing.known != asked) {
             let agreement = Agreement::new(attribution, 1 + u8::from(twice));
             let is_repeated = asked.is_some() && !agreement.is_immediate();
@@ -195,7 +195,7 @@ impl<'r> Conversation<'r> {
             Request::Read { table, address, .. } => Request::read_of(table, address, count).ok(),
             _ => None,
         };
-        let (Some(request), Some(unit)) = (request, unit_of(&ask)) else {
+        let (Some(request), Some(unit)) = (request, ask.destination.unit()) else {
             return self.put(now, known, ask, Purpose::Plain);
         };
         self.counts.resyncs += u32::from(!again && known.master.in_quarantine(now, unit));
@@ -220,7 +220,7 @@ impl<'r> Conversation<'r> {
             (Put::BehindInput, Request::Read { address, .. }) => Request::read_of(Table::Input, address, 1).ok(),
             _ => None,
         };
-        let (Some(request), Some(unit)) = (read, unit_of(&ask)) else {
+        let (Some(request), Some(unit)) = (read, ask.destination.unit()) else {
             self.course.prepared();
             self.state = State::Passing;
             return;
@@ -235,16 +235,14 @@ impl<'r> Conversation<'r> {
         self.send(now, known, Ask { request, in_doubt: true, ..ask }, purpose);
     }
 
-    /// Sends `probe` to `unit`.
+    /// Sends `probe` to the unit that is asked.
     fn probe<const U: usize, const P: usize>(
         &mut self,
         now: Instant,
         known: &mut Known<U, P>,
         ask: Ask<'r>,
-        unit: UnitAddress,
         probe: Probe,
     ) {
-        debug_assert_eq!(unit_of(&ask), Some(unit));
         let request = match probe {
             Probe::Echo => Request::echo(self.words.next()),
             Probe::OtherRead { address, count } => match Request::read(address, count) {

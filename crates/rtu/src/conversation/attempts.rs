@@ -27,7 +27,10 @@ impl Conversation<'_> {
             }
             if self.question.urgency != Urgency::Stop {
                 match known.units.verdict(unit, now) {
-                    Verdict::AskOnce => self.retries = 0,
+                    Verdict::AskOnce => {
+                        self.retries = 0;
+                        self.course = Course::new(self.question.timeout, 0);
+                    }
                     Verdict::Wait(until) if known.is_open() => {
                         let patience = patience.unwrap_or(now + self.patience());
                         if now < patience {
@@ -48,16 +51,22 @@ impl Conversation<'_> {
     }
 
     /// The first attempt.
-    pub(super) fn begin(&mut self) {
-        self.course = Course::new(self.question.timeout, self.retries);
+    fn begin(&mut self) {
         if !matches!(self.question.request, Request::Read { .. }) {
             self.write = Write::of(&self.question, self.retries);
             self.course.go_on_with(self.question.timeout, 0);
         }
+        self.state = State::Passing;
+    }
+
+    /// The same call goes on with something else, asked so often more than once.
+    pub(super) fn go_on_with(&mut self, retries: u32) {
+        self.course.go_on_with(self.question.timeout, retries);
+        self.port_failed = None;
         self.begin_attempt();
     }
 
-    pub(super) fn begin_attempt(&mut self) {
+    fn begin_attempt(&mut self) {
         self.attempt = Attempt::new(self.question.verify, self.course.asked());
         self.state = State::Passing;
     }
@@ -71,7 +80,7 @@ impl Conversation<'_> {
     ) {
         let Err(slip) = result else { return self.settle(now, known, result) };
         let is_port = slip.why.is_of_the_port();
-        let to_ask_again = self.unit().is_some() && slip.why.asks_again(&self.question.meanings);
+        let to_ask_again = self.asks_again(slip.why);
         if !self.course.goes_on(&slip, self.attempt.asked_before, to_ask_again) || !self.is_wanted {
             let why = match slip.why {
                 // It came when it was asked for the last of so many times.
@@ -92,7 +101,7 @@ impl Conversation<'_> {
     }
 
     /// What was asked came to this: the end, where nothing was written that is read back.
-    pub(super) fn settle<const U: usize, const P: usize>(
+    fn settle<const U: usize, const P: usize>(
         &mut self,
         now: Instant,
         known: &mut Known<U, P>,

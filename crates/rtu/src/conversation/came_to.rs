@@ -2,7 +2,7 @@
 
 use super::course::{Form, Hearing};
 use super::echo::LOOKS;
-use super::exchange::{Flight, Purpose, unit_of};
+use super::exchange::{Flight, Purpose};
 use super::first_contact::Put;
 use super::known::{Ask, Known};
 use super::outcome::{Slip, Times, Unanswered};
@@ -69,12 +69,8 @@ impl<'r> Conversation<'r> {
         flight: &Flight<'r>,
         result: &Result<Times, Slip>,
     ) {
-        let unit = unit_of(&flight.ask).filter(|_| matches!(flight.ask.request, Request::Read { .. }));
+        let unit = flight.ask.destination.unit().filter(|_| matches!(flight.ask.request, Request::Read { .. }));
         self.course.leaves_open(form, result.err().map(|slip| slip.why), unit.map(|unit| known.asked(unit)));
-    }
-
-    fn asks_again(&self, why: Unanswered) -> bool {
-        self.unit().is_some() && why.asks_again(&self.question.meanings)
     }
 
     /// A request that did not wait until it was known whether the adapter echoes came to `result`: if it does, it may have been
@@ -89,7 +85,7 @@ impl<'r> Conversation<'r> {
         match result {
             Ok(times)
                 if known.echo == OwnEcho::Unknown
-                    && unit_of(&ask).is_some()
+                    && ask.destination.unit().is_some()
                     && ask.request.expected().may_repeat_request() =>
             {
                 match known.look(now, &ask, false) {
@@ -109,7 +105,7 @@ impl<'r> Conversation<'r> {
     /// If it has not, the request went out, and it is not known whether the unit took it.
     fn looked_after<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>, times: Times) {
         let ask = self.ask();
-        let (OwnEcho::Unknown | OwnEcho::Present, Some(unit)) = (known.echo, unit_of(&ask)) else {
+        let (OwnEcho::Unknown | OwnEcho::Present, Some(unit)) = (known.echo, ask.destination.unit()) else {
             return self.end_attempt(now, known, Ok(times));
         };
         known.master.still_owed(times.ended, unit, &ask.request, ask.timeout);
@@ -189,7 +185,7 @@ impl<'r> Conversation<'r> {
         count: u16,
         times: Times,
     ) {
-        let (Some(unit), Request::Read { table, address, .. }) = (unit_of(&ask), ask.request) else {
+        let (Some(unit), Request::Read { table, address, .. }) = (ask.destination.unit(), ask.request) else {
             return self.apart_came_to(now, known, &ask, count, Ok(times));
         };
         let other = known.other_length(now, unit, &ask.request);
@@ -221,7 +217,7 @@ impl<'r> Conversation<'r> {
             Err(slip) if !slip.why.is_refused() => return self.apart_ended(now, known, proof, Err(slip)),
             Err(_) => {
                 if let (Request::Read { table, address, count: words, .. }, Some(unit)) =
-                    (proof.request, unit_of(proof))
+                    (proof.request, proof.destination.unit())
                 {
                     let refused = if words > count { words } else { u16::MAX };
                     known.longer.refused(unit, (table, address), refused);
@@ -241,11 +237,11 @@ impl<'r> Conversation<'r> {
         count: u16,
         times: Times,
     ) {
-        let is_ours = unit_of(&ask).is_none_or(|unit| known.proves(now, unit, &ask.request));
+        let is_ours = ask.destination.unit().is_none_or(|unit| known.proves(now, unit, &ask.request));
         let result = if is_ours {
             Ok(times)
         } else {
-            match (unit_of(&ask), self.answer.whole()) {
+            match (ask.destination.unit(), self.answer.whole()) {
                 (Some(unit), Some(answer)) => self.came.set(Adu::answer(unit, &answer).as_bytes()),
                 _ => self.came.clear(),
             }
@@ -263,7 +259,8 @@ impl<'r> Conversation<'r> {
         count: u16,
         result: Result<Times, Slip>,
     ) {
-        if let (Request::Read { table, address, count: asked, .. }, Some(unit)) = (self.ask().request, unit_of(ask))
+        if let (Request::Read { table, address, count: asked, .. }, Some(unit)) =
+            (self.ask().request, ask.destination.unit())
             && count > asked
         {
             let place = (table, address);
@@ -315,7 +312,8 @@ impl<'r> Conversation<'r> {
         (put, is_behind_all): (Put, bool),
         result: Result<Times, Slip>,
     ) {
-        let (Request::Read { table, address, count, .. }, Some(unit)) = (self.ask().request, unit_of(ask)) else {
+        let (Request::Read { table, address, count, .. }, Some(unit)) = (self.ask().request, ask.destination.unit())
+        else {
             return self.end_attempt(now, known, result);
         };
         let refused = result.is_err_and(|slip| slip.why.is_refusal() && !self.asks_again(slip.why));
@@ -359,6 +357,7 @@ impl<'r> Conversation<'r> {
         again: bool,
         result: Result<Times, Slip>,
     ) {
+        let is_put_off = result.is_err_and(|slip| self.asks_again(slip.why));
         let (Some(unit), Some(hearing)) = (self.unit(), self.course.hearing.as_mut()) else {
             return self.end_attempt(now, known, result);
         };
@@ -385,9 +384,7 @@ impl<'r> Conversation<'r> {
                     self.course.leaves_open(Form::Repeated, Some(slip.why), known_by);
                     return self.end_attempt(now, known, result);
                 };
-                if slip.why.asks_again(&self.question.meanings)
-                    || agreement.hear(unit, &Answer::exception(function, code))
-                {
+                if is_put_off || agreement.hear(unit, &Answer::exception(function, code)) {
                     return self.end_attempt(now, known, result);
                 }
                 if !is_last {

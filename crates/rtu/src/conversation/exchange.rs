@@ -7,9 +7,7 @@ use super::known::{Ask, Known};
 use super::outcome::{Exchange, Slip, Times, Unanswered};
 use super::probes::Probe;
 use super::{Conversation, Polled, State};
-use crate::{
-    Adu, Answer, AnswerError, Destination, Event, ExceptionCode, Instant, Master, Meaning, Request, Tally, UnitAddress,
-};
+use crate::{Adu, Answer, AnswerError, Event, ExceptionCode, Instant, Master, Meaning, Request, Tally};
 
 /// What a request is for.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +91,7 @@ impl<'r> Conversation<'r> {
         ask: Ask<'r>,
         purpose: Purpose<'r>,
     ) {
-        let unit = unit_of(&ask);
+        let unit = ask.destination.unit();
         let is_met = ask.in_doubt && unit.is_some_and(|unit| known.master.first_contact_ends(now, unit).is_some());
         if let (true, Some(unit)) = (is_met, unit) {
             known.units.of(unit).met.asked(&ask.request);
@@ -148,7 +146,7 @@ impl<'r> Conversation<'r> {
         if !flight.listened {
             return Polled::Listen(known.master.deadline().unwrap_or(now));
         }
-        let (unit, expected) = (unit_of(&flight.ask), flight.ask.request.expected());
+        let (unit, expected) = (flight.ask.destination.unit(), flight.ask.request.expected());
         let (timeout, sent) = (flight.timeout, flight.sent);
         let why = match known.master.poll(now) {
             Some(Event::Transmit(_)) => {
@@ -239,7 +237,7 @@ impl<'r> Conversation<'r> {
         flight: &Flight<'r>,
         result: &Result<Times, Slip>,
     ) {
-        let (ask, unit) = (&flight.ask, unit_of(&flight.ask));
+        let (ask, unit) = (&flight.ask, flight.ask.destination.unit());
         let (failure, ended, sent) = match result {
             Ok(times) => (None, times.ended, true),
             Err(slip) => (Some(slip.why), slip.ended, slip.sent.is_some()),
@@ -263,13 +261,5 @@ impl<'r> Conversation<'r> {
             Some(None) => {}
         }
         record.asked = record.asked.wrapping_add(u32::from(sent));
-    }
-}
-
-/// Who is asked, if it is one unit.
-pub(super) fn unit_of(ask: &Ask<'_>) -> Option<UnitAddress> {
-    match ask.destination {
-        Destination::Unit(unit) => Some(unit),
-        Destination::Broadcast => None,
     }
 }

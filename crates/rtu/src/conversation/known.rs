@@ -32,7 +32,7 @@ pub(super) enum Next {
     /// See whether the adapter echoes.
     LookForEcho,
     /// Make sure that the unit owes nothing else.
-    Probe(UnitAddress, Probe),
+    Probe(Probe),
     /// Let this moment come; others may use the line.
     Wait(Instant),
     /// The same: until then an open answer could be taken for its own.
@@ -279,7 +279,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         if in_doubt {
             let probing = &mut self.units.of(unit).probing;
             if let Some(probe) = probing.probe(&self.master, now, unit, &ask.request, tried, in_time) {
-                return Next::Probe(unit, probe);
+                return Next::Probe(probe);
             }
             return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
         }

@@ -113,11 +113,7 @@ impl<'r> Conversation<'r> {
             }
             Err(slip) => slip,
         };
-        let came = match self.came_of(&slip) {
-            None if is_unproven && slip.why.is_refused() => Some(Came::Refused),
-            came => came,
-        };
-        let (Some(came), Some(sent)) = (came, slip.sent) else {
+        let (Some(came), Some(sent)) = (self.came_of(&slip, is_unproven), slip.sent) else {
             // It may not have gone out this time, but it has before.
             return self.finish(known, Err(Slip { sent: slip.sent.or(write.before), ..slip }));
         };
@@ -126,14 +122,7 @@ impl<'r> Conversation<'r> {
         self.connection = Some(known.connection());
         write.looking = Some(Looking { slip, raw: self.came, came, is_unproven, look: 1 });
         self.write = Some(write);
-        self.look();
-    }
-
-    /// Reads what the unit shows.
-    fn look(&mut self) {
-        self.course.go_on_with(self.question.timeout, self.retries);
-        self.port_failed = None;
-        self.begin_attempt();
+        self.go_on_with(self.retries);
     }
 
     /// What the unit shows was read, or not.
@@ -167,7 +156,7 @@ impl<'r> Conversation<'r> {
             looking.look += 1;
             write.looking = Some(looking);
             self.write = Some(write);
-            self.look();
+            self.go_on_with(self.retries);
             self.state = State::Pausing(times.ended + self.patience() / LOOKS);
             return;
         }
@@ -180,9 +169,7 @@ impl<'r> Conversation<'r> {
             Came::Nothing { cost } if cost <= write.left => {
                 write.left -= cost;
                 self.write = Some(write);
-                self.course.go_on_with(self.question.timeout, 0);
-                self.port_failed = None;
-                return self.begin_attempt();
+                return self.go_on_with(0);
             }
             // Which of them was refused, nobody can tell; what the unit shows is sure.
             Came::Refused => {
@@ -213,13 +200,14 @@ impl<'r> Conversation<'r> {
         }
     }
 
-    /// What `slip` tells of the write; `None` where it was not taken, or did not go out, and that is that.
-    fn came_of(&self, slip: &Slip) -> Option<Came> {
+    /// What `slip` tells of the write, `is_unproven` where it may be meant for an earlier one; `None` where it was not taken, or
+    /// did not go out, and that is that.
+    fn came_of(&self, slip: &Slip, is_unproven: bool) -> Option<Came> {
         match (slip.why, self.question.request) {
             (Unanswered::Refused { code, .. }, _) => match slip.why.means(&self.question.meanings)? {
                 Meaning::AskAgain => Some(Came::Nothing { cost: 1 }),
                 Meaning::Taken => Some(Came::Acknowledged(code)),
-                Meaning::NoSuch | Meaning::NotNow => None,
+                Meaning::NoSuch | Meaning::NotNow => is_unproven.then_some(Came::Refused),
             },
             // A late confirmation of an earlier write is known as that: it never gets here while that one is open.
             (
