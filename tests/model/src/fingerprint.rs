@@ -19,14 +19,18 @@ pub fn offset(now: Instant, at: Instant) -> i64 {
 }
 
 /// Takes in a text in which each `Instant(…)` is told as its offset from `now`.
-struct Relative {
+struct Relative<'a> {
     now: Instant,
+    /// Fields of which it makes no difference when it was.
+    timeless: &'a [&'a str],
     number: u64,
     /// How many pieces of `Instant(` were written last.
     pieces: u8,
+    /// Whether the field is one of these.
+    is_timeless: bool,
 }
 
-impl Relative {
+impl Relative<'_> {
     /// Takes in eight bytes more: multiplied out to twice the width, so that each bit reaches all others.
     fn take(&mut self, word: u64) {
         let product = u128::from(self.number ^ word) * 0x9E37_79B9_7F4A_7C15;
@@ -36,21 +40,25 @@ impl Relative {
     }
 }
 
-impl Write for Relative {
+impl Write for Relative<'_> {
     fn write_str(&mut self, piece: &str) -> fmt::Result {
-        let nanos = (self.pieces == 2).then(|| piece.parse::<u64>().ok()).flatten();
-        self.pieces = match (self.pieces, piece) {
-            (_, "Instant") => 1,
-            (1, "(") => 2,
-            _ => 0,
+        // Names and numbers tell all; what stands between them follows from them.
+        let Some(first) = piece.bytes().next().filter(u8::is_ascii_alphanumeric) else {
+            self.pieces = if self.pieces == 1 && piece == "(" { 2 } else { 0 };
+            return Ok(());
         };
-        if let Some(nanos) = nanos {
-            self.take(offset(self.now, Instant::from_nanos(nanos)).cast_unsigned());
+        if self.pieces == 2
+            && let Ok(nanos) = piece.parse()
+        {
+            let offset = if self.is_timeless { 0 } else { offset(self.now, Instant::from_nanos(nanos)) };
+            self.take(offset.cast_unsigned());
+            self.pieces = 0;
             return Ok(());
         }
-        // Names and numbers tell all; what stands between them follows from them.
-        if !piece.starts_with(|first: char| first.is_ascii_alphanumeric()) {
-            return Ok(());
+        self.pieces = u8::from(piece == "Instant");
+        // The name of a field is small.
+        if first.is_ascii_lowercase() {
+            self.is_timeless = self.timeless.contains(&piece);
         }
         let (words, rest) = piece.as_bytes().as_chunks::<8>();
         for word in words {
@@ -64,9 +72,9 @@ impl Write for Relative {
     }
 }
 
-/// A number for all that `thing` shows at `now`.
-pub fn of(now: Instant, thing: &dyn Debug) -> u64 {
-    let mut relative = Relative { now, number: 0, pieces: 0 };
+/// A number for all that `thing` shows at `now`, but when it was what the fields hold that are `timeless`.
+pub fn of(now: Instant, thing: &dyn Debug, timeless: &[&str]) -> u64 {
+    let mut relative = Relative { now, timeless, number: 0, pieces: 0, is_timeless: false };
     // Nothing here fails.
     let _ = write!(relative, "{thing:?}");
     relative.number
@@ -94,14 +102,30 @@ mod tests {
     fn only_the_time_since_counts() {
         let (early, late) = (Instant::from_nanos(100_000_000_000), Instant::from_nanos(107_000_000_000));
         let second = Duration::from_secs(1);
-        assert_eq!(of(early + second, &master(early)), of(late + second, &master(late)));
-        assert_ne!(of(early + second, &master(early)), of(early + second + second, &master(early)));
+        assert_eq!(of(early + second, &master(early), &[]), of(late + second, &master(late), &[]));
+        assert_ne!(of(early + second, &master(early), &[]), of(early + second + second, &master(early), &[]));
     }
 
     #[test]
     fn what_is_long_past_counts_alike() {
         let start = Instant::from_nanos(100_000_000_000);
         let later = start + 20 * OVERTAKING;
-        assert_eq!(of(later, &master(start)), of(later + OVERTAKING, &master(start)));
+        assert_eq!(of(later, &master(start), &[]), of(later + OVERTAKING, &master(start), &[]));
+    }
+
+    #[derive(Debug)]
+    struct Fields {
+        busy: Option<Instant>,
+        until: Instant,
+    }
+
+    #[test]
+    fn when_it_was_counts_but_in_the_fields_that_are_named() {
+        let [now, sooner, later] = [9, 7, 8].map(|seconds| Instant::from_nanos(seconds * 1_000_000_000));
+        let number = |busy, until, timeless| of(now, &Fields { busy, until }, timeless);
+        assert_eq!(number(Some(sooner), later, &["busy"]), number(Some(later), later, &["busy"]));
+        assert_ne!(number(Some(sooner), later, &["busy"]), number(None, later, &["busy"]));
+        assert_ne!(number(Some(sooner), later, &["busy"]), number(Some(sooner), sooner, &["busy"]));
+        assert_ne!(number(Some(sooner), later, &["until"]), number(Some(later), later, &["until"]));
     }
 }

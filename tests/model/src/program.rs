@@ -103,10 +103,10 @@ impl Program {
         self.call.as_ref().is_some_and(|call| call.standing == Standing::Sending)
     }
 
-    pub(crate) fn hash_at<H: Hasher>(&self, now: Instant, hasher: &mut H) {
+    pub(crate) fn hash_at<H: Hasher>(&self, now: Instant, timeless: &[&str], hasher: &mut H) {
         let Some(call) = &self.call else { return };
         (call.unit, call.kind, call.truth, call.flight.map(|flight| (flight.place, flight.ends_doubt))).hash(hasher);
-        fingerprint::of(now, &(call.standing, &call.conversation)).hash(hasher);
+        fingerprint::of(now, &(call.standing, &call.conversation), timeless).hash(hasher);
     }
 }
 
