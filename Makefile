@@ -237,7 +237,7 @@ THREADS ?= 2
 
 model: $(VENV)/.created ## some minutes; see tests/model/README.md
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-model -- --deep --threads $(THREADS)
-	$(BIN)/python tools/check_model.py
+	$(BIN)/python tools/check_model.py --threads $(THREADS)
 
 packages: $(VENV)/.dev ## what a package leaves out shows here
 	$(BIN)/python tools/check_packages.py
