@@ -301,14 +301,16 @@ BREAKS = [
         DOUBT,
         "self.enter(now, unit, expected, window, since);",
         "self.enter(now, unit, expected, window, now.max(since));",
-        "damaged-again --requests 4 --refusals 1",
+        # A read given up is displaced by the refusal of a longer one, and this by that of the first: nine seconds pass.
+        "overtaking-one --requests 5 --refusals 1 --quits 2 --retries 0",
     ),
     Break(
         "a refusal may have been another's",
         DOUBT,
         "self.enter(now, unit, expected, window, since);\n        }\n    }",
         "let _ = (window, since);\n        }\n    }",
-        "overtaking --requests 5 --faults 0 --refusals 1",
+        # A refusal is taken for another read's, whose answer for the next's, and so on: until nobody asks twice.
+        "overtaking --requests 5 --refusals 1 --retries 0",
     ),
     Break(
         "one answer more than could be mistaken",

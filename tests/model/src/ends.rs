@@ -12,13 +12,14 @@ const FRESH: u16 = 0xFFFE;
 
 /// What outlasts its time about a unit; `None` where all is well.
 pub fn overdue(state: &State) -> Option<&'static str> {
-    if state.program.is_sending() || state.program.in_flight().is_some() {
+    if state.program.in_flight().is_some() {
         return None;
     }
+    let is_idle = !state.program.is_sending();
     (0..state.units.len()).find_map(|unit| {
         if outlasts_its_time(state, unit) {
             Some("the stated time is over, and the unit still is in doubt")
-        } else if outlasts_an_echo(state, unit) {
+        } else if is_idle && outlasts_an_echo(state, unit) {
             Some("the unit has returned an echo, and still is in doubt")
         } else {
             None

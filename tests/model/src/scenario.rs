@@ -46,8 +46,10 @@ pub struct Budget {
     pub faults: u8,
     /// Requests that a unit refuses.
     pub refusals: u8,
-    /// Requests given up before their time.
+    /// Calls given up at any time: what is on the wire then, before its time.
     pub aborts: u8,
+    /// Calls given up between two of their requests.
+    pub quits: u8,
     /// Times that the port is opened again.
     pub openings: u8,
     /// Times that a unit forgets what it was asked.
@@ -68,6 +70,7 @@ impl Budget {
             "faults" => &mut self.faults,
             "refusals" => &mut self.refusals,
             "aborts" => &mut self.aborts,
+            "quits" => &mut self.quits,
             "openings" => &mut self.openings,
             "restarts" => &mut self.restarts,
             "changes" => &mut self.changes,
@@ -84,6 +87,7 @@ impl Budget {
             faults: 0,
             refusals: 0,
             aborts: 0,
+            quits: 0,
             openings: 0,
             restarts: 0,
             changes: 0,

@@ -58,6 +58,8 @@ pub enum Action {
     Linger,
     /// The program gives up what it asked.
     Abort,
+    /// The same, between two requests.
+    Quit,
     /// Nothing is sent until this moment.
     Wait(Instant),
     /// The port is opened again, after another program asked for these answers.
@@ -229,8 +231,9 @@ impl Search {
                 state.wait(&self.scenario, state.now + TICK);
                 state.take_in(step, &[], Source::Nowhere);
             }
-            Action::Abort => {
-                state.left.aborts -= 1;
+            Action::Abort | Action::Quit => {
+                let left = if action == Action::Quit { &mut state.left.quits } else { &mut state.left.aborts };
+                *left -= 1;
                 let State { program, known, now, .. } = &mut *state;
                 program.call.as_mut()?.conversation.cut_short(*now, known, Cut::GivenUp);
                 state.go_on(step, Source::Nowhere);
@@ -315,10 +318,12 @@ impl Model for Search {
             actions.push(Action::Change);
         }
         let may_abort = state.left.aborts > 0;
+        let may_quit = state.left.quits > 0 && call.is_some_and(|call| call.first <= state.requests);
         match call.map(|call| call.standing) {
             Some(Standing::Sending) => {
                 self.sends(state, actions);
                 actions.extend(may_abort.then_some(Action::Abort));
+                actions.extend(may_quit.then_some(Action::Quit));
             }
             Some(Standing::Listening(due)) => {
                 actions.push(Action::TimeOut);
@@ -331,6 +336,7 @@ impl Model for Search {
                 let end = state.next_end(&self.scenario).map_or(until, |end| end.min(until));
                 actions.push(Action::Wait(end));
                 actions.extend(may_abort.then_some(Action::Abort));
+                actions.extend(may_quit.then_some(Action::Quit));
             }
             None if state.left.requests > 0 => {
                 for unit in 0..state.units.len() {

@@ -72,7 +72,7 @@ fn line(before: &State, action: Action, after: &State) -> String {
         }
         Action::TimeOut => format!("  request {} times out{outcome}", before.requests),
         Action::Linger => "  half of the time-out is over".to_owned(),
-        Action::Abort => format!("  the call is cut short{outcome}"),
+        Action::Abort | Action::Quit => format!("  the call is cut short{outcome}"),
         Action::Wait(_) => format!("nothing is sent until now{outcome}"),
         Action::Open(strangers) => format!("the port is opened again{}", also_asked(strangers)),
         Action::Restart(unit) => format!("unit {} restarts and forgets what it was asked", unit + 1),
