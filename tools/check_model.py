@@ -1,10 +1,10 @@
 """Breaks each rule of the protocol core once in a copy, and expects the model's search to refute it.
 
 `check_model.py` builds each broken copy of `crates/rtu` under the target folder, searches the line on which the rule
-matters, and prints the shortest run that shows what the rule is for. A rule that can be broken unnoticed is a finding:
-the exit code is 1 then, or where the text that a break replaces is no longer there. Where something is replaced beside
-the rule, that everything holds with this alone is searched too; so it is where a rule only holds back what is assumed.
-`check_model.py NAME …` takes those whose names hold one of these words.
+matters, and prints the shortest run that shows what the rule is for, or what is never seen without it. A rule that can
+be broken unnoticed is a finding: the exit code is 1 then, or where the text that a break replaces is no longer there.
+Where something is replaced beside the rule, that everything holds with this alone is searched too; so it is where a
+rule only holds back what is assumed. `check_model.py NAME …` takes those whose names hold one of these words.
 """
 
 from __future__ import annotations
@@ -65,12 +65,20 @@ class Result:
 
     broken: Break
     verdict: str
-    found: str | None
+    shown: str
     seconds: float
 
     def __str__(self) -> str:
         what = f'{self.verdict}: not "{self.broken.name}" ({self.broken.search}), {self.seconds:.0f} s'
-        return f"\n{what}\n{self.found}" if self.found else f"\n{what}"
+        return f"\n{what}\n{self.shown}" if self.shown else f"\n{what}"
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found: the run that refutes something, if one does, and else what was not seen."""
+
+    run: str
+    unseen: frozenset[str]
 
 
 # A damaged answer is believed to be all, from the first on.
@@ -599,8 +607,8 @@ class Searches:
         shutil.rmtree(self.programs, ignore_errors=True)
         self.programs.mkdir()
 
-    def run(self, changes: list[Change], bounds: str) -> str | None:
-        """Searches within *bounds* where *changes* are made: the run that refutes something, None where all holds."""
+    def run(self, changes: list[Change], bounds: str) -> Found:
+        """Searches within *bounds* where *changes* are made."""
         with self.building, changed(self.place, changes):
             program = self.programs / f"{next(self.number)}"
             shutil.copy(build(self.place), program)
@@ -609,19 +617,23 @@ class Searches:
         program.unlink()
         if done.returncode not in (0, 1):
             raise SystemExit(f"check_model: {' '.join(search)} failed:\n{done.stderr}")
-        # What was not seen within the bounds refutes nothing.
-        shown = [line for line in done.stdout.splitlines() if not line.startswith(("line ", "all ", "not seen"))]
-        return "\n".join(shown[1:]) or None
+        shown = [line for line in done.stdout.splitlines() if not line.startswith(("line ", "all "))][1:]
+        if shown and (unseen := re.fullmatch(r"not seen: \[(.*)\]", shown[0])):
+            return Found("", frozenset(unseen[1].split(", ")))
+        return Found("\n".join(shown), frozenset())
 
     def check(self, broken: Break) -> Result:
-        """Breaks one rule, and first only what is replaced beside it."""
+        """Breaks one rule; where something is replaced beside it, only this before."""
         began = time.monotonic()
         beside = [broken.beside] if broken.beside else []
-        if beside and (found := self.run(beside, broken.search)):
-            return Result(broken, "NOT ALONE", found, time.monotonic() - began)
+        if beside and (alone := self.run(beside, broken.search)).run:
+            return Result(broken, "NOT ALONE", alone.run, time.monotonic() - began)
         found = self.run([(broken.file, broken.old, broken.new), *beside], broken.search)
-        verdict = ("REFUTED" if broken.holds else "refuted") if found else ("holds" if broken.holds else "UNNOTICED")
-        return Result(broken, verdict, found, time.monotonic() - began)
+        shown = found.run
+        if found.unseen and (missed := found.unseen - self.run(beside, broken.search).unseen):
+            shown = f"never seen, as it is otherwise: {', '.join(sorted(missed))}"
+        verdict = ("REFUTED" if broken.holds else "refuted") if shown else ("holds" if broken.holds else "UNNOTICED")
+        return Result(broken, verdict, shown, time.monotonic() - began)
 
 
 def main() -> int:
