@@ -1,6 +1,6 @@
 #!/bin/sh
-# Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, and
-# valgrind, which counts instructions, into .tools/ without touching the system.
+# Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, valgrind,
+# which counts instructions, and strace, which writes down system calls, into .tools/ without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -17,16 +17,20 @@ have_valgrind() {
     [ "$(uname -sm)" != "Linux x86_64" ] || command -v valgrind >/dev/null 2>&1 ||
         [ -x "$tools/usr/libexec/valgrind/callgrind-amd64-linux" ]
 }
+# Linux's alone.
+have_strace() {
+    [ "$(uname -s)" != Linux ] || command -v strace >/dev/null 2>&1 || [ -x "$tools/usr/bin/strace" ]
+}
 have_tshark() { command -v tshark >/dev/null 2>&1 || [ -x "$tools/usr/bin/tshark" ]; }
 # LinuxCNC is for Linux alone.
 have_hal() {
     [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/halrun" ]
 }
-have_all() { have_program && have_library && have_valgrind && have_tshark && have_hal; }
+have_all() { have_program && have_library && have_valgrind && have_strace && have_tshark && have_hal; }
 lacking() {
-    echo "of mbpoll, libmodbus, tshark, valgrind and LinuxCNC some are missing ($1); the checks that need them will be" >&2
+    echo "of mbpoll, libmodbus, tshark, valgrind, strace and LinuxCNC some are missing ($1); the checks that need them will be" >&2
     echo "skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind linuxcnc-uspace" >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace linuxcnc-uspace" >&2
     echo "    macOS:           brew install libmodbus wireshark, and mbpoll from its source" >&2
     exit 0
 }
@@ -35,6 +39,7 @@ have_all && exit 0
 packages=
 have_program && have_library || packages="mbpoll libmodbus5"
 have_valgrind || packages="$packages valgrind"
+have_strace || packages="$packages strace libunwind8"
 wants_tshark=
 have_tshark || wants_tshark=yes
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"
