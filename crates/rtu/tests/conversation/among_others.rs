@@ -2,7 +2,7 @@
 
 use drivebus_rtu::*;
 
-use crate::rig::Does::{And, AndBefore, Nothing, Refuses, Right};
+use crate::rig::Does::{And, AndBefore, Nothing, Refuses, Right, Says};
 use crate::rig::*;
 
 fn others() -> Opened {
@@ -154,10 +154,172 @@ fn a_length_that_was_proven_beside_others_is_asked_for_without_another_proof() {
         "the question and its proof"
     );
     let length = told.sent[0][5];
+    for _ in 0..10 {
+        rig.now = rig.now + ms(200);
+        let told = rig.run(ask(9, 1));
+        assert_eq!((told.end, told.sent.len()), (End::Words(vec![9]), 1));
+        assert_eq!(told.sent[0][5], length);
+    }
+    // Who was gone may ask for other lengths when it is back.
+    rig.now = rig.now + 2 * OTHERS;
+    for count in [1, 2] {
+        assert_eq!(rig.run(ask(9, 1)).sent, [read(9, count)]);
+    }
+    theirs(&mut rig, &words(&[0x77]));
+    assert_eq!(rig.run(ask(9, 1)).sent.len(), 2);
+}
+
+#[test]
+fn two_proven_lengths_are_both_remembered() {
+    let mut rig = rig();
+    assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]));
+    theirs(&mut rig, &words(&[0x77]));
+    for requests in [2, 1, 1] {
+        // No other length than these 20 is put in the place of what asks for them.
+        for count in [1, 20] {
+            let told = rig.run(ask(9, count));
+            assert_eq!(told.sent.len(), requests, "{:02X?}", told.sent);
+            rig.now = rig.now + ms(200);
+        }
+    }
+}
+
+#[test]
+fn alone_a_read_that_follows_closely_takes_no_request_more() {
+    let mut rig = rig();
+    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1), read(9, 2)]);
+    for round in 0..10 {
+        let told = rig.run(ask(9, 1));
+        assert_eq!(told.end, End::Words(vec![9]));
+        assert_eq!(told.sent, [read(9, 1 + round % 2)], "the shortest that the one before had not");
+    }
+}
+
+#[test]
+fn what_is_verified_is_not_asked_for_in_a_length_of_another_master_either() {
+    let mut rig = rig();
+    assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]));
+    theirs(&mut rig, &words(&[0x77]));
+    let told = rig.run(ask(9, 1).verify(true));
+    assert_eq!(told.end, End::Words(vec![9]));
+    assert!(told.sent.iter().all(|frame| frame[5] != 1), "{:02X?}", told.sent);
+}
+
+#[test]
+fn of_coils_whose_answers_are_as_long_the_fewest_are_asked_for() {
+    let mut rig = rig();
+    let coil = Request::read_of(Table::Coil, 9, 1).unwrap();
+    rig.run(Question::new(UNIT.into(), coil, TIMEOUT));
+    // Up to 8 come in one byte, and that is what another master has.
+    theirs(&mut rig, &sealed(&[UNIT.get(), 1, 1, 0]));
+    for _ in 0..10 {
+        rig.now = rig.now + ms(200);
+        let told = rig.run(Question::new(UNIT.into(), coil, TIMEOUT));
+        assert_eq!(told.sent, [request(1, 9, 9)]);
+    }
+}
+
+/// The length that a line with this chance asks for first where another master asks for one word.
+fn first_by_chance(chance: u64) -> u8 {
+    let mut rig = rig();
+    rig.known = Line::new(SerialFormat::DEFAULT, OwnEcho::Absent, chance);
+    rig.known.opened(Instant::ZERO, &others());
+    rig.run(ask(9, 1));
+    theirs(&mut rig, &words(&[0x77]));
+    rig.run(ask(9, 1)).sent[0][5]
+}
+
+/// A chance, and the upper byte of what becomes of it; reckoned in Python. Odd, as every chance is made.
+const CHANCES: [(u64, u8); 16] = [
+    (0x9E3779B97F4A7C15, 220),
+    (0x3C6EF372FE94F82B, 184),
+    (0xDAA66D2C7DDF743F, 221),
+    (0x78DDE6E5FD29F055, 114),
+    (0x1715609F7C746C69, 190),
+    (0xB54CDA58FBBEE87F, 187),
+    (0x538454127B096493, 246),
+    (0xF1BBCDCBFA53E0A9, 230),
+    (0x8FF34785799E5CBD, 56),
+    (0x2E2AC13EF8E8D8D3, 126),
+    (0xCC623AF8783354E7, 21),
+    (0x6A99B4B1F77DD0FD, 118),
+    (0x08D12E6B76C84D11, 221),
+    (0xA708A824F612C927, 238),
+    (0x454021DE755D453B, 112),
+    (0xE3779B97F4A7C151, 207),
+];
+
+#[test]
+fn masters_that_do_the_same_do_not_do_it_in_step() {
+    // Xorshift with shifts by 13, 7 and 17, as G. Marsaglia has it, once: the upper byte, and what that leaves by eight.
+    let chosen = CHANCES.map(|(chance, byte)| (first_by_chance(chance), 2 + byte % 8));
+    for (chosen, expected) in chosen {
+        assert_eq!(chosen, expected);
+    }
+    let all: std::collections::BTreeSet<_> = chosen.map(|(chosen, _)| chosen).into();
+    assert!(all.len() > 4, "{all:?}");
+}
+
+#[test]
+fn a_unit_that_refused_a_read_is_met() {
+    let mut rig = rig().does([Refuses(2)]);
+    assert_eq!(rig.run(ask(9, 1)).sent.len(), 1);
     rig.now = rig.now + ms(200);
+    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1)]);
+}
+
+#[test]
+fn a_unit_that_was_silent_is_not_met() {
+    let mut rig = rig().does([Nothing]);
+    assert_eq!(rig.run(ask(9, 1)).end, silence(1));
+    rig.now = rig.now + ms(500);
     let told = rig.run(ask(9, 1));
-    assert_eq!((told.end, told.sent.len()), (End::Words(vec![9]), 1));
-    assert_eq!(told.sent[0][5], length);
+    assert_eq!((told.end, told.sent.len()), (End::Words(vec![9]), 2), "the question and its proof");
+}
+
+#[test]
+fn the_words_of_the_proof_are_not_the_answer() {
+    let mut rig = rig().does([Says(words(&[5])), Says(words(&[6, 7]))]);
+    assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![5]));
+}
+
+#[test]
+fn more_words_that_were_refused_are_not_asked_for_again_where_reads_follow_closely() {
+    let mut rig = rig();
+    rig.most = 1;
+    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1), read(9, 2)]);
+    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1)]);
+}
+
+#[test]
+fn fewer_words_that_were_refused_say_nothing_of_more() {
+    let mut rig = rig().does([Right, Refuses(3)]);
+    let told = rig.run(ask(9, 2));
+    assert_eq!((told.end, told.sent), (End::Words(vec![9, 10]), vec![read(9, 2), read(9, 1)]));
+    for count in [2, 3] {
+        let told = rig.run(ask(9, 2));
+        assert_eq!((told.end, told.sent), (End::Words(vec![9, 10]), vec![read(9, count)]));
+    }
+}
+
+#[test]
+fn silence_on_as_many_words_as_were_asked_for_is_no_refusal_of_them() {
+    let mut rig = rig().does([Nothing, Nothing]);
+    assert_eq!(rig.run(ask(9, 1)).end, silence(1));
+    rig.now = rig.now + ms(500);
+    assert_eq!(rig.run(ask(9, 1)).end, silence(1));
+    rig.now = rig.now + ms(10_000);
+    let told = rig.run(ask(9, 1));
+    assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![read(9, 1), read(9, 2)]));
+}
+
+#[test]
+fn a_look_at_the_adapter_has_a_length_that_no_other_master_asks_for() {
+    let mut rig = Rig::opened(Opened::new().may_have_others(true), OwnEcho::Unknown);
+    rig.now = at(5_000);
+    theirs(&mut rig, &words(&[0x77]));
+    let told = rig.run(set(9, 1));
+    assert_eq!((told.end, told.sent), (End::Confirmed, vec![read(0, 2), write(9, 1)]));
 }
 
 #[test]

@@ -78,6 +78,7 @@ fn silence_is_told_as_anywhere() {
     rig.then = Nothing;
     let told = rig.run(stop(1));
     assert!(matches!(told.end, End::Failed(Unanswered::NoAnswer { .. })), "{told:?}");
+    assert_eq!(told.sent.len(), 1, "it ends the attempt");
 }
 
 #[test]
@@ -95,4 +96,79 @@ fn a_write_and_a_stop_in_doubt_are_put_as_they_are() {
     assert_eq!(told.sent, [write(9, 1)]);
     let told = rig.run(stop(1).in_doubt(true));
     assert_eq!(told.sent, [read(9, 1)]);
+}
+
+#[test]
+fn a_length_that_was_asked_for_in_doubt_tells_nothing() {
+    let mut rig = rig();
+    for count in [1, 2] {
+        assert_eq!(rig.run(stop(count).in_doubt(true)).sent, [read(9, count)]);
+    }
+    let told = rig.run(stop(1));
+    assert_eq!(told.end, End::Words(vec![9]));
+    assert_eq!(told.sent, [read(9, 3)], "two were answered before, and this one has a length of its own");
+}
+
+#[test]
+fn an_input_register_that_was_asked_for_in_doubt_tells_nothing() {
+    let input = Request::read_of(Table::Input, 9, 1).unwrap();
+    for refused in [false, true] {
+        let mut rig = rig();
+        rig.most = 1;
+        if refused {
+            rig.always.insert(4, Refuses(1));
+        }
+        rig.run(Question::new(UNIT.into(), input, TIMEOUT).urgency(Urgency::Stop).in_doubt(true));
+        let told = rig.run(stop(1));
+        assert!(told.sent.iter().all(|frame| frame[1] != 4), "{:02X?}", told.sent);
+    }
+}
+
+#[test]
+fn where_something_was_asked_whose_answer_may_have_any_shape_only_time_tells() {
+    let mut rig = rig();
+    let end = rig.now + FIRST_CONTACT;
+    let custom = Request::custom(&[0x41, 7], AnswerLength::Bytes(2)).unwrap();
+    rig.run(Question::new(UNIT.into(), custom, TIMEOUT).urgency(Urgency::Stop).in_doubt(true));
+    let told = rig.run(stop(1));
+    assert_eq!(told.end, End::Words(vec![9]));
+    assert!(rig.now >= end, "{told:?}");
+}
+
+#[test]
+fn where_too_few_questions_can_be_told_apart_nothing_is_believed() {
+    // No unit is asked for more words than these, and of two answers both may be another program's.
+    let told = rig().run(stop(16));
+    assert_eq!(told.end, End::Failed(Unanswered::Doubtful), "{:02X?}", told.sent);
+}
+
+#[test]
+fn silence_is_no_answer_of_another_program() {
+    let mut rig = rig();
+    for count in 1..=2 {
+        let told = rig.next([Nothing]).run(stop(1));
+        assert_eq!(told.sent, [read(9, count)]);
+    }
+    let told = rig.run(stop(1));
+    assert_eq!(told.end, End::Words(vec![9]));
+    assert_eq!(told.sent, [read(9, 3), read(9, 4), read(9, 5)], "two are still to come before the own one");
+}
+
+#[test]
+fn a_unit_that_was_silent_on_longer_reads_twice_is_not_asked_for_them_again() {
+    let mut rig = rig();
+    let told = rig.next([Right, Nothing]).run(stop(1));
+    assert_eq!(told.sent, [read(9, 1), read(9, 2)]);
+    let told = rig.next([Nothing]).run(stop(1));
+    assert_eq!(told.sent, [read(9, 3)]);
+    let told = rig.run(stop(1));
+    assert_eq!(told.end, End::Words(vec![9]));
+    assert_eq!(told.sent[0][1], 4, "an input register");
+}
+
+#[test]
+fn what_only_shows_whose_answer_it_is_is_never_the_answer() {
+    let mut rig = rig();
+    rig.next([Says(words(&[0x111])), Says(words(&[0x222, 0x222])), Says(words(&[5, 6, 7]))]);
+    assert_eq!(rig.run(stop(1)).end, End::Words(vec![5]));
 }

@@ -311,7 +311,10 @@ impl Rig {
             }
             1 | 2 => {
                 let on = self.registers.get(&word(2)).is_some_and(|on| *on != 0);
-                sealed(&[frame[0], frame[1], 1, u8::from(on)])
+                let bytes = word(4).div_ceil(8);
+                let mut body = vec![frame[0], frame[1], u8::try_from(bytes).unwrap(), u8::from(on)];
+                body.resize(3 + usize::from(bytes), 0);
+                sealed(&body)
             }
             5 | 6 => {
                 let value = if frame[1] == 5 { u16::from(word(4) == 0xFF00) } else { word(4) };
