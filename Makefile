@@ -36,7 +36,7 @@ help: ## what can be made
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
-	@echo "make schedules   each wake-up of the queue left out once, which the search of orders of threads must notice"
+	@echo "make schedules   each wake-up at a bus left out once, which the search of orders of threads must notice"
 	@echo "make matrix  every case of the tests of which make test runs a sample"
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"

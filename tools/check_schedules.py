@@ -1,4 +1,4 @@
-"""Leaves each wake-up of the queue out once, in a copy, and expects `tests/schedules` to notice.
+"""Leaves each wake-up of the queue and the bus out once, in a copy, and expects `tests/schedules` to notice.
 
 `make schedules` runs it. A search that finds nothing when somebody is not called searches nothing.
 """
@@ -17,6 +17,18 @@ ROOT = Path(__file__).resolve().parent.parent
 QUEUE = "crates/line/src/turns/queue.rs"
 WORK = "crates/line/src/turns/queue/work.rs"
 CREW = "crates/line/src/turns/crew.rs"
+CALL = "crates/line/src/bus/call.rs"
+ERRAND = "crates/line/src/bus/errand.rs"
+HOST = "crates/line/src/bus/host.rs"
+PORT = "crates/line/src/bus/port.rs"
+
+WATCHES = """\
+        let mut inside = self.guests.lock();
+        let mut voice = channel.voice();
+        // Asked under the lock that who opens the port takes after it has counted: no opening falls between.
+        let is_said = voice.say_in_passing(&Told::Reconnects(port.figures.reconnects())).ok()?;
+        inside.watching.insert(self.number, voice);
+"""
 
 # What is broken: the file, what stands there once, and what stands there instead.
 BREAKS: list[tuple[str, str, str, str]] = [
@@ -76,6 +88,31 @@ BREAKS: list[tuple[str, str, str, str]] = [
         "    pub(crate) fn has_come(&mut self) {",
     ),
     ("who is woken still counts as idle", CREW, "            self.idle -= 1;\n", ""),
+    (
+        "an errand ends, and nobody is told",
+        ERRAND,
+        "        if self.then.is_some() {\n            self.failed",
+        "        if false {\n            self.failed",
+    ),
+    (
+        "a bus is closed, and its crew stays",
+        PORT,
+        "        self.dismiss();\n        if self.queue",
+        "        if self.queue",
+    ),
+    (
+        "a call goes on behind the close",
+        CALL,
+        "        if self.bus.is_shut() {\n            owner.close();",
+        "        if false {\n            owner.close();",
+    ),
+    ("who is in is not ended", HOST, "let _ = stream.shutdown(Shutdown::Read);", "let _ = stream;"),
+    (
+        "an opening falls between",
+        HOST,
+        WATCHES,
+        WATCHES.replace("        let mut inside = self.guests.lock();\n", "").replace("inside.", "self.guests.lock()."),
+    ),
 ]
 
 

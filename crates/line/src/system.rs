@@ -9,4 +9,6 @@ pub(crate) mod inherited;
 mod listed;
 pub(crate) mod process;
 pub(crate) mod punctual;
+#[cfg(all(unix, feature = "share"))]
+pub(crate) mod sockets;
 pub(crate) mod sync;

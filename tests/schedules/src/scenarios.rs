@@ -4,6 +4,9 @@
 //! for ever, and shuttle says so. One at a time has the line (`Line`). What is left to be done is told of once: it was
 //! carried out, taken back, or given back (`Told`).
 
+mod bus;
+mod door;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -32,6 +35,20 @@ pub const ALL: &[(&str, fn())] = &[
     ("work_is_dismissed", work_is_dismissed),
     ("closing", closing),
     ("other_programs", other_programs),
+    ("errands_and_callers", bus::errands_and_callers),
+    ("an_errand_is_abandoned", bus::an_errand_is_abandoned),
+    ("an_urgent_errand_is_next", bus::an_urgent_errand_is_next),
+    ("a_bus_is_closed", bus::a_bus_is_closed),
+    ("a_bus_is_closed_by_who_waits", bus::a_bus_is_closed_by_who_waits),
+    ("a_bus_is_dropped", bus::a_bus_is_dropped),
+    ("programs_come_in", door::programs_come_in),
+    ("a_stop_of_another_program_is_next", door::a_stop_of_another_program_is_next),
+    ("a_program_goes", door::a_program_goes),
+    ("a_program_takes_back", door::a_program_takes_back),
+    ("the_system_refuses_for_a_while", door::the_system_refuses_for_a_while),
+    ("who_is_in_is_ended", door::who_is_in_is_ended),
+    ("a_bus_with_guests_is_closed", door::a_bus_with_guests_is_closed),
+    ("an_opening_is_told", door::an_opening_is_told),
 ];
 
 /// A line that notices when two have it.

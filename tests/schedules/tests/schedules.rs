@@ -2,8 +2,8 @@
 
 use drivebus_schedules::scenarios::ALL;
 
-/// Orders of each scenario, of each kind: with eleven scenarios two hundred and twenty thousand in all.
-const EACH: usize = 10_000;
+/// Orders of each scenario, of each kind: with 26 scenarios two hundred and sixty thousand in all.
+const EACH: usize = 5_000;
 
 /// As many as are asked for (`DRIVEBUS_SCHEDULES`), or else [`EACH`].
 fn each() -> usize {
@@ -44,4 +44,18 @@ explored! {
     work_is_dismissed,
     closing,
     other_programs,
+    errands_and_callers,
+    an_errand_is_abandoned,
+    an_urgent_errand_is_next,
+    a_bus_is_closed,
+    a_bus_is_closed_by_who_waits,
+    a_bus_is_dropped,
+    programs_come_in,
+    a_stop_of_another_program_is_next,
+    a_program_goes,
+    a_program_takes_back,
+    the_system_refuses_for_a_while,
+    who_is_in_is_ended,
+    a_bus_with_guests_is_closed,
+    an_opening_is_told,
 }

@@ -10,8 +10,6 @@
 //! What it takes to be sure is bounded too: a call sends eight requests at most for each time that it may ask, the questions,
 //! the probes, and what is asked again included.
 
-use std::sync::MutexGuard;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use drivebus_rtu::{Answer, Conversation, Instant, Question, UnitAddress, Urgency};
@@ -23,6 +21,8 @@ use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::owner::Owner;
 use crate::owner::exchange::{Talk, Then};
+use crate::system::sync::MutexGuard;
+use crate::system::sync::atomic::{AtomicBool, Ordering};
 use crate::turns::order::{Claim, Priority, Program};
 use crate::turns::queue::{NoTurn, Turn};
 

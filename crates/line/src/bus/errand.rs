@@ -6,13 +6,13 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 
 use crate::ask::Done;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
+use crate::system::sync::atomic::AtomicBool;
 
 /// A request, and who is told what became of it.
 pub struct Errand {
@@ -88,7 +88,7 @@ impl Errand {
     /// Whether somebody still waits for it.
     #[cfg(all(unix, feature = "share"))]
     pub(super) fn is_wanted(&self) -> bool {
-        self.wanted.load(std::sync::atomic::Ordering::Acquire)
+        self.wanted.load(crate::system::sync::atomic::Ordering::Acquire)
     }
 
     /// It is not carried out, for `failure`; `ended` is when that was known.

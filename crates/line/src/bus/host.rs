@@ -9,11 +9,7 @@ mod at_door;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::io;
-use std::net::Shutdown;
-use std::os::unix::net::UnixStream;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::thread;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
@@ -37,6 +33,9 @@ use crate::share::place::{Door, Place};
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::{self, Life, Process};
+use crate::system::sockets::{Shutdown, UnixStream};
+use crate::system::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use crate::system::sync::{Mutex, MutexGuard, PoisonError, thread};
 use crate::trace::{Direction, Overheard};
 use crate::turns::order::Program;
 

@@ -4,8 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use drivebus_rtu::{BeginError, Destination, FreshWords, Instant, Request, UnitAddress};
@@ -22,6 +21,8 @@ use crate::owner::meanings::UnitMeanings;
 use crate::system::clock::{LOOK_UP, monotonic, sleep_until};
 use crate::system::process::Process;
 use crate::system::punctual;
+use crate::system::sync::atomic::{AtomicBool, Ordering};
+use crate::system::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use crate::trace::{Trace, Watch};
 use crate::turns::order::Priority;
 use crate::turns::queue::{NoTurn, Queue, Stops};

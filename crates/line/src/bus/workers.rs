@@ -1,13 +1,13 @@
 //! The threads that carry out errands: each takes the next one from the queue in its turn, and asks as any caller would.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
-use std::thread;
 
 use crate::bus::Bus;
 use crate::bus::errand::{Errand, Reply, pdu_of};
 use crate::bus::shared::Shared;
 use crate::error::Failure;
+use crate::system::sync::atomic::{AtomicBool, Ordering};
+use crate::system::sync::thread;
 use crate::turns::crew::Employer;
 use crate::turns::order::{Priority, Ticket};
 use crate::turns::queue::{NoTurn, Turn};

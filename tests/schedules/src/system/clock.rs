@@ -26,6 +26,10 @@ pub(crate) fn advance(time: Duration) {
     NOW.set(NOW.get() + time);
 }
 
+pub(crate) fn sleep_until(until: Instant) {
+    NOW.set(NOW.get().max(until));
+}
+
 pub(crate) fn monotonic() -> Instant {
     NOW.get()
 }

@@ -1,6 +1,6 @@
 //! Locks and threads whose order is the test's to decide.
 
-pub(crate) use std::sync::PoisonError;
+pub(crate) use std::sync::{PoisonError, TryLockError};
 
 pub(crate) use shuttle::sync::{Condvar, Mutex, MutexGuard, atomic};
 

@@ -1,13 +1,11 @@
 //! The thread at the door: it lets in who knocks, and stands back while the system has nothing left to let anybody in with.
 
 use std::io;
-use std::os::unix::net::UnixStream;
-use std::thread;
 use std::time::Duration;
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-
 use crate::share::place::Entrance;
+use crate::system::sockets::{Came, UnixStream, wait_for_a_knock};
+use crate::system::sync::thread;
 
 /// How long nobody is let in where the system has no more files or threads for that: the first time, and in the end.
 const SHORTEST: Duration = Duration::from_millis(10);
@@ -26,15 +24,14 @@ pub(super) fn stand(
     let mut pause = Pause::default();
     loop {
         let listened = if pause.is_none() { entrances } else { &[] };
-        let doors = listened.iter().map(|entrance| PollFd::new(&*entrance.listener, PollFlags::IN));
-        let mut descriptors: Vec<_> = std::iter::once(PollFd::new(woken, PollFlags::IN)).chain(doors).collect();
-        let refused = match poll(&mut descriptors, pause.timeout().as_ref()) {
-            Ok(_) if !descriptors[0].revents().is_empty() => return,
-            Ok(_) => accept(entrances, &mut let_in).err(),
-            Err(rustix::io::Errno::INTR) => continue,
+        let doors = listened.iter().map(|entrance| &*entrance.listener);
+        let refused = match wait_for_a_knock(doors, woken, pause.timeout()) {
+            Ok(Came::End) => return,
+            Ok(Came::Knock) => accept(entrances, &mut let_in).err(),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
             Err(error) => {
                 thread::sleep(LONGEST);
-                Some(error.into())
+                Some(error)
             }
         };
         says(refused.as_ref());
@@ -67,8 +64,8 @@ impl Pause {
     }
 
     /// For how long only the end is waited for; `None` while there is no pause.
-    fn timeout(&self) -> Option<Timespec> {
-        if self.is_none() { None } else { Timespec::try_from(self.0).ok() }
+    fn timeout(&self) -> Option<Duration> {
+        (!self.is_none()).then_some(self.0)
     }
 
     fn after(&mut self, refused: bool) {

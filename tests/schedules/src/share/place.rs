@@ -1,0 +1,33 @@
+// A door without a folder: who has its listener knocks.
+
+use std::sync::Arc;
+
+use crate::system::inherited::Kept;
+use crate::system::sockets::UnixListener;
+
+/// Nobody looks for a door by its place.
+#[derive(Debug)]
+pub(crate) struct Place;
+
+impl Place {
+    pub(crate) fn has(&self, _door: &Door) -> bool {
+        true
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct Door {
+    pub(crate) entrances: Arc<[Entrance]>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Entrance {
+    pub(crate) listener: Kept<UnixListener>,
+    pub(crate) is_private: bool,
+}
+
+impl Door {
+    pub(crate) fn new(listener: UnixListener) -> Self {
+        Self { entrances: Arc::new([Entrance { listener: Kept::new(listener), is_private: true }]) }
+    }
+}
