@@ -207,23 +207,29 @@ fn what_is_verified_is_not_asked_for_in_a_length_of_another_master_either() {
 
 #[test]
 fn of_coils_whose_answers_are_as_long_the_fewest_are_asked_for() {
-    let mut rig = rig();
     let coil = Request::read_of(Table::Coil, 9, 1).unwrap();
-    rig.run(Question::new(UNIT.into(), coil, TIMEOUT));
-    // Up to 8 come in one byte, and that is what another master has.
-    theirs(&mut rig, &sealed(&[UNIT.get(), 1, 1, 0]));
-    for _ in 0..10 {
+    for (chance, _) in CHANCES {
+        let mut rig = by_chance(chance);
+        rig.run(Question::new(UNIT.into(), coil, TIMEOUT));
+        // Up to 8 come in one byte, and that is what another master has.
+        theirs(&mut rig, &sealed(&[UNIT.get(), 1, 1, 0]));
         rig.now = rig.now + ms(200);
         let told = rig.run(Question::new(UNIT.into(), coil, TIMEOUT));
         assert_eq!(told.sent, [request(1, 9, 9)]);
     }
 }
 
-/// The length that a line with this chance asks for first where another master asks for one word.
-fn first_by_chance(chance: u64) -> u8 {
+/// As [`rig`], with this chance.
+fn by_chance(chance: u64) -> Rig {
     let mut rig = rig();
     rig.known = Line::new(SerialFormat::DEFAULT, OwnEcho::Absent, chance);
     rig.known.opened(Instant::ZERO, &others());
+    rig
+}
+
+/// The length that a line with this chance asks for first where another master asks for one word.
+fn first_by_chance(chance: u64) -> u8 {
+    let mut rig = by_chance(chance);
     rig.run(ask(9, 1));
     theirs(&mut rig, &words(&[0x77]));
     rig.run(ask(9, 1)).sent[0][5]
@@ -327,4 +333,12 @@ fn where_the_proof_meets_silence_nothing_is_believed() {
     let mut rig = rig().does([Right, Nothing]);
     let told = rig.run(ask(9, 1));
     assert_eq!((told.end, told.sent.len()), (silence(1), 2));
+}
+
+#[test]
+fn what_a_line_is_like_is_set_one_by_one() {
+    let opened = Opened::new().gapless(true).may_have_others(true).may_echo(true);
+    assert!(opened.gapless && opened.may_have_others && opened.may_echo);
+    let opened = opened.may_echo(false);
+    assert!(opened.gapless && opened.may_have_others && !opened.may_echo);
 }

@@ -168,3 +168,15 @@ fn fresh_words_begin_where_they_are_told_to() {
     words.begin_at(0x4321);
     assert_eq!(words.next(), 0x4321);
 }
+
+#[test]
+fn probes_take_their_words_from_where_they_are_told_last() {
+    let (own, theirs) = (FreshWords::beginning_at(7), FreshWords::beginning_at(9));
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Absent);
+    let mut call = Conversation::new(ask(9, 1), &own);
+    call.take_words_from(&theirs);
+    let told = rig.carry_out(&mut call);
+    assert_eq!((told.end, told.sent[0].clone()), (End::Words(vec![9]), echo()));
+    assert_eq!(own.next(), 7, "none was taken here");
+    assert_ne!(theirs.next(), 9);
+}
