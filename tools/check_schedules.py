@@ -20,7 +20,6 @@ CREW = "crates/line/src/turns/crew.rs"
 CALL = "crates/line/src/bus/call.rs"
 ERRAND = "crates/line/src/bus/errand.rs"
 HOST = "crates/line/src/bus/host.rs"
-PORT = "crates/line/src/bus/port.rs"
 
 WATCHES = """\
         let mut inside = self.guests.lock();
@@ -56,8 +55,8 @@ BREAKS: list[tuple[str, str, str, str]] = [
     (
         "two take the line",
         QUEUE,
-        "if self.owner.is_none() {\n            self.owner = self.order.take",
-        "{\n            self.owner = self.order.take",
+        "if self.owner.is_none() {\n            let waiter = self.order.take",
+        "{\n            let waiter = self.order.take",
     ),
     ("one of the crew is not woken", WORK, "self.called.notify_one();", ""),
     ("a crew that is dismissed is not woken", WORK, "self.called.notify_all();", ""),
@@ -95,16 +94,10 @@ BREAKS: list[tuple[str, str, str, str]] = [
         "        if false {\n            self.failed",
     ),
     (
-        "a bus is closed, and its crew stays",
-        PORT,
-        "        self.dismiss();\n        if self.queue",
-        "        if self.queue",
-    ),
-    (
         "a call goes on behind the close",
         CALL,
-        "        if self.bus.is_shut() {\n            owner.close();",
-        "        if false {\n            owner.close();",
+        "            if self.bus.is_shut() {\n                owner.close();",
+        "            if false {\n                owner.close();",
     ),
     ("who is in is not ended", HOST, "let _ = stream.shutdown(Shutdown::Read);", "let _ = stream;"),
     (
