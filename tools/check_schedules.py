@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parent.parent
 QUEUE = "crates/line/src/turns/queue.rs"
 WORK = "crates/line/src/turns/queue/work.rs"
 CREW = "crates/line/src/turns/crew.rs"
-CALL = "crates/line/src/bus/call.rs"
 ERRAND = "crates/line/src/bus/errand.rs"
 HOST = "crates/line/src/bus/host.rs"
 
@@ -92,12 +91,6 @@ BREAKS: list[tuple[str, str, str, str]] = [
         ERRAND,
         "        if self.then.is_some() {\n            self.failed",
         "        if false {\n            self.failed",
-    ),
-    (
-        "a call goes on behind the close",
-        CALL,
-        "            if self.bus.is_shut() {\n                owner.close();",
-        "            if false {\n                owner.close();",
     ),
     ("who is in is not ended", HOST, "let _ = stream.shutdown(Shutdown::Read);", "let _ = stream;"),
     (
