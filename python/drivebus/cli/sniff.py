@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, closing, nullcontext
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import replace
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -24,6 +28,8 @@ __all__ = ["COMMANDS"]
 
 _EACH = 0.2
 """Seconds between two looks of the live table."""
+
+_ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 @click.command()
@@ -76,6 +82,7 @@ def sniff(
     figures = Figures(line.t35)
     screen = SniffTable(port, families, figures) if table and out.live else None
     lines = Lines(out, families)
+    ended = threading.Event()
     seen, settings = 0, f"{session.baud} {bits}{parity}{stop}"
     with ExitStack() as opened:
         kept = None
@@ -89,8 +96,10 @@ def sniff(
             bytesize=int(bits),
             profiles=families,
             duration=duration,
+            stop=ended,
         )
         opened.enter_context(closing(heard))
+        opened.enter_context(_ended_by_signals(ended))
         live = opened.enter_context(
             Live(screen, console=out.console, refresh_per_second=1 / _EACH, screen=True) if screen else nullcontext()
         )
@@ -114,6 +123,25 @@ def sniff(
         except KeyboardInterrupt:
             pass
     _told(replace(session, port=port), figures, target, kept)
+
+
+@contextmanager
+def _ended_by_signals(stop: threading.Event) -> Iterator[None]:
+    """What ends programs sets *stop*, so that all that was heard is shown and kept; the second time it ends at once."""
+
+    def end(number: int, _frame: Any) -> None:
+        signal.signal(number, signal.default_int_handler)
+        stop.set()
+
+    # What is ignored, as under nohup, stays so.
+    before = {number: was for number in _ENDS if (was := signal.getsignal(number)) not in (signal.SIG_IGN, None)}
+    try:
+        for number in before:
+            signal.signal(number, end)
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _units(context: click.Context, session: Session) -> frozenset[int]:

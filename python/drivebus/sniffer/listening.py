@@ -35,6 +35,7 @@ def sniff(
     profiles: Given | Families = None,
     duration: float | None = None,
     tap: Callable[[float, bytes], object] | None = None,
+    stop: threading.Event | None = None,
 ) -> Generator[Exchange, None, None]:
     """Listens on *port* and yields each exchange as it is heard. Nothing is sent, ever.
 
@@ -43,7 +44,8 @@ def sniff(
 
     Who asks and who answers is worked out of the frames themselves. What cannot be told is said so: see
     `Exchange.error`. Where another program of this user has the port, or this one as a bus, all that goes over it is
-    heard too, what they ask included. Ends after *duration*, or when the generator is closed.
+    heard too, what they ask included. Ends after *duration*, or by *stop*, with all that was heard until then; who
+    closes the generator, or leaves it by Ctrl-C, is not told what was still waiting for the frame behind it.
 
     Args:
         port: As `Bus` takes it, or a bus that is open, which is listened to with its own settings.
@@ -55,6 +57,7 @@ def sniff(
             what the units tell and guesses otherwise; see `Families`.
         duration: Seconds to listen; None listens on.
         tap: Is called with each piece as it comes: Unix time in seconds, and the bytes as they were handed over.
+        stop: Ends it within 0.2 s when it is set, by another thread or a signal handler.
 
     Raises:
         NotAllowed: An argument is wrong.
@@ -66,45 +69,49 @@ def sniff(
     own = None
     if bus is None:
         bus = own = Bus(port, baudrate=baudrate, parity=parity, stopbits=stopbits, bytesize=bytesize, read_only=True)
-    return _exchanges(bus, own, families, limit, tap)
+    return _exchanges(bus, own, families, limit, tap, threading.Event() if stop is None else stop)
 
 
 def _exchanges(
-    bus: Bus, own: Bus | None, families: Families, limit: float, tap: Callable[[float, bytes], object] | None
+    bus: Bus,
+    own: Bus | None,
+    families: Families,
+    limit: float,
+    tap: Callable[[float, bytes], object] | None,
+    stop: threading.Event,
 ) -> Generator[Exchange, None, None]:
     began = bus.now()
     ahead = time() - began
     pairing = Pairing(bus.format, families, ahead)
     try:
-        with closing(heard(bus)) as pieces:
+        with closing(heard(bus, lambda: stop.is_set() or bus.now() - began >= limit)) as pieces:
             for at, data in pieces:
                 if tap is not None and data:
                     tap(at + ahead, data)
                 yield from pairing.receive(at, data)
-                if bus.now() - began >= limit:
-                    break
         yield from pairing.finish()
     finally:
         if own is not None:
             own.close()
 
 
-def heard(bus: Bus) -> Generator[tuple[float, bytes], None, None]:
-    """All that goes over the line of *bus*, as it comes: moments on the line's clock, and bytes.
+def heard(bus: Bus, is_over: Callable[[], bool]) -> Generator[tuple[float, bytes], None, None]:
+    """All that goes over the line of *bus*, as it comes, until *is_over*: moments on the line's clock, and bytes.
 
-    No bytes where only time has passed. A thread of its own hears it, so that nobody who takes his time is missed.
+    No bytes where only time has passed. A thread of its own hears it, so that nobody who takes his time is missed; what
+    it has heard by then is yielded after *is_over*, too.
 
     Raises:
         PortError: The line was lost.
     """
     pieces: queue.SimpleQueue[tuple[float, bytes] | BaseException | None] = queue.SimpleQueue()
-    over = threading.Event()
+    enough = threading.Event()
     core = bus.line
     assert isinstance(core, _native.Bus)
 
     def put(at: float, _sent: bool, data: bytes) -> bool:
         pieces.put((at, data))
-        return over.is_set()
+        return enough.is_set()
 
     def hear() -> None:
         try:
@@ -117,6 +124,9 @@ def heard(bus: Bus) -> Generator[tuple[float, bytes], None, None]:
     thread.start()
     try:
         while True:
+            if not enough.is_set() and is_over():
+                enough.set()
+                thread.join()
             try:
                 piece = pieces.get(timeout=_LOOK_UP)
             except queue.Empty:
@@ -129,5 +139,5 @@ def heard(bus: Bus) -> Generator[tuple[float, bytes], None, None]:
                 raise piece
             yield piece
     finally:
-        over.set()
+        enough.set()
         thread.join()
