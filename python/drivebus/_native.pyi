@@ -40,6 +40,7 @@ __all__ = [
     "end_of_program",
     "exception_means",
     "fault_kinds",
+    "frame_len",
     "open_bus",
     "port_facts",
     "port_url",
@@ -74,6 +75,12 @@ def decode(frame: Buffer) -> dict[str, Any]:
 
     `kind` is `"read"`, `"write"`, `"write_many"`, `"echo"` (requests and answers that look alike),
     `"read_answer"`, `"write_many_answer"`, `"exception"`, `"other"`. Raises CrcError, BadAnswer.
+    """
+
+def frame_len(data: Buffer, /) -> int | None:
+    """How many bytes at the front of *data* are a whole frame of a function that tells its length.
+
+    As a request or as an answer, with the CRC right; None where none is.
     """
 
 def port_facts(

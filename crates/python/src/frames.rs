@@ -1,6 +1,8 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
-use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, Table, UnitAddress, crc16 as crc, function};
+use drivebus_rtu::{
+    Adu, Answer, Destination, Frame, Request, Table, UnitAddress, crc16 as crc, frame_len as len_of, function,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -16,6 +18,13 @@ pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
         return Ok(crc(bytes.as_bytes()));
     }
     Ok(crc(bytes_of(data)?.as_bytes()))
+}
+
+/// How many bytes at the front of any bytes-like object are a whole frame.
+#[pyfunction]
+#[pyo3(signature = (data, /))]
+pub(crate) fn frame_len(data: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    Ok(len_of(bytes_of(data)?.as_bytes()))
 }
 
 /// A whole 03H request frame.

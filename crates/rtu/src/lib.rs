@@ -50,7 +50,7 @@ pub use pdu::{AnswerLength, ExceptionCode, MAX_PDU, MAX_READ, MAX_READ_BITS, MAX
 pub use request::{Request, RequestError};
 pub use serial::{DataBits, Parity, SerialFormat, SerialFormatError, Silence, StopBits};
 pub use slave::{Slave, SlaveEvent};
-pub use sniffer::{Heard, Role, Sniffer};
+pub use sniffer::{Heard, Role, Sniffer, frame_len};
 pub use table::Table;
 pub use time::Instant;
 pub use words::Words;

@@ -19,6 +19,7 @@ use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::{Instant, SerialFormat, UnitAddress};
 
 use lengths::Length;
+pub use lengths::frame_len;
 pub use role::Role;
 use stories::{Behind, Next};
 
@@ -314,11 +315,7 @@ impl Sniffer {
 
     /// Whether a whole frame of a function that tells its length stands at `start`.
     fn begins_a_frame(&self, start: usize) -> bool {
-        let here = &self.bytes[start..self.len];
-        [lengths::of_request(here), lengths::of_answer(here)].iter().any(|length| match length {
-            Length::Is(len) => here.get(..*len).is_some_and(|frame| Frame::parse(frame).is_ok()),
-            _ => false,
-        })
+        frame_len(&self.bytes[start..self.len]).is_some()
     }
 
     fn latest(&self) -> Option<Instant> {

@@ -17,7 +17,7 @@
 //!
 //! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.21, §7; address and CRC are counted.
 
-use crate::frame::MAX_ADU;
+use crate::frame::{Frame, MAX_ADU};
 use crate::pdu::function::EXCEPTION_BIT;
 
 /// How long the frame is that begins so.
@@ -69,6 +69,23 @@ pub(super) fn of_answer(here: &[u8]) -> Length {
         EXCEPTION_BIT.. => Length::Is(5),
         _ => Length::Unknown,
     }
+}
+
+/// How many bytes at the front of `here` are a whole frame of a function that tells its length, as a request or as an
+/// answer, and match their CRC; `None` where none is.
+///
+/// For bytes whose moments tell nothing, such as those of a capture: a [`Sniffer`](super::Sniffer) hears a line.
+///
+/// ```
+/// let bytes = [0x01, 0x03, 0x02, 0x00, 0x03, 0xF8, 0x45, 0x01, 0x03];
+/// assert_eq!(drivebus_rtu::frame_len(&bytes), Some(7));
+/// assert_eq!(drivebus_rtu::frame_len(&bytes[1..]), None);
+/// ```
+pub fn frame_len(here: &[u8]) -> Option<usize> {
+    [of_request(here), of_answer(here)].into_iter().find_map(|length| match length {
+        Length::Is(len) => here.get(..len).and_then(|frame| Frame::parse(frame).ok()).map(|_| len),
+        _ => None,
+    })
 }
 
 /// `around` bytes and as many as the byte at `index` says.
