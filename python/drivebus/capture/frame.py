@@ -15,8 +15,15 @@ class Captured:
         time: Unix time in seconds at which it had come or had left; None where the capture does not tell.
         data: All of it, with address and CRC.
         asks: Whether a master sent it; None where the capture does not tell.
+        line: Which of the lines in the capture it went over, by the name of its interface or of a server's port; empty
+            where there is only one.
+        connection: Which of the connections to that server; a request is answered on its own.
+        at_once: Whether its characters took no time, as over a network.
     """
 
     time: float | None
     data: bytes
     asks: bool | None = None
+    line: str = ""
+    connection: int = 0
+    at_once: bool = False

@@ -3,8 +3,8 @@
 | link type | what is in a packet | what Wireshark makes of it |
 | --- | --- | --- |
 | 252, upper PDU | tags, among them the name of the dissector, then the frame | Modbus RTU, without a setting |
-| 250, RTAC serial | a head with the kind of event, then the frame | Modbus RTU by "decode as" `rtacser.data,mbrtu` |
-| 147 to 162, user | the frame | what its table of user link types says |
+| 250, RTAC serial | a head with the event, then bytes | Modbus RTU by "decode as" `rtacser.data,mbrtu` |
+| 147 to 162, user | bytes | what its table of user link types says |
 
 Tags of the upper PDU carry addresses and ports as if it were TCP, the unit on port 502: a write and its answer look
 alike, and who sets `mbrtu.tcp.port` to 502 is told which is which. Measured with tshark 4.0.17.
@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from drivebus.capture.frame import Captured
-from drivebus.capture.pcapng import Packet
-from drivebus.errors import NotAllowed
+from drivebus.capture.packets import Packet
 
-__all__ = ["LINKS", "captured", "packed"]
+__all__ = ["LINKS", "USB", "Said", "is_serial", "named", "packed", "said"]
 
 LINKS: Mapping[str, int] = {"upper": 252, "rtac": 250}
 """What a capture is written as, by the name that people give."""
@@ -30,6 +30,50 @@ _TCP = 2
 _UNIT_PORT, _MASTER_PORT = 502, 50_000
 _MASTER = bytes([10, 0, 0, 254])
 _TX, _RX = 1, 2
+_RTAC_EVENTS = {
+    5: "lost piece",
+    7: "framing error",
+    8: "parity error",
+    9: "break",
+    10: "overrun",
+}
+"""Events behind which bytes are missing or wrong. Source: Wireshark 4.0, `rtacser.eventtype`."""
+_NAMES = {
+    0: "BSD loopback",
+    1: "Ethernet",
+    9: "PPP",
+    12: "raw IP",
+    14: "raw IP",
+    50: "PPP",
+    101: "raw IP",
+    104: "Cisco HDLC",
+    105: "Wi-Fi",
+    108: "OpenBSD loopback",
+    113: "Linux cooked capture",
+    127: "Wi-Fi",
+    165: "BACnet MS/TP",
+    186: "USB",
+    187: "Bluetooth",
+    189: "USB, by Linux usbmon",
+    190: "CAN",
+    192: "PPI",
+    195: "IEEE 802.15.4",
+    201: "Bluetooth",
+    220: "USB, by Linux usbmon",
+    227: "CAN",
+    228: "IPv4",
+    229: "IPv6",
+    230: "IEEE 802.15.4",
+    249: "USB, by USBPcap",
+    251: "Bluetooth Low Energy",
+    253: "Netlink",
+    266: "USB, by macOS",
+    276: "Linux cooked capture",
+    288: "USB 2.0",
+}
+"""Link types that people have. Source: the list of link types of the tcpdump group."""
+USB = frozenset({186, 189, 220, 249, 266, 288})
+"""Those whose packets are what a computer says to its adapter."""
 _RTAC_HEAD = struct.Struct(">IIBBH")
 
 
@@ -47,24 +91,48 @@ def packed(frame: Captured, link: str, is_frame: bool) -> bytes:
     return tags + _tag(0, b"") + frame.data
 
 
-def captured(packet: Packet, name: str) -> Captured:
-    """The frame in *packet*; *name* is for messages.
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a packet of a serial line holds.
 
-    Raises:
-        NotAllowed: Its link type is none of a serial line.
+    Attributes:
+        data: Bytes that went over the line; often none, in a packet that tells an event.
+        outbound: Whether they were sent by the one that captured, or by a master; None where that is not told.
+        event: What happened on the line, in words; empty where nothing is told.
+        is_lost: Whether bytes before or behind it are missing.
     """
-    if packet.link == LINKS["upper"]:
+
+    data: bytes
+    outbound: bool | None
+    event: str = ""
+    is_lost: bool = False
+
+
+def is_serial(link: int) -> bool:
+    """Whether packets of *link* are those of a serial line."""
+    return link in LINKS.values() or link in _USER
+
+
+def said(packet: Packet) -> Said:
+    """What *packet* holds, whose link is one of a serial line."""
+    link = packet.interface.link
+    if link == LINKS["upper"]:
         data, asks = _upper(packet.data)
-        return Captured(packet.time, data, packet.outbound if asks is None else asks)
-    if packet.link == LINKS["rtac"]:
-        event = packet.data[8] if len(packet.data) >= _RTAC_HEAD.size else 0
-        return Captured(packet.time, packet.data[_RTAC_HEAD.size :], {_TX: True, _RX: False}.get(event))
-    if packet.link in _USER:
-        return Captured(packet.time, packet.data, packet.outbound)
-    raise NotAllowed(
-        f"{name} is a capture of link type {packet.link}, which is not a serial line; captures of Modbus RTU have 252 "
-        "(upper PDU), 250 (RTAC serial) or 147 to 162 (user)"
-    )
+        return Said(data, packet.outbound if asks is None else asks, is_lost=packet.is_cut)
+    if link != LINKS["rtac"]:
+        return Said(packet.data, packet.outbound, is_lost=packet.is_cut)
+    if len(packet.data) < _RTAC_HEAD.size:
+        return Said(b"", None, is_lost=True)
+    event = packet.data[8]
+    told = _RTAC_EVENTS.get(event, "")
+    direction = {1: True, 2: False, 3: True, 4: False}.get(event)
+    return Said(packet.data[_RTAC_HEAD.size :], direction, told, packet.is_cut or bool(told))
+
+
+def named(link: int) -> str:
+    """*link* as people know it."""
+    name = _NAMES.get(link, "")
+    return f"link type {link}{f' ({name})' if name else ''}"
 
 
 def _upper(data: bytes) -> tuple[bytes, bool | None]:

@@ -8,40 +8,27 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import BinaryIO
 
+from drivebus.capture.packets import LARGEST, Interface, Packet, moment
 from drivebus.errors import NotAllowed
 
-__all__ = ["MAGIC", "Packet", "description", "interface", "packet", "packets", "section"]
+__all__ = ["MAGIC", "descriptions", "interface", "packet", "packets", "section"]
 
 MAGIC = b"\x0a\x0d\x0d\x0a"
 """How every file begins, whichever byte order it has."""
 
-_SECTION, _INTERFACE, _SIMPLE, _ENHANCED = 0x0A0D0D0A, 1, 3, 6
+_SECTION, _INTERFACE, _OLD, _SIMPLE, _ENHANCED = 0x0A0D0D0A, 1, 2, 3, 6
+_PACKETS = (_ENHANCED, _SIMPLE, _OLD)
 _BYTE_ORDER = 0x1A2B3C4D
-_END, _NAME, _DESCRIPTION, _RESOLUTION, _FLAGS, _APPLICATION = 0, 2, 3, 9, 2, 4
+_END, _NAME, _DESCRIPTION, _RESOLUTION, _OFFSET, _FLAGS, _APPLICATION = 0, 2, 3, 9, 14, 2, 4
 _NANOSECONDS = b"\x09"
 _INBOUND, _OUTBOUND = 1, 2
-_LARGEST = 16 * 1024 * 1024
-"""A longer block is no block of a capture that this program could have a use for."""
+_MOST_PARTS = 10**18
+"""A stamp counts no smaller parts of a second than this."""
 
-
-@dataclass(frozen=True, slots=True)
-class Packet:
-    """One packet of a file.
-
-    Attributes:
-        link: Its link type.
-        time: Unix time in seconds; None where its block tells none.
-        outbound: Whether it was sent by the one that captured; None where that is not told.
-        data: What was captured.
-    """
-
-    link: int
-    time: float | None
-    outbound: bool | None
-    data: bytes
+_Line = tuple[Interface, int, int, int]
+"""An interface, the ticks of its stamps in a second, the seconds to add, and the longest packet kept (0: any)."""
 
 
 def section(application: str) -> bytes:
@@ -64,23 +51,25 @@ def packet(time: float, data: bytes, outbound: bool | None) -> bytes:
     return _block(_ENHANCED, head + _padded(data) + (_options(flags) if flags else b""))
 
 
-def description(stream: BinaryIO, name: str) -> str | None:
-    """What the file says of the line on which its packets were; None where it does not.
+def descriptions(stream: BinaryIO, name: str) -> Iterator[str]:
+    """What the file says of the lines on which its packets were, as far as it does before the first of them.
 
     Raises:
         NotAllowed: It is not such a file, or breaks off before.
     """
-    order, head = "<", stream.read(8)
-    while head:
+    order = "<"
+    while head := stream.read(8):
         if int.from_bytes(head[:4], "little") == _SECTION:
             head += stream.read(4)
             order = _order(head[8:], name)
-        body, _ = _rest(stream, head, order, name, 0)
-        if struct.unpack(f"{order}I", head[:4])[0] == _INTERFACE:
-            told = next((value for code, value in _listed(body[8:], order) if code == _DESCRIPTION), None)
-            return None if told is None else told.decode(errors="replace")
-        head = stream.read(8)
-    return None
+        kind = int.from_bytes(head[:4], "little" if order == "<" else "big")
+        if kind in _PACKETS:
+            return
+        body = _rest(stream, head, order, name, 0)
+        if kind == _INTERFACE:
+            yield from (
+                value.decode(errors="replace") for code, value in _listed(body[8:], order) if code == _DESCRIPTION
+            )
 
 
 def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
@@ -89,7 +78,7 @@ def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
     Raises:
         NotAllowed: It is not such a file, or breaks off; what came before was yielded.
     """
-    order, interfaces, count = "<", list[tuple[int, float]](), 0
+    order, lines, count = "<", list[_Line](), 0
     while True:
         head = stream.read(8)
         if not head:
@@ -97,19 +86,17 @@ def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
         kind = int.from_bytes(head[:4], "little")
         if kind == _SECTION:
             head += stream.read(4)
-            order, interfaces = _order(head[8:], name), []
-        body, more = _rest(stream, head, order, name, count)
+            order, lines = _order(head[8:], name), []
+        body = _rest(stream, head, order, name, count)
         kind = struct.unpack(f"{order}I", head[:4])[0]
         try:
             if kind == _INTERFACE:
-                interfaces.append((struct.unpack_from(f"{order}H", body)[0], _tick(body[8:], order)))
-            elif kind in (_ENHANCED, _SIMPLE):
-                yield _packet(kind, body, order, interfaces)
+                lines.append(_line(body, order, len(lines)))
+            elif kind in _PACKETS:
+                yield _packet(kind, body, order, lines)
                 count += 1
-        except (struct.error, IndexError, ValueError) as error:
+        except (struct.error, ValueError) as error:
             raise NotAllowed(f"{name} has a block that is not whole behind its packet {count}: {error}") from None
-        if not more:
-            return
 
 
 def _order(magic: bytes, name: str) -> str:
@@ -119,41 +106,60 @@ def _order(magic: bytes, name: str) -> str:
     raise NotAllowed(f"{name} begins as a pcapng file and has no byte order; it is damaged")
 
 
-def _rest(stream: BinaryIO, head: bytes, order: str, name: str, count: int) -> tuple[bytes, bool]:
-    """The body of the block that begins with *head*, without its length at the end; and whether more may follow."""
+def _rest(stream: BinaryIO, head: bytes, order: str, name: str, count: int) -> bytes:
+    """The body of the block that begins with *head*, without its length at the end."""
     length = struct.unpack(f"{order}I", head[4:8])[0] if len(head) >= 8 else 0
-    broken = NotAllowed(f"{name} breaks off behind its packet {count}: it is not a whole pcapng file")
-    if not 12 <= length <= _LARGEST or length % 4:
-        raise broken
-    rest = stream.read(length - len(head))
-    if len(rest) != length - len(head):
-        raise broken
-    return head[8:] + rest[:-4], True
+    if 12 <= length <= LARGEST and length % 4 == 0:
+        rest = stream.read(length - len(head))
+        if len(rest) == length - len(head) and rest[-4:] == head[4:8]:
+            return head[8:] + rest[:-4]
+    raise NotAllowed(f"{name} breaks off behind its packet {count}: it is not a whole pcapng file")
 
 
-def _tick(options: bytes, order: str) -> float:
-    """Seconds of one tick of the time stamps: a microsecond, unless an option says otherwise."""
-    for code, value in _listed(options, order):
-        if code == _RESOLUTION and value:
-            return 2.0 ** -(value[0] & 0x7F) if value[0] & 0x80 else 10.0 ** -value[0]
-    return 1e-6
+def _line(body: bytes, order: str, number: int) -> _Line:
+    """The interface whose block has *body*: stamps are in microseconds, unless an option says otherwise."""
+    link, _, longest = struct.unpack_from(f"{order}HHI", body)
+    name, per_second, offset = "", 10**6, 0
+    for code, value in _listed(body[8:], order):
+        if code == _NAME:
+            name = "".join(letter for letter in value.decode(errors="replace") if letter.isprintable())
+        elif code == _RESOLUTION and value:
+            per_second = 2 ** (value[0] & 0x7F) if value[0] & 0x80 else 10 ** value[0]
+        elif code == _OFFSET and len(value) == 8:
+            offset = struct.unpack(f"{order}q", value)[0]
+    if per_second > _MOST_PARTS:
+        raise ValueError(f"no stamp counts parts of a second as small as 1/{per_second:.3g}")
+    return Interface(number, link, name), per_second, offset, longest
 
 
-def _packet(kind: int, body: bytes, order: str, interfaces: list[tuple[int, float]]) -> Packet:
+def _packet(kind: int, body: bytes, order: str, lines: list[_Line]) -> Packet:
     if kind == _SIMPLE:
-        return Packet(interfaces[0][0], None, None, body[4 : 4 + struct.unpack_from(f"{order}I", body)[0]])
-    index, high, low, length, _ = struct.unpack_from(f"{order}IIIII", body)
-    link, tick = interfaces[index]
-    data = body[20 : 20 + length]
-    if len(data) != length:
-        raise ValueError(f"a packet of {length} bytes has {len(data)}")
+        interface, _, _, longest = _described(lines, 0)
+        (whole,) = struct.unpack_from(f"{order}I", body)
+        length = min(whole, longest) if longest else whole
+        return Packet(interface, None, None, _whole(body[4:], length), length < whole)
+    index, high, low, length, whole = struct.unpack_from(f"{order}IIIII", body)
+    if kind == _OLD:
+        # Its number has two bytes; the packets that were dropped are counted in the other two.
+        (index,) = struct.unpack_from(f"{order}H", body)
+    interface, per_second, offset, _ = _described(lines, index)
+    data = _whole(body[20:], length)
     flags = next((value for code, value in _listed(body[20 + length + -length % 4 :], order) if code == _FLAGS), b"")
     direction = struct.unpack(f"{order}I", flags)[0] & 3 if len(flags) == 4 else 0
-    moment = high << 32 | low
-    # The whole seconds apart: a float has no room for both.
-    ticks = round(1 / tick)
-    time = moment // ticks + moment % ticks * tick
-    return Packet(link, time, {_INBOUND: False, _OUTBOUND: True}.get(direction), data)
+    time = moment(high << 32 | low, per_second, offset)
+    return Packet(interface, time, {_INBOUND: False, _OUTBOUND: True}.get(direction), data, length < whole)
+
+
+def _described(lines: list[_Line], index: int) -> _Line:
+    if index >= len(lines):
+        raise ValueError(f"its interface {index} is not described")
+    return lines[index]
+
+
+def _whole(data: bytes, length: int) -> bytes:
+    if len(data) < length:
+        raise ValueError(f"a packet of {length} bytes has {len(data)}")
+    return data[:length]
 
 
 def _listed(options: bytes, order: str) -> Iterator[tuple[int, bytes]]:

@@ -1,50 +1,58 @@
-"""Opens a capture, whatever it is: pcapng, or hex text of any tool."""
+"""Reads a capture, whatever it is: pcapng, pcap, or hex text of any tool."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from drivebus import checks
 from drivebus._native import SerialFormat
-from drivebus.capture import links, pcapng, text
+from drivebus.capture import pcapng, text
+from drivebus.capture.contents import Contents
 from drivebus.capture.frame import Captured
+from drivebus.capture.opened import opened, packets_of
 from drivebus.errors import NotAllowed
 
 __all__ = ["line_of", "read"]
 
-_OLD_PCAP = (b"\xa1\xb2\xc3\xd4", b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\x3c\x4d", b"\x4d\x3c\xb2\xa1")
 _LINE = re.compile(r"(?P<baud>[0-9]{2,8}) (?P<bits>[78])(?P<parity>[NEO])(?P<stop>[12])")
 """What our own captures say of their line, such as 9600 8N1."""
 _MOST_TEXT = 64 * 1024 * 1024
 
 
-def read(path: str | os.PathLike[str]) -> Iterator[Captured]:
-    """The frames of the capture at *path*, in its order.
+def read(path: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Iterator[Captured]:
+    """The frames of the capture at *path*, in its order, line by line where it is of several.
+
+    Args:
+        path: A pcapng or pcap file, or hex text; also packed by gzip.
+        say: Is given what is to be known of the file, a line each: what was left out, and what it is where it is not of
+            a serial line.
 
     Raises:
-        NotAllowed: It cannot be read, is not a capture, is one of another kind of line, or breaks off; what came before
-            was yielded.
+        NotAllowed: It cannot be read, is not a capture, holds no Modbus, or breaks off; what came before was yielded.
     """
     name = os.fspath(path)
-    try:
-        with Path(path).open("rb") as stream:
-            magic = stream.read(4)
-            stream.seek(0)
-            if magic == pcapng.MAGIC:
-                for packet in pcapng.packets(stream, name):
-                    yield links.captured(packet, name)
-                return
-            if magic in _OLD_PCAP:
-                raise NotAllowed(
-                    f"{name} is a capture in the older pcap format; save it as pcapng (Wireshark: Save As)"
-                )
-            data = stream.read(_MOST_TEXT + 1)
-    except OSError as error:
-        raise checks.unread(name, error) from None
-    yield from _text(data, name)
+    with opened(Path(path), name) as (magic, stream):
+        packets = packets_of(magic)
+        if packets is None:
+            yield from _text(stream.read(_MOST_TEXT + 1), name)
+            return
+        contents, broken = Contents(name), None
+        try:
+            for packet in packets(stream, name):
+                contents.take(packet)
+        except (NotAllowed, OSError, EOFError, zlib.error) as error:
+            # What came before it breaks off is told.
+            broken = error
+        yield from contents.frames(say or _silently, broken)
+        if broken is not None:
+            raise broken
+
+
+def _silently(_text: str) -> None:
+    pass
 
 
 def line_of(path: str | os.PathLike[str]) -> SerialFormat | None:
@@ -54,15 +62,9 @@ def line_of(path: str | os.PathLike[str]) -> SerialFormat | None:
         NotAllowed: It cannot be read, or is damaged before it says so.
     """
     name = os.fspath(path)
-    try:
-        with Path(path).open("rb") as stream:
-            if stream.read(4) != pcapng.MAGIC:
-                return None
-            stream.seek(0)
-            told = pcapng.description(stream, name)
-    except OSError as error:
-        raise checks.unread(name, error) from None
-    found = _LINE.fullmatch(told or "")
+    with opened(Path(path), name) as (magic, stream):
+        told = pcapng.descriptions(stream, name) if magic == pcapng.MAGIC else ()
+        found = next((match for text in told if (match := _LINE.fullmatch(text))), None)
     if found is None:
         return None
     try:

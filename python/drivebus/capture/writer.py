@@ -7,6 +7,7 @@ from typing import BinaryIO
 from drivebus import _native, checks
 from drivebus.capture import links, pcapng
 from drivebus.capture.frame import Captured
+from drivebus.capture.streams import is_frame
 
 __all__ = ["Writer"]
 
@@ -33,9 +34,8 @@ class Writer:
         Raises:
             OSError: The disk is full, or who read the pipe has gone.
         """
-        data = frame.data
-        is_frame = len(data) >= 4 and _native.crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
-        self._put(pcapng.packet(frame.time or 0.0, links.packed(frame, self._link, is_frame), frame.asks))
+        packed = links.packed(frame, self._link, is_frame(frame.data))
+        self._put(pcapng.packet(frame.time or 0.0, packed, frame.asks))
 
     def _put(self, block: bytes) -> None:
         self._stream.write(block)

@@ -47,12 +47,16 @@ class Lines:
         out: Where they go.
         families: What their words mean.
         has_times: Whether their times are those of the clock.
+        line: The name of the line, where there are several; it is shown above them.
     """
 
-    def __init__(self, out: Output, families: Families, has_times: bool = True) -> None:
+    def __init__(self, out: Output, families: Families, has_times: bool = True, line: str = "") -> None:
         self._out = out
         self._families = families
         self._has_times = has_times
+        self._line = line
+        if line and not out.as_json:
+            out.say(f"{line}:")
 
     def show(self, exchange: Exchange) -> None:
         """One exchange."""
@@ -107,6 +111,8 @@ class Lines:
         }
         if not self._has_times:
             del told["time"]
+        if self._line:
+            told["line"] = self._line
         if error is not None:
             told |= {"error": str(error), "raw": error.raw, "exit_code": exit_code(error)}
         return told

@@ -52,8 +52,8 @@ def show_frames(context: click.Context) -> None:
 def decode(session: Session, data: tuple[str, ...]) -> None:
     """Take a whole frame apart, CRC included, or all frames of a capture.
 
-    A capture is a pcapng file of Wireshark's or `sniff -w`, or hex text of any tool. With --profile, registers are
-    shown by name; 3=gd350,5=vfd500 names the family of each unit.
+    A capture is a pcapng or pcap file, of `sniff -w` or any other tool, or hex text; also packed by gzip. With
+    --profile, registers are shown by name; 3=gd350,5=vfd500 names the family of each unit.
     """
     if len(data) == 1 and _is_file(data[0]):
         _decode_file(session, data[0])
@@ -69,7 +69,7 @@ def decode(session: Session, data: tuple[str, ...]) -> None:
 def _is_file(text: str) -> bool:
     """Whether *text* is the name of a file: one that is there, or what no hex looks like."""
     there = os.path.isfile(text)  # noqa: PTH113 - Path raises where a name is too long
-    return there or os.path.splitext(text)[1].lower() in (".pcapng", ".pcap", ".txt", ".log")  # noqa: PTH122
+    return there or os.path.splitext(text)[1].lower() in (".pcapng", ".pcap", ".cap", ".gz", ".txt", ".log")  # noqa: PTH122
 
 
 def _decode_file(session: Session, file: str) -> None:
@@ -78,20 +78,23 @@ def _decode_file(session: Session, file: str) -> None:
     from drivebus.sniffer import Families, exchanges_in
 
     # Times of frames are those of their last characters: when they began follows from the speed.
-    line = line_of(file) or session.serial_format
-    families = Families(names.parse_families(session.profile))
-    whole: list[Captured] = []
+    format_ = line_of(file) or session.serial_format
+    lines: dict[str, list[Captured]] = {}
     broken = None
     try:
-        whole.extend(read(file))
+        for frame in read(file, remark):
+            lines.setdefault(frame.line, []).append(frame)
     except drivebus.NotAllowed as error:
         # What came before it breaks off is shown.
-        if not whole:
+        if not lines:
             raise
         broken = error
-    shown = Lines(session.out, families, any(frame.time is not None for frame in whole))
-    for exchange in exchanges_in(whole, line, families):
-        shown.show(exchange)
+    for line, frames in lines.items():
+        # A unit is not the one of the same address on another line.
+        families = Families(names.parse_families(session.profile))
+        shown = Lines(session.out, families, any(frame.time is not None for frame in frames), line)
+        for exchange in exchanges_in(frames, format_, families):
+            shown.show(exchange)
     if broken is not None:
         raise broken
 

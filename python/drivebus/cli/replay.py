@@ -74,12 +74,12 @@ def _asked(request: bytes) -> str:
 def replay(session: Session, file: str, transport: str, duration: float | None) -> None:
     """Answer as the units in a capture did, until Ctrl-C.
 
-    FILE is a pcapng file or hex text. Each request gets the answers that it got there, in their order; the last of them
-    is given from then on. What nobody answered there stays without an answer. A read that is not there is answered if
-    all its registers were read there; a write only if it is there. What cannot be answered is told.
+    FILE is a pcapng or pcap file, or hex text. Each request gets the answers that it got there, in their order; the
+    last of them is given from then on. What nobody answered there stays without an answer. A read that is not there is
+    answered if all its registers were read there; a write only if it is there. What cannot be answered is told.
     """
     line = line_of(file) or session.serial_format
-    exchanges = list(exchanges_in(read(file), line))
+    exchanges = list(exchanges_in(read(file, remark), line))
     with Replay(exchanges, line, transport, Missing(remark).take) as units:
         answered = sum(exchange.answer is not None for exchange in exchanges if exchange.request is not None)
         with suppress(KeyboardInterrupt):

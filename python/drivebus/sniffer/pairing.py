@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TypedDict
 
-from drivebus._native import SerialFormat, Sniffer, crc16, decode_answer, exception_means
-from drivebus.capture import Captured
+from drivebus._native import SerialFormat, Sniffer, exception_means
+from drivebus.capture import Captured, answers, is_frame
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.profile import Profile
@@ -160,16 +160,26 @@ def exchanges_in(
     """The exchanges in the *frames* of a capture.
 
     Where the capture tells who sent each, that is believed; otherwise it is worked out, as of a line that is heard.
-    Frames without a time are taken to follow each other.
+    Frames without a time are taken to follow each other. A request is answered on its own line and connection: where
+    there are several, the exchanges of each follow those of the one before.
     """
-    pairing = Pairing(line, Families() if families is None else families)
-    known, began = list(frames), 0.0
-    if known and all(frame.asks is not None or not _is_frame(frame.data) for frame in known):
+    told = Families() if families is None else families
+    talks: dict[tuple[str, int], list[Captured]] = {}
+    for frame in frames:
+        talks.setdefault((frame.line, frame.connection), []).append(frame)
+    for talk in talks.values():
+        yield from _exchanges_of(talk, line, told)
+
+
+def _exchanges_of(known: list[Captured], line: SerialFormat, families: Families) -> Iterator[Exchange]:
+    """The exchanges of one line."""
+    pairing = Pairing(line, families)
+    if known and all(frame.asks is not None or not is_frame(frame.data) for frame in known):
         yield from pairing.take(_pieces(known, line))
         return
+    # Moments near to zero: a float has no room for nanoseconds since 1970.
+    began = next((frame.time for frame in known if frame.time is not None), 0.0)
     for index, frame in enumerate(known):
-        # Moments near to zero: a float has no room for nanoseconds since 1970.
-        began = began or frame.time or 0.0
         at = _BETWEEN * index if frame.time is None else frame.time - began
         for exchange in pairing.receive(at + 1.0, frame.data):
             yield _later(exchange, began - 1.0)
@@ -191,33 +201,17 @@ def _pieces(frames: Iterable[Captured], line: SerialFormat) -> Iterator[_Piece]:
     open_, asked = b"", 0.0
     last: float | None = None
     for frame in frames:
-        ended = frame.time or 0.0
-        began = ended - len(frame.data) * line.char_time
+        ended = (last or 0.0) if frame.time is None else frame.time
+        began = ended if frame.at_once else ended - len(frame.data) * line.char_time
         gap = None if last is None else max(began - last, 0.0)
         last = ended
-        if not _is_frame(frame.data):
+        if not is_frame(frame.data):
             yield "noise", frame.data, began, ended, gap, 0.0, None, "its CRC does not match"
         elif frame.asks:
             open_, asked = frame.data, ended
             yield "request", frame.data, began, ended, gap, 0.0, None, None
-        elif _answers(open_, frame.data):
+        elif open_ and answers(open_, frame.data):
             open_ = b""
             yield "answer", frame.data, began, ended, gap, 0.0, max(began - asked, 0.0), None
         else:
             yield "stray", frame.data, began, ended, gap, 0.0, None, None
-
-
-def _answers(request: bytes, answer: bytes) -> bool:
-    if not request or request[0] != answer[0]:
-        return False
-    try:
-        decode_answer(request, answer)
-    except Refused:
-        return True
-    except DrivebusError:
-        return False
-    return True
-
-
-def _is_frame(data: bytes) -> bool:
-    return len(data) >= 4 and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
