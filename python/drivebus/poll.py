@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import math
 import threading
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from types import TracebackType
@@ -16,7 +17,7 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus.attributes import known_only
-from drivebus.errors import NotAllowed
+from drivebus.errors import DrivebusWarning, NotAllowed, level_of_the_program
 from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
@@ -30,7 +31,8 @@ class Poll(Polling[Key]):
     Samples that nobody takes are kept, the latest *size* of them. Everything is safe from any thread.
 
     On a line in virtual time nothing is asked by itself: whoever waits for samples does the asking, and meanwhile time
-    moves. Starts of cycles that passed while nobody waited count as late.
+    moves. Starts of cycles that passed while nobody waited count as late; where nobody ever waits, a `DrivebusWarning`
+    at the end says so.
 
     Attributes as those of `Polling`.
     """
@@ -55,6 +57,8 @@ class Poll(Polling[Key]):
         self._error: BaseException | None = None
         self._closing = False
         self._thread: threading.Thread | None = None
+        # In virtual time: since when nobody has waited.
+        self._idle_since = native.now() if native.virtual else math.inf
         _polls.add(self)
         # In virtual time a thread would let time run away: there, `wait` calls it.
         if callback is not None and not native.virtual:
@@ -71,13 +75,13 @@ class Poll(Polling[Key]):
             PortError: The poll belongs to the parent of this process.
         """
         self._not_called_back()
-        self._native.wait(how_many(self, count), seconds(timeout))
+        self._wait(how_many(self, count), seconds(timeout))
         return self.take(count)
 
     def __iter__(self) -> Iterator[Sample]:
         self._not_called_back()
         # One at a time: who leaves the loop leaves the others where they are.
-        while self._native.wait(1, None):
+        while self._wait(1, None):
             yield from self.take(1)
 
     def wait(self, timeout: float | None = None) -> bool:
@@ -95,7 +99,7 @@ class Poll(Polling[Key]):
             self._deliver(limit)
         else:
             # More than are ever kept: only the end of the poll ends this.
-            self._native.wait(MOST_SAMPLES + 1, limit)
+            self._wait(MOST_SAMPLES + 1, limit)
         self._raise()
         return self.closed
 
@@ -104,6 +108,9 @@ class Poll(Polling[Key]):
 
         A callback that is under way is waited for, unless it is the one that calls this. Closing again does nothing.
         """
+        if not self._closing and not self.cycles and (due := never_run(self)):
+            text = f"a poll in virtual time goes on only while somebody waits: {due} due and never run; call `wait`"
+            warnings.warn(text, DrivebusWarning, stacklevel=level_of_the_program())
         self._closing = True
         self._native.close()
         if self._thread is not None and self._thread is not threading.current_thread():
@@ -119,6 +126,12 @@ class Poll(Polling[Key]):
         if error is None:
             self._raise()
 
+    def _wait(self, count: int, timeout: float | None) -> int:
+        there = self._native.wait(count, timeout)
+        if self._bus.virtual:
+            self._idle_since = self._bus.now()
+        return there
+
     def _not_called_back(self) -> None:
         if self._callback is not None:
             raise NotAllowed("this poll gives its samples to its callback; make another one to take them yourself")
@@ -130,7 +143,7 @@ class Poll(Polling[Key]):
         try:
             while not self._closing:
                 left = None if timeout is None else max(deadline - self._bus.now(), 0.0)
-                if not self._native.wait(1, left):
+                if not self._wait(1, left):
                     return
                 for sample in self.take():
                     if self._closing:
@@ -144,6 +157,18 @@ class Poll(Polling[Key]):
         error, self._error = self._error, None
         if error is not None:
             raise error
+
+
+def never_run(polling: Poll[Any]) -> str:
+    """The cycles that were due on a line in virtual time while nobody waited, in words; empty where none was."""
+    idle = polling._bus.now() - polling._idle_since
+    if polling.closed or idle <= 0:
+        return ""
+    if polling.interval is None:
+        return "its cycles were"
+    # The first is due at once.
+    count = int(idle / polling.interval) + (polling.cycles == 0)
+    return f"{checks.counted(count, 'cycle')} {'was' if count == 1 else 'were'}" if count else ""
 
 
 _polls: weakref.WeakSet[Poll[Any]] = weakref.WeakSet()

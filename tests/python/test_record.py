@@ -11,6 +11,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -365,3 +366,45 @@ def test_no_gap_is_said_only_if_no_sample_was_too_late(tmp_path: Path, monkeypat
     done = CliRunner().invoke(cli, [*words[:3], path, *words[3:]], prog_name="drivebus")
     assert (done.exit_code, "no gap" in done.stdout) == (0, False), done.output
     assert "3 came too late" in " ".join(done.stderr.split())
+
+
+def test_what_was_due_in_virtual_time_and_never_ran_is_told(tmp_path: Path) -> None:
+    """Time moves there by other calls, and nobody waits for the recorder."""
+    path = tmp_path / "run.csv"
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        recorder = drivebus.Recorder(path, {bus.drive(1): ["output_current"]}, interval=0.1)
+        assert bus.simulator is not None
+        bus.simulator.advance(1.05)
+        with pytest.warns(
+            drivebus.DrivebusWarning, match="only while somebody waits: 11 cycles were due and never run"
+        ):
+            recorder.close()
+        assert "0 rows, 0 samples missing, 0 too late, 11 cycles were due and never run" in path.read_text()
+
+
+def test_what_was_due_after_the_last_wait_stands_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        recorder = drivebus.Recorder(path, {bus.drive(1): ["output_current"]}, interval=0.1)
+        recorder.wait(1.0)
+        assert bus.simulator is not None
+        bus.simulator.advance(0.35)
+        recorder.close()
+        assert recorder.rows > 0
+        assert ", 3 cycles were due and never run" in path.read_text()
+
+
+def test_a_poll_in_virtual_time_that_never_ran_says_so() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        wanted = {bus.drive(1): ["output_current"]}
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            bus.poll(wanted, 0.1).close()
+            with bus.poll(wanted, 0.1) as poll:
+                poll.batch(3)
+                bus.read(1, 0x2100)
+        poll = bus.poll(wanted)
+        bus.read(1, 0x2100)
+        with pytest.warns(drivebus.DrivebusWarning, match="its cycles were due and never run; call `wait`"):
+            poll.close()
+        poll.close()

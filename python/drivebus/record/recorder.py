@@ -18,7 +18,7 @@ from drivebus.bus import Bus
 from drivebus.drive import Drive
 from drivebus.errors import DrivebusWarning, NotAllowed
 from drivebus.line.samples import Names, Sample
-from drivebus.poll import Poll
+from drivebus.poll import Poll, never_run
 from drivebus.record.events import Witness
 from drivebus.record.files import format_of
 from drivebus.record.series import Series
@@ -51,7 +51,8 @@ class Recorder:
     which is looked at once a second, a warning says so at once, and a new file goes on at its path, or at `run-2.csv`
     where something else stands there now, with all its rows as far as they can still be read.
 
-    On a line in virtual time nothing is recorded by itself: `wait` lets time move.
+    On a line in virtual time nothing is recorded by itself: `wait` lets time move. What was due meanwhile and never
+    ran, the `end` tells.
 
     Args:
         path: The file.
@@ -104,6 +105,7 @@ class Recorder:
         table = Table(list(recorded.values()), interval, _native.__version__)
         self._witnesses = {drive: Witness(known, table) for drive, known in recorded.items()}
         self.gaps = 0
+        self._never_run = ""
         self._over = threading.Event()
         self._lock = threading.Lock()
         by_bus: dict[Bus, dict[Drive, list[str]]] = {}
@@ -192,6 +194,8 @@ class Recorder:
             OSError: The last rows cannot be written, or the file is gone and cannot be begun anew. The error says how
                 many rows are lost.
         """
+        if not self.closed:
+            self._never_run = ", ".join(filter(None, map(never_run, self._polls)))
         for poll in self._polls:
             poll.close()
         self._over.set()
@@ -237,7 +241,8 @@ class Recorder:
             self._series.add(rows)
 
     def _counted(self) -> str:
-        return f"{self.rows} rows, {self.missing} samples missing, {self.late} too late"
+        never = f", {self._never_run} due and never run" if self._never_run else ""
+        return f"{self.rows} rows, {self.missing} samples missing, {self.late} too late{never}"
 
     def _give_up(self) -> None:
         """No drive is polled: the file that was begun goes."""
