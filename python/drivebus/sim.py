@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import TypeVar
 
@@ -34,6 +35,9 @@ _SERVED_BY = {"pty": "by a pseudo-terminal", "tcp": "over TCP", "process": "in t
 
 _ASKED = ("anything", "reads", "writes")
 """What a drive can be told to refuse."""
+
+_LINE = "line"
+"""What the link to a simulator's pseudo-terminal is called, in a folder of its own."""
 
 _T = TypeVar("_T")
 
@@ -241,7 +245,7 @@ class Simulator:
         seed: As above: the same seed, arguments and requests give the same run in virtual time.
     """
 
-    __slots__ = ("_native", "_profiles", "format", "seed", "transport")
+    __slots__ = ("__weakref__", "_folder", "_link", "_native", "_profiles", "format", "seed", "transport")
 
     def __init__(
         self,
@@ -283,6 +287,9 @@ class Simulator:
         self.format = SerialFormat(baudrate, parity, stopbits, bytesize, silence)
         self.seed = checks.whole("seed", seed, 0, 2**64 - 1)
         fifo = checks.whole("fifo", fifo, 1, 256)
+        # A bus that is made from this finds it again when its pseudo-terminal has another number.
+        self._folder = _folder(self) if link is None and transport in ("auto", "pty") else None
+        lasting = link if self._folder is None else f"{self._folder}/{_LINE}"
 
         def served(by: str) -> _native.Simulator:
             return _native.Simulator(
@@ -292,7 +299,7 @@ class Simulator:
                 transport=by,
                 realtime=clock == "real",
                 strict_silence=strict_silence,
-                link=link,
+                link=lasting if by == "pty" else None,
                 fifo=fifo,
                 ear=ear is True,
                 ear_link=ear_link,
@@ -300,6 +307,7 @@ class Simulator:
 
         anything = SERVED if link is None else ("pty",)
         self.transport, self._native = first_served(anything if transport == "auto" else (transport,), served)
+        self._link = lasting if self.transport == "pty" else None
         self.line.set_faults(**rates)
         self.line.echo = echo
 
@@ -339,6 +347,8 @@ class Simulator:
     def close(self) -> None:
         """Ends the simulation. Closing again does nothing."""
         self._native.close()
+        if self._folder is not None:
+            _remove(self._folder, os.getpid())
 
     def __enter__(self) -> Simulator:
         return self
@@ -377,6 +387,34 @@ def first_served(transports: Sequence[str], served: Callable[[str], _T]) -> tupl
 def core_of(simulator: Simulator) -> _native.Simulator:
     """What serves the line, in the core."""
     return simulator._native
+
+
+def lasting_port(simulator: Simulator) -> str:
+    """What to open, now and after each `line.replug()`: its port, or a link that is kept leading there."""
+    return simulator.port if simulator._link is None else simulator._link
+
+
+def _folder(simulator: Simulator) -> str | None:
+    """A folder for the link of *simulator*, which goes with it; None where there can be none."""
+    # Imported here: not every program makes a simulator.
+    import tempfile
+    import weakref
+
+    try:
+        folder = tempfile.mkdtemp(prefix="drivebus-sim-")
+    except OSError:
+        return None
+    weakref.finalize(simulator, _remove, folder, os.getpid())
+    return folder
+
+
+def _remove(folder: str, made_by: int) -> None:
+    """Removes *folder*, unless a forked child of the process that made it does."""
+    if os.getpid() == made_by:
+        with suppress(OSError):
+            os.unlink(f"{folder}/{_LINE}")  # noqa: PTH108 - pathlib would be loaded for every stop
+        with suppress(OSError):
+            os.rmdir(folder)  # noqa: PTH106
 
 
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:

@@ -141,3 +141,15 @@ def test_a_serial_server_that_comes_back() -> None:
 def test_who_has_a_busy_port_is_named(simulator: Simulator) -> None:
     with Bus(simulator.port), pytest.raises(PortError, match=r"this program has it open already: .*process \d+"):
         Bus(simulator.port, share="never")
+
+
+def test_a_bus_made_from_a_simulator_follows_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("DRIVEBUS_SERIAL_BY_ID", str(tmp_path / "nothing here"))
+    with Simulator({1: "gd350"}, transport="pty") as simulator, Bus(simulator) as bus:
+        for _ in range(3):
+            assert bus.read(1, IDENTIFICATION) == EXPECTED[IDENTIFICATION]
+            simulator.line.unplug()
+            with pytest.raises(PortError):
+                bus.read(1, IDENTIFICATION)
+            simulator.line.replug()
+        assert bus.read(1, IDENTIFICATION) == EXPECTED[IDENTIFICATION]

@@ -13,7 +13,7 @@ from drivebus.line import ports
 from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
 from drivebus.line.units import Units
-from drivebus.sim import Simulator, core_of
+from drivebus.sim import Simulator, core_of, lasting_port
 
 if TYPE_CHECKING:
     from drivebus.line.wire_file import WireFile
@@ -75,7 +75,7 @@ class Opening:
         self.simulator = target if isinstance(target, Simulator) else None
         self.owned = target if target is not port and not isinstance(target, str) else None
         if isinstance(target, Simulator):
-            target = core_of(target) if target.transport == "process" else target.port
+            target = core_of(target) if target.transport == "process" else lasting_port(target)
         self.target = target
         self.known = Units()
         self.shown = str(port)
