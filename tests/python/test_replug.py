@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import itertools
+import os
+import struct
 import sys
 import threading
 from collections.abc import Iterator
@@ -14,6 +16,9 @@ import pytest
 from drivebus import Bus, PortError, Simulator
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="adapters are known on Linux only")
+if sys.platform != "win32":
+    import fcntl
+    import termios
 
 IDENTIFICATION, STATE, SETTINGS = 0x2103, 0x2100, 0x0E00
 # What a drive that stands has there: its family, "stopped", its address and 19200 bit/s. No two alike.
@@ -153,3 +158,29 @@ def test_a_bus_made_from_a_simulator_follows_it(monkeypatch: pytest.MonkeyPatch,
                 bus.read(1, IDENTIFICATION)
             simulator.line.replug()
         assert bus.read(1, IDENTIFICATION) == EXPECTED[IDENTIFICATION]
+
+
+def test_a_pseudo_terminal_is_not_opened_again_by_its_number_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its number is given to whoever opens the next one."""
+    monkeypatch.setenv("DRIVEBUS_SERIAL_BY_ID", str(tmp_path / "nothing here"))
+    with Simulator({1: "gd350"}, transport="pty") as simulator, Bus(simulator.port) as bus:
+        name = simulator.port
+        assert bus.read(1, IDENTIFICATION) == EXPECTED[IDENTIFICATION]
+        simulator.line.unplug()
+        with pytest.raises(PortError):
+            bus.read(1, IDENTIFICATION)
+        simulator.close()
+        ends: list[int] = []
+        try:
+            # The lowest number that is free; other programs may take some.
+            while not ends or (os.ttyname(ends[-1]) != name and len(ends) < 64):
+                ends += os.openpty()
+            assert os.ttyname(ends[-1]) == name
+            with pytest.raises(PortError, match="it was a pseudo-terminal, and another one has its number now"):
+                bus.read(1, IDENTIFICATION)
+            assert struct.unpack("i", fcntl.ioctl(ends[-2], termios.FIONREAD, b"\0" * 4))[0] == 0
+        finally:
+            for end in ends:
+                os.close(end)

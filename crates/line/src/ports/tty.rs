@@ -176,6 +176,11 @@ impl Tty {
         system::device_number(&self.port)
     }
 
+    /// Whether it is the user's side of a pseudo-terminal.
+    pub(crate) fn is_pseudo_terminal(&self) -> bool {
+        system::is_pseudo_terminal(&self.port, &self.name)
+    }
+
     fn lost(&self, error: &io::Error) -> PortError {
         let message = format!(
             "the port is gone ({error}); plug the adapter in again; a bus opens the port again at its next call"

@@ -21,12 +21,14 @@ pub struct Adapter {
     places: Places,
     /// `None` as long as it was not opened, and for a port of which nothing but its name is known.
     known: Option<Identity>,
+    /// When it was made: of a pseudo-terminal that was opened by its number, which is given to others once it is gone.
+    made: Option<Made>,
 }
 
 impl Adapter {
     /// The adapter whose port is `name` when it is opened first.
     pub fn new(name: impl Into<String>, format: SerialFormat, options: TtyOptions) -> Self {
-        Self { name: name.into(), format, options, places: Places::default(), known: None }
+        Self { name: name.into(), format, options, places: Places::default(), known: None, made: None }
     }
 
     /// Looks up adapters in `places`, not in those of this machine.
@@ -36,13 +38,19 @@ impl Adapter {
     }
 
     /// Opens the port: at first the one with the name that was given, later the same adapter's, whatever its name is
-    /// now. Where nothing but its name is known of an adapter, the name is opened again, as a link perhaps elsewhere.
+    /// now. Where nothing but its name is known of an adapter, the name is opened again, as a link perhaps elsewhere; but
+    /// not the number of a pseudo-terminal that is another one by now.
     ///
     /// # Errors
     ///
     /// Those of [`Tty::open`]. [`PortErrorKind::NotFound`]: the adapter is not plugged in, also when another one has its
     /// name now, which is then left alone.
     pub fn open(&mut self) -> Result<Tty, PortError> {
+        if self.made.is_some_and(|made| made_at(&self.name).is_some_and(|now| now != made)) {
+            let message = "it was a pseudo-terminal, and another one has its number now, so it was not opened: make a \
+                           new bus, or give a link that is kept leading to it";
+            return Err(PortError::new(PortErrorKind::NotFound, &self.name, message));
+        }
         let name = match &self.known {
             Some(known) => self.whereabouts(known)?,
             None => self.name.clone(),
@@ -60,6 +68,8 @@ impl Adapter {
             }
             (None, found) => found,
         };
+        let is_bare = self.known.is_none() && tty.is_pseudo_terminal();
+        self.made = if is_bare { made_at(&self.name) } else { None };
         Ok(tty)
     }
 
@@ -95,6 +105,25 @@ impl Adapter {
         };
         PortError::new(PortErrorKind::NotFound, &self.name, message)
     }
+}
+
+/// Seconds and nanoseconds.
+type Made = (i64, i64);
+
+/// When what has this `name` was made, which a pseudo-terminal shows by when its owner or rights were set last; `None`
+/// for a link, which may lead to something new on purpose.
+#[cfg(unix)]
+fn made_at(name: &str) -> Option<Made> {
+    use std::os::unix::fs::MetadataExt;
+
+    let status = std::fs::symlink_metadata(name).ok().filter(|status| !status.is_symlink())?;
+    Some((status.ctime(), status.ctime_nsec()))
+}
+
+/// Nothing: there are no pseudo-terminals.
+#[cfg(not(unix))]
+fn made_at(_name: &str) -> Option<Made> {
+    None
 }
 
 /// `error` of opening a port again: its user could open it before, so it is not the user who lacks a right.
