@@ -529,7 +529,8 @@ class Profile:
     def control(self) -> list[dict[str, Any]]:
         """What must be set before the drive obeys the bus, in order.
 
-        Keys of each: `code`, `value`, `label`, `verified`, `note`, `source`.
+        Keys of each: `code`, `value`, `label`, `always` (asked before each start), `by_hand` (not set by
+        `prepare_control`), `verified`, `note`, `source`.
         """
     def setpoint_names(self) -> list[str]: ...
     def needs(self, setpoint: str, /) -> list[dict[str, Any]]:

@@ -150,7 +150,7 @@ static BUILTINS: [Builtin; 25] = [
     builtin!("gd10": "registers.csv" "faults.csv"),
     builtin!("gd20": "registers.csv" "parameters.csv"),
     builtin!("gd100": "registers.csv" "parameters.csv"),
-    builtin!("gd200a": "registers.csv" "parameters.csv"),
+    builtin!("gd200a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd600": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd600-rectifier": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd3000": "registers.csv" "parameters.csv" "faults.csv"),

@@ -201,7 +201,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gd10", 81),
         ("gd100", 94),
         ("gd20", 92),
-        ("gd200a", 94),
+        ("gd200a", 96),
         ("gd300", 97),
         ("gd3000", 19),
         ("gd3000-rectifier", 6),

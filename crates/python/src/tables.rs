@@ -155,6 +155,8 @@ pub(crate) fn items<'py>(py: Python<'py>, profile: &Profile, rows: &[Control]) -
         dict.set_item("code", &row.code)?;
         dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
         dict.set_item("label", &row.label)?;
+        dict.set_item("always", row.always)?;
+        dict.set_item("by_hand", row.by_hand)?;
         dict.set_item("verified", row.verified)?;
         dict.set_item("note", &row.note)?;
         dict.set_item("source", &row.source)?;

@@ -15,7 +15,7 @@ from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Control, ControlItem
 
-__all__ = ["check_control", "check_heeded", "check_set", "prepare_control", "wanted_for", "wanted_of_commands"]
+__all__ = ["check_control", "check_heeded", "check_set", "prepare_control", "wanted_always", "wanted_for", "wanted_of_commands"]
 
 
 async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: bool = False) -> Control:
@@ -55,9 +55,17 @@ async def prepare_control(
     unit = unit.trusting(unverified)
     wanted = wanted_for(unit, setpoint)
     needed = {}
-    for item in await _check_items(unit, wanted):
+    for row, item in zip(wanted, await _check_items(unit, wanted), strict=True):
         if item.ok and not (store and sending.is_in_ram(unit, item.code)):
             continue
+        if item.actual is not None and row["by_hand"]:
+            raise NotAllowed(
+                f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
+                f"({item.label}). prepare_control() does not set it: {item.note} Nothing was written. If that is meant, "
+                f'write("{item.code}", {int(item.wanted)}, store=True) (`drivebus write {item.code} '
+                f"{int(item.wanted)} --store`) comes first",
+                unit=unit.address,
+            )
         if item.actual is None or not (item.verified or unit.unverified):
             what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"
             raise not_verified(what, item.note, unit.address)
@@ -105,6 +113,11 @@ def wanted_of_commands(unit: Unit) -> list[dict[str, Any]]:
     names = unit.profile.setpoint_names()
     of_setpoints = {row["code"] for name in names for row in unit.profile.needs(name)}
     return [row for row in unit.profile.control() if row["code"] not in of_setpoints]
+
+
+def wanted_always(unit: Unit) -> list[dict[str, Any]]:
+    """What must be set in any case, or the words of the profile are not where it has them."""
+    return [row for row in unit.profile.control() if row["always"]]
 
 
 def wanted_for(unit: Unit, setpoint: str | None) -> list[dict[str, Any]]:

@@ -61,6 +61,7 @@ async def prove_link(unit: Unit, force: bool) -> None:
 
 async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
     """How the drive stands. Raises `NotAllowed` where it would not start, or not obey the bus (*by_bus*)."""
+    await control.check_set(unit, control.wanted_always(unit), "has its words elsewhere")
     seen = await state.glance(unit)
     if seen.tripped:
         raise NotAllowed(
@@ -79,7 +80,8 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
             unit=unit.address,
         )
     if by_bus and seen.source is None:
-        await control.check_set(unit, control.wanted_of_commands(unit), "does not take its commands from the bus")
+        left = [row for row in control.wanted_of_commands(unit) if not row["always"]]
+        await control.check_set(unit, left, "does not take its commands from the bus")
     return seen
 
 

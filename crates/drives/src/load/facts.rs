@@ -137,6 +137,8 @@ pub(super) fn control(
             code: entry.name.clone(),
             raw,
             label: row.label.clone(),
+            always: row.always,
+            by_hand: row.by_hand,
             verified: row.verified,
             note: row.note.clone(),
             source: row.source.clone(),

@@ -14,6 +14,9 @@ use crate::text::closest;
 const TABLES: [&str; 10] =
     ["commands", "state", "control", "setpoints", "variants", "memory", "requests", "serial", "watchdog", "faults"];
 
+/// What stands among the rows to drop for the whole list of faults.
+const FAULTS: &str = "faults";
+
 /// `base` as the one who writes `manifest` sees it: without what is dropped, and, for a sister family, with the evidence
 /// that the assumption leaves.
 pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems: &mut Problems) -> Profile {
@@ -29,6 +32,10 @@ pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems
 
 fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], problems: &mut Problems) {
     for name in dropped {
+        if name.get_ref() == FAULTS {
+            base.faults.clear();
+            continue;
+        }
         base.groups.dropped.extend(base.entry(name.get_ref()).map(|entry| entry.name.clone()));
         if problems.is_full() {
             return;

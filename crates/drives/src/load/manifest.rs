@@ -36,7 +36,7 @@ pub(super) struct Manifest {
     pub(super) source: String,
     pub(super) extends: Option<Placed<Extends>>,
     pub(super) overlay: Option<Placed<Overlay>>,
-    /// Names and codes of the profile below that this drive does not have.
+    /// Names and codes of the profile below that this drive does not have; `faults` is the whole list of them.
     #[serde(default)]
     pub(super) drop: Vec<Placed<String>>,
     pub(super) serial: Option<Serial>,

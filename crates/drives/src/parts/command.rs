@@ -126,6 +126,11 @@ pub struct Control {
     pub raw: u16,
     /// What this value means.
     pub label: String,
+    /// Whether it is asked before each start, also where the drive says itself that it obeys the bus: with another value
+    /// the words of the profile are not where it has them.
+    pub always: bool,
+    /// Whether setting it does more than make the drive obey the bus: it is left to who asks for it by its name.
+    pub by_hand: bool,
     /// Whether a document of this family prints the value; else it is assumed.
     pub verified: bool,
     /// What to know about it; may be empty.

@@ -167,6 +167,12 @@ pub(in crate::load) struct Control {
     pub(in crate::load) value: i64,
     /// What that means.
     pub(in crate::load) label: String,
+    /// Whether it is asked before each start, also where the drive says itself that it obeys the bus.
+    #[serde(default)]
+    pub(in crate::load) always: bool,
+    /// Whether setting it does more than make the drive obey, so that `prepare` leaves it to who asks for it by name.
+    #[serde(default)]
+    pub(in crate::load) by_hand: bool,
     /// Whether a document of this very family prints it.
     pub(in crate::load) verified: bool,
     /// What to know about it; where it is not verified, why.

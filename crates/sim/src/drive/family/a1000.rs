@@ -89,6 +89,7 @@ const REGISTERS: &[Register] = &[
     Register::read(0x003F, Shows::Measured(Measure::Frequency, 200.0)),
     Register::read(0x004B, Shows::bits(STATUS_1)),
     Register::read(0x007F, Shows::Zero),
+    Register::read(0x0080, Shows::Zero),
     Register::read(0x00AC, Shows::Measured(Measure::Speed, 1.0)),
 ];
 

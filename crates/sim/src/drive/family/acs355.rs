@@ -75,6 +75,7 @@ const REGISTERS: &[Register] = &[
     Register::read(101, Shows::Measured(Measure::Speed, 1.0)),
     Register::read(102, Shows::Measured(Measure::Frequency, 10.0)),
     Register::read(103, Shows::Measured(Measure::Current, 10.0)),
+    Register::read(400, Shows::Zero),
 ];
 
 const PARAMETERS: &[Parameter] = &[

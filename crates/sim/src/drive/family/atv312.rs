@@ -1,20 +1,19 @@
 //! Schneider Altivar 312: led through the states of CiA 402 by the bits of CMD (8501), which ETA (3201) shows.
 //!
-//! Registers as programs that name the manual BBV51701 have them (dmatscheko/modbus_connect); the words and the states behind them
-//! as nobrega8/mbmap-library has them of the Altivar 12 manual BBV28590: 06H, 07H and then 0FH; ETA shows 0050H, 0031H, 0033H and
-//! 0037H. 080FH runs in reverse.
+//! From the manuals of the maker (Schneider BBV51701, pp. 10 to 39, and BBV52816): 06H, 07H and then 0FH; ETA shows 0240H, 0221H, 0223H
+//! and 0227H. 080FH runs in reverse. 06H and 00H take the voltage off a motor that runs, 07H brings it down its ramp. ACC and dEC are
+//! 3.0 s from the factory, and count from 0 to FrS.
 //!
-//! - Assumption: 06H and 00H take the voltage off a motor that runs, 07H brings it down its ramp; 80H resets a fault, whatever
-//!   the word before it. A fault and its reset lead back to the beginning.
-//! - Assumption: CMD takes these words only, and 04H (quick stop) is none of them. Other words are out of range.
+//! - Assumption: somebody has set LAC to L3 at its keypad, and SLL to 0, so that a silent bus does nothing; from the factory they are
+//!   0 (L1) and 1. What L1 and L2 change is not done here.
+//! - Assumption: 80H resets a fault, whatever the word before it. A fault and its reset lead back to the beginning.
+//! - Assumption: CMD takes these words only, and 02H (quick stop) is none of them. Other words are out of range.
 //! - Assumption: it obeys the bus while Fr1 is 164, and is at AI1 from the factory: the setpoint is then that of the keypad.
-//! - Assumption: 50.0 Hz is the highest frequency from the factory and 500.0 Hz the end of its range; ACC and dEC are 3.0 s.
-//! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H.
-//! - Assumption: a silent bus is not watched here: no value of ttO that switches it off is at hand.
+//! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad.
 
 use super::{
-    Bit, Bounds, Family, Faults, Handshake, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows,
-    Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Bit, Bounds, Family, Faults, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles,
+    Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -23,6 +22,9 @@ const COMMAND: u32 = 8501;
 const MAX_FREQUENCY: u16 = 3103;
 const HIGH_SPEED: u16 = 3104;
 const SETPOINT_SOURCE: u16 = 8413;
+const ACCESS_LEVEL: u16 = 3006;
+const TIMEOUT: u16 = 6005;
+const ON_SILENCE: u16 = 7010;
 const ACCELERATION: u16 = 9001;
 const DECELERATION: u16 = 9002;
 /// In Fr1.
@@ -47,18 +49,23 @@ pub(crate) fn atv312() -> Family {
         factory: &[],
         capped: &[],
         roles: Roles {
-            obeys: vec![(SETPOINT_SOURCE, MODBUS)],
+            obeys: vec![(ACCESS_LEVEL, 2), (SETPOINT_SOURCE, MODBUS)],
             speed: Some(Speed { register: 8502, unit: None, usual: SPEED }),
             max_frequency: Some(Scaled::tenths(MAX_FREQUENCY)),
             upper_frequency: Some(Scaled::tenths(HIGH_SPEED)),
             acceleration: Some(Scaled::tenths(ACCELERATION)),
             deceleration: Some(Scaled::tenths(DECELERATION)),
-            handshake: Some(Handshake { idle: 0x0050, words: vec![(0x06, 0x0031), (0x07, 0x0033)] }),
+            bus_timeout: Some(Scaled::tenths(TIMEOUT)),
+            on_silence: Some(Silence {
+                parameter: ON_SILENCE,
+                words: vec![(1, OnSilence::Trip), (6, OnSilence::Stop)],
+            }),
+            handshake: Some(Handshake { idle: 0x0240, words: vec![(0x06, 0x0221), (0x07, 0x0223)] }),
             ..Roles::NONE
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,
-        faults: Faults { overload: Some(0x1000), silent_bus: None },
+        faults: Faults { overload: Some(0x1000), silent_bus: Some(0x7510) },
     }
 }
 
@@ -76,7 +83,7 @@ const COMMANDS: &[(u16, Command)] = &[
 ];
 
 const REGISTERS: &[Register] = &[
-    Register::read(3201, Shows::State([0x0037, 0x8037, 0x0050, 0x0008], std::borrow::Cow::Borrowed(&[]))),
+    Register::read(3201, Shows::State([0x0227, 0x8227, 0x0240, 0x0208], std::borrow::Cow::Borrowed(&[]))),
     Register::read(3202, Shows::Measured(Measure::SignedFrequency, 10.0)),
     Register::read(3203, Shows::Measured(Measure::Setpoint, 10.0)),
     Register::read(3204, Shows::Measured(Measure::Current, 10.0)),
@@ -89,11 +96,15 @@ const REGISTERS: &[Register] = &[
     Register::read(7121, Shows::Zero),
     Register::set(8501, Range::Words(0, u16::MAX)),
     Register::set(8502, Range::Speed),
+    Register::read(8504, Shows::Zero),
     Register::read(8606, Shows::Fault),
     Register::read(9630, Shows::Zero),
 ];
 
 const PARAMETERS: &[Parameter] = &[
+    Parameter::new(ACCESS_LEVEL, 0, 2, 2).at_standstill(),
+    Parameter::new(TIMEOUT, 1, 100, 100).at_standstill(),
+    Parameter::new(ON_SILENCE, 0, 7, 0).at_standstill(),
     Parameter::new(MAX_FREQUENCY, 100, 5_000, 600).at_standstill(),
     Parameter::new(HIGH_SPEED, 0, 5_000, 500).not_above(MAX_FREQUENCY),
     Parameter::new(SETPOINT_SOURCE, 1, 167, 1).at_standstill(),

@@ -78,6 +78,7 @@ const REGISTERS: &[Register] = &[
     Register::read(0x100C, Shows::Zero),
     Register::write_only(0x2000, Range::Words(1, 10)),
     Register::set(0x2001, Range::Speed),
+    Register::write_only(0x2002, Range::Words(0, u16::MAX)),
     Register::read(0x2100, Shows::state([1, 2, 3, 4])),
     Register::read(0x2180, Shows::Fault),
 ];

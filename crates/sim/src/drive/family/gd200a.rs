@@ -1,7 +1,9 @@
 //! Goodrive10, 20, 100 and 200A, the older class: as Goodrive350, with what their own manuals print otherwise.
 //!
 //! Printed: 2000H and its codes for all four (GD10, p. 88; GD20-EU, p. 141; GD100, p. 167, which lets it be written only;
-//! GD200A, p. 146), 2103H, and the word that each of them shows there (GD10, p. 90; GD20, p. 140; GD200A V2.6, p. 147).
+//! GD200A, pp. 139 and 146), 2103H, and the word that each of them shows there (GD10, p. 90; GD20, p. 140; GD200A V2.6, p. 147).
+//! The whole manual of Goodrive200A is at hand (Operation Manual Goodrive200A): 3002H counts whole volts there, 300FH and 3011H are
+//! reserved, P00.03 ends at 400.00 Hz.
 //! Bit 0 of 2101H tells whether the bus has its voltage (GD10, p. 88; GD200A, p. 147). 200AH goes up to 1FFH there.
 //!
 //! - Assumption: of Goodrive100 2103H reads as 010BH, which the manuals of its sisters print. Its own (p. 171) prints 0110H,
@@ -14,13 +16,15 @@
 //! - Assumption: all else that their manuals at hand do not show is as in Goodrive350. Goodrive20 has no P00.02 (its p. 140
 //!   asks for P00.01 alone).
 
-use super::{Bit, Family, Range, Register, Roles, Shows, gd350};
+use super::{Bit, Family, Measure, Range, Register, Roles, Shows, gd350};
 
 pub(crate) fn gd200a() -> Family {
+    let registers =
+        [gd350::CONTROL, gd350::STATE, gd350::MONITOR, CLASS, MOTORS, TO_400_HZ, TORQUE_OR_SPEED, WHOLE_VOLTS].concat();
     Family {
         name: "gd200a".into(),
         identification: 0x0107,
-        registers: [gd350::CONTROL, gd350::STATE, gd350::MONITOR, CLASS, MOTORS, TO_600_HZ, TORQUE_OR_SPEED].concat(),
+        registers: without(registers, &[0x300F, 0x3011]),
         ..gd350::gd350()
     }
 }
@@ -72,7 +76,14 @@ const MOTORS: &[Register] = &[Register::read(
     Shows::bits(&[Bit::Always(1), Bit::Motor(1, 0x2009), Bit::OverloadAlarm(4), Bit::Channel(5)]),
 )];
 
-/// P00.03 ends at 600.00 Hz: GD20-EU, p. 140; GD200A, p. 153.
+/// GD200A, p. 35: P00.03 ends at 400.00 Hz.
+const TO_400_HZ: &[Register] = &[
+    Register::set(0x2001, Range::UpTo(40_000, gd350::MAX_FREQUENCY)),
+    Register::set(0x2005, Range::UpTo(40_000, gd350::MAX_FREQUENCY)),
+    Register::set(0x2006, Range::UpTo(40_000, gd350::MAX_FREQUENCY)),
+];
+
+/// P00.03 ends at 600.00 Hz: GD20-EU, p. 140.
 const TO_600_HZ: &[Register] = &[
     Register::set(0x2001, Range::UpTo(60_000, gd350::MAX_FREQUENCY)),
     Register::set(0x2005, Range::UpTo(60_000, gd350::MAX_FREQUENCY)),
@@ -86,3 +97,6 @@ const SILENT_COMMAND: &[Register] = &[Register::write_only(0x2000, Range::Words(
 
 /// Without a torque setpoint there is none in force.
 const NO_TORQUE: &[Register] = &[Register::read(0x3015, Shows::Zero)];
+
+/// GD200A, p. 141: 0 to 1200 V without a decimal.
+const WHOLE_VOLTS: &[Register] = &[Register::read(0x3002, Shows::Measured(Measure::BusVoltage, 1.0))];

@@ -1,7 +1,7 @@
 //! Siemens SINAMICS V20, over its process data: control word at 0063H (40100), setpoint at 0064H, status word at 006DH.
 //!
 //! The registers up to 001DH are those of its manual's page 112 (easymanua.ls siemens sinamics-v20-series). The bits of both words
-//! are FluidNC's (SiemensV20Protocol.cpp), and those of the G120C manual (p. 235): bit 11 turns the setpoint round, so 047FH
+//! are FluidNC's (SiemensV20.cpp), and those of the G120C manual (p. 235): bit 11 turns the setpoint round, so 047FH
 //! runs forward and 0C7FH in reverse.
 //!
 //! - Assumption: a run is obeyed only behind 047EH (OFF1), which 047CH (OFF2), 04FEH (a reset) and the power take back.
@@ -12,8 +12,8 @@
 //! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
 
 use super::{
-    Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows,
-    Speed, SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
+    Family, Faults, Handshake, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows, Speed,
+    SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -28,7 +28,7 @@ pub(crate) fn v20() -> Family {
         name: "v20".into(),
         kind: Kind::Inverter,
         functions: vec![0x03, 0x06, 0x10],
-        max_words: MAX_WORDS,
+        max_words: 123,
         across_groups: true,
         exception: by_the_specification,
         memory: Memory::EepromOnly,
