@@ -50,6 +50,16 @@ __all__ = [
 def crc16(data: Buffer, /) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
 
+def read_sheet(data: bytes, texts: Sequence[str], /) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The table in *data*: its titles, and each row that holds something with its line, from 1.
+
+    UTF-8, or UTF-16 with its mark; cells divided by commas, semicolons or tabs. A decimal comma becomes a point, but in
+    the columns *texts*. What stands behind the last end of a line is left out.
+
+    Raises:
+        NotAllowed: It is no such text, or a number in it may mean two things; the message has the line.
+    """
+
 def encode_read(unit: int, address: int, count: int) -> bytes:
     """A whole 03H request frame: *unit* 1..=247, *address* 0..=0xFFFF, *count* 1..=125 words."""
 

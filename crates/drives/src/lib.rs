@@ -78,6 +78,7 @@ mod plan;
 mod profile;
 mod quantity;
 mod scale;
+mod sheet;
 mod text;
 mod value;
 
@@ -102,6 +103,7 @@ pub use profile::counts::Counts;
 pub use profile::lookup::NameError;
 pub use profile::read_plan::ReadPlan;
 pub use quantity::Quantity;
+pub use sheet::{Sheet, SheetError, decode, whole_lines};
 pub use value::{Input, Limits, Value, ValueError};
 
 /// The examples of the README are tests.

@@ -33,6 +33,7 @@ use manifest::Manifest;
 use problems::Problems;
 
 use crate::profile::Profile;
+use crate::sheet::decode;
 use crate::text::closest;
 
 /// The files of a profile.
@@ -101,9 +102,8 @@ struct File {
 }
 
 impl File {
-    /// The text without the mark that some editors put before it.
     fn text(&self) -> &str {
-        self.text.strip_prefix('\u{feff}').unwrap_or(&self.text)
+        &self.text
     }
 
     fn broken(&self, line: u64, reason: impl Into<String>) -> ProfileError {
@@ -217,7 +217,8 @@ impl Profile {
         include_str!("../profiles/profile.schema.json")
     }
 
-    /// Loads the profile in `folder`: `profile.toml`, `registers.csv`, `parameters.csv` and `faults.csv`, all UTF-8.
+    /// Loads the profile in `folder`: `profile.toml`, `registers.csv`, `parameters.csv` and `faults.csv`, UTF-8
+    /// or UTF-16 with its mark.
     ///
     /// # Errors
     ///
@@ -357,13 +358,9 @@ fn read(folder: &Path, name: &str) -> Result<File, ProfileError> {
     if bytes.len() as u64 > MOST_BYTES {
         return Err(unreadable(format!("the file has more than {} MiB", MOST_BYTES >> 20)));
     }
-    match String::from_utf8(bytes) {
-        Ok(text) => Ok(File { name: file, text }),
-        Err(error) => {
-            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-            let line = line_of(valid);
-            Err(ProfileError::Broken { file, line, reason: "not UTF-8; save the file in this encoding".to_owned() })
-        }
+    match decode(&bytes) {
+        Ok(text) => Ok(File { name: file, text: text.into_owned() }),
+        Err(error) => Err(ProfileError::Broken { file, line: error.line, reason: error.reason }),
     }
 }
 

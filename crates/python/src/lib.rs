@@ -22,6 +22,7 @@ mod poll;
 mod profile;
 mod pyserial;
 mod requests;
+mod sheet;
 mod signals;
 mod sim;
 mod sim_line;
@@ -54,6 +55,8 @@ mod _native {
     use crate::profile::{Profile, exception_means};
     #[pymodule_export]
     use crate::requests::{Asked, Requests, open_bus};
+    #[pymodule_export]
+    use crate::sheet::read_sheet;
     #[pymodule_export]
     use crate::sim::{SimulatedDrive, Simulator};
     #[pymodule_export]

@@ -11,6 +11,7 @@ import drivebus
 from drivebus import places
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import exit_code
+from drivebus.line import huanyang
 from drivebus.line.trace import meaning
 from drivebus.sniffer import Exchange, Families
 
@@ -78,8 +79,12 @@ class Lines:
         error = exchange.error
         if exchange.request is None:
             return str(error)
+        if exchange.protocol != "modbus":
+            return _foreign(exchange)
         profile = None if exchange.unit is None else self._families.of(exchange.unit, exchange.request)
         asked = meaning(exchange.request, True, None, profile)
+        if profile is not None and exchange.unit is not None and self._guessed(exchange.unit):
+            asked = asked.replace(f"unit {exchange.unit}", f"unit {exchange.unit} ({profile.name}, guessed)", 1)
         again = f" (again, {exchange.repeated})" if exchange.repeated else ""
         if isinstance(error, drivebus.Refused):
             name = f" {error.name}" if error.name else ""
@@ -100,6 +105,7 @@ class Lines:
             "unit": exchange.unit,
             "profile": exchange.profile,
             "guessed": exchange.unit is not None and exchange.profile is not None and self._guessed(exchange.unit),
+            "protocol": exchange.protocol,
             "request": exchange.request,
             "answer": exchange.answer,
             "gap": exchange.gap,
@@ -119,6 +125,15 @@ class Lines:
 
     def _guessed(self, unit: int) -> bool:
         return self._families.is_guess(unit)
+
+
+def _foreign(exchange: Exchange) -> str:
+    """An exchange in Huanyang's own protocol."""
+    asked = huanyang.words(exchange.request or b"", True)
+    if exchange.answer is None:
+        return asked if exchange.error is None else f"{asked} -> did not answer"
+    told = huanyang.words(exchange.answer, False).removeprefix(f"unit {exchange.unit} ")
+    return f"{asked} -> {told.removesuffix(huanyang.REMARK)}{_after(exchange)}"
 
 
 def _after(exchange: Exchange) -> str:

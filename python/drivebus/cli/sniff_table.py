@@ -12,6 +12,7 @@ from rich.text import Text
 import drivebus
 from drivebus import places
 from drivebus.cli.output import printable
+from drivebus.line import huanyang
 from drivebus.sniffer import Exchange, Families, Figures
 from drivebus.sniffer.figures import RegisterFigures, UnitFigures
 
@@ -76,6 +77,8 @@ class SniffTable:
         family = "all" if not address else "" if profile is None else profile.name
         if profile is not None and self._families.is_guess(address):
             family += "?"
+        if unit.protocol != "modbus":
+            family = huanyang.NAME
         turnaround = unit.turnaround
         bad = [
             Text(str(count), "red" if count else "")
@@ -87,8 +90,10 @@ class SniffTable:
     def _registers(self) -> Iterator[list[str]]:
         for address, unit in sorted(self._figures.units.items()):
             profile = self._families.of(address) if address else None
+            mark = "?" if profile is not None and self._families.is_guess(address) else ""
             for name, register in unit.registers.items():
-                yield [str(address), *_register(name, register, profile)]
+                shown, *rest = _register(name, register, profile)
+                yield [str(address), f"{shown}{mark}" if isinstance(name, str) else shown, *rest]
 
     def _table(self, rows: list[list[str]]) -> Table:
         table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 2, 0, 0))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import places, rtu
 from drivebus.errors import DrivebusError
+from drivebus.line import huanyang
 from drivebus.line.units import Units
 from drivebus.line.write_guard import code_text
 from drivebus.profile import Profile
@@ -112,6 +113,8 @@ def meaning(frame: bytes, sent: bool, asked: bytes | None = None, profile: Profi
     except DrivebusError:
         return "1 byte that is not a frame" if len(frame) == 1 else f"{len(frame)} bytes that are not a frame"
     whom = f"unit {fields.unit}" if fields.unit else "all units"
+    if fields.kind == "other" and huanyang.is_sure(frame):
+        return huanyang.words(frame, sent)
     if sent:
         return f"{whom}: {_request(fields, profile)}"
     if frame == asked and fields.kind == "read":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import sqlite3
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
+from drivebus._native import read_sheet
 from drivebus.errors import NotAllowed
 from drivebus.record.files import format_of
 from drivebus.record.table import FIXED, seconds_of
@@ -141,13 +141,13 @@ _Rows = tuple[list[str], Iterator[Cells]]
 
 def _csv_rows(path: Path, name: str) -> _Rows:
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        titles, rows = read_sheet(path.read_bytes(), FIXED)
+    except (OSError, NotAllowed) as error:
         raise _unread(name, error) from None
-    # What stands behind the last end of a line was cut off.
-    lines = csv.reader(text[: text.rfind("\n") + 1].splitlines(keepends=True))
-    titles = next(lines, [])
-    return titles, ({title: _number(cell) for title, cell in zip(titles, line, strict=False)} for line in lines)
+    for number, cells in rows:
+        if len(cells) > len(titles):
+            raise NotAllowed(f"{name} is not a recording: line {number} has more cells than there are titles")
+    return titles, ({title: _number(cell) for title, cell in zip(titles, cells, strict=False)} for _, cells in rows)
 
 
 def _json_rows(path: Path, name: str) -> _Rows:

@@ -33,6 +33,7 @@ class Exchange:
         profile: The name of the family that its values were read by; None where none is known.
         repeated: How often the same request had been sent before it without an answer.
         lump: Seconds that the adapter kept bytes back, as far as that has shown.
+        protocol: `"modbus"`, or `"huanyang"`: the maker's own one, which has the same CRC.
     """
 
     unit: int | None
@@ -47,6 +48,7 @@ class Exchange:
     profile: str | None = None
     repeated: int = 0
     lump: float = 0.0
+    protocol: str = "modbus"
 
     @property
     def function(self) -> int | None:

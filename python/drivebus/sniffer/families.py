@@ -19,14 +19,20 @@ Given = Mapping[int, "str | os.PathLike[str] | Profile"] | str | os.PathLike[str
 """A profile for each unit, one for all of them, or None: guess."""
 
 _LEAST = 3
-"""Registers that a unit was asked for before a guess is made of them."""
+"""Registers that a unit has answered with before a guess is made of them."""
+_REQUESTS = 2
+"""Different requests that it answered by then: one read of a few words says nothing of a family."""
+_NO_SUCH_ADDRESS = 0x02
+_MOST_WORDS = 16
+"""Different words of one register that are held against a family."""
 
 
 class Families:
     """The families of the units on a line that others use.
 
-    A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed: any
-    that has all registers that it is asked for and does not refuse. Where several have them, names are those on which
+    A unit that is asked for its identification code tells its family. Of one that is not, the family is guessed, from
+    several requests that it answered: any that has all registers that it answers with, can have the values that are in
+    them, and has none that the unit says it has not. Where several are left, names are those on which
     they agree, so a guess stays where the next request brings a register on which they differ. A family that is told by
     what its units answer is guessed only when they were asked for that, if another fits too: makers use the same
     addresses. Where no family has all of them any more, it is taken back; see `withdrawn`.
@@ -46,7 +52,11 @@ class Families:
             self._given = {}
             self._all = None if given is None else Profile.find(given)
         self._told: dict[int, Profile] = {}
+        self._apart: set[int] = set()
         self._asked: dict[int, set[int]] = {}
+        self._requests: dict[int, set[tuple[int, int, int]]] = {}
+        self._words: dict[int, dict[int, set[tuple[int, bool]]]] = {}
+        self._refused: dict[int, set[tuple[int, int]]] = {}
         self._fitting: dict[int, tuple[Profile, ...]] = {}
         self._likely: dict[int, tuple[Profile, ...]] = {}
         self._agreed: dict[tuple[int, int, int], bool] = {}
@@ -55,7 +65,7 @@ class Families:
     def of(self, unit: int, request: bytes | None = None) -> Profile | None:
         """The profile of *unit*, as far as it is known or guessed; a guess only where it tells what *request* means."""
         known = self._given.get(unit) or self._all or self._told.get(unit)
-        if known is not None:
+        if known is not None or unit in self._apart:
             return known
         fitting = self._likely.get(unit, ())
         if not fitting or (request is not None and not self._agree(fitting, request)):
@@ -76,14 +86,40 @@ class Families:
             names = shipped(dict.fromkeys(row["family"] for row in listed_at(address, word) if row["verified"]))
             if len(names) == 1:
                 self._told[unit] = Profile.builtin(names[0])
-        if answer is not None and answer[1] & 0x80:
-            # What it refuses it may not have.
+        if answer is None:
             return
-        asked = self._asked.setdefault(unit, set())
-        new = set(range(first, first + count)) - asked
-        if new:
-            asked |= new
+        new = set(range(first, first + count))
+        if answer[1] & 0x80:
+            # What it refuses it may not have, and of an address it says so.
+            if answer[2] != _NO_SUCH_ADDRESS or (first, count) in self._refused.setdefault(unit, set()):
+                return
+            self._refused[unit].add((first, count))
             self._guess(unit, new)
+            return
+        asked, requests = self._asked.setdefault(unit, set()), self._requests.setdefault(unit, set())
+        words, is_written = written_by(request), True
+        if words is None:
+            words, is_written = carried(answer, request) or [], False
+        seen = self._words.setdefault(unit, {})
+        said = {
+            (address, word)
+            for address, word in enumerate(words[:count], first)
+            if word and (word, is_written) not in seen.setdefault(address, set())
+        }
+        for address, word in said:
+            # So many different words of one register say what can be said.
+            if len(seen[address]) < _MOST_WORDS:
+                seen[address].add((word, is_written))
+        if said or new - asked or (request[1], first, count) not in requests:
+            asked |= new
+            requests.add((request[1], first, count))
+            self._guess(unit, new)
+
+    def set_apart(self, unit: int) -> None:
+        """*unit* speaks no Modbus: it is of no family that is guessed."""
+        self._apart.add(unit)
+        for known in (self._fitting, self._likely):
+            known.pop(unit, None)
 
     def withdrawn(self) -> list[tuple[int, str, int]]:
         """Guesses that were taken back since this was last asked.
@@ -120,11 +156,16 @@ class Families:
 
     def _guess(self, unit: int, new: set[int]) -> None:
         """Says what *unit* may be, which was asked for *new* addresses."""
-        asked, before = self._asked[unit], self._fitting.get(unit)
-        if len(asked) < _LEAST:
+        asked, before = self._asked.get(unit, set()), self._fitting.get(unit)
+        if len(asked) < _LEAST or len(self._requests[unit]) < _REQUESTS or unit in self._apart:
             return
         able = [Profile.builtin(name) for name in profiles()] if before is None else before
-        self._fitting[unit] = fitting = tuple(each for each in able if None not in _meant(each, asked))
+        words, refused = self._words.get(unit, {}), self._refused.get(unit, set())
+        self._fitting[unit] = fitting = tuple(
+            each
+            for each in able
+            if None not in _meant(each, asked) and _can_be(each, words) and not _denied(each, refused)
+        )
         self._likely[unit] = tuple(each for each in fitting if _shows_itself(each, asked)) or fitting
         self._agreed.clear()
         if before and not fitting:
@@ -146,6 +187,34 @@ def _shows_itself(profile: Profile, asked: set[int]) -> bool:
     """Whether nothing else is known by which *profile* is told, or some of that is among what was *asked*."""
     signature = profile.signature()
     return signature is None or not asked.isdisjoint(signature["answers"])
+
+
+def _can_be(profile: Profile, words: Mapping[int, Iterable[tuple[int, bool]]]) -> bool:
+    """Whether a unit of *profile* can have these *words*, by address; each with whether it was written."""
+    return all(
+        _allows(profile, address, word, is_written)
+        for address, seen in words.items()
+        for word, is_written in seen
+    )
+
+
+def _allows(profile: Profile, address: int, word: int, is_written: bool) -> bool:
+    name = profile.name_at(profile.plain_address(address), written=is_written)
+    if name is None:
+        return False
+    row = profile.describe(name)
+    if row.words > 1 or row.variant is not None:
+        return True
+    try:
+        value = float(profile.decode(name, word))
+    except (DrivebusError, TypeError, ValueError):
+        return True
+    return (row.low is None or value >= row.low) and (row.high is None or value <= row.high)
+
+
+def _denied(profile: Profile, refused: Iterable[tuple[int, int]]) -> bool:
+    """Whether a unit said that it has not what *profile* has: spans of addresses, all of them known there."""
+    return any(None not in _meant(profile, range(first, first + count)) for first, count in refused)
 
 
 def _misfit(profile: Profile, addresses: set[int]) -> int:

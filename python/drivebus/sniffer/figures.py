@@ -9,6 +9,7 @@ from statistics import median
 
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.line import huanyang
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.frames import written_by
 from drivebus.values import Value
@@ -63,6 +64,7 @@ class UnitFigures:
         strays: Answers that answer nothing, late ones among them.
         registers: By the name or the address of the register.
         turnarounds: The last of them, in seconds.
+        protocol: What it speaks: `"modbus"` or `"huanyang"`.
     """
 
     requests: int = 0
@@ -74,6 +76,7 @@ class UnitFigures:
     strays: int = 0
     registers: dict[str | int, RegisterFigures] = field(default_factory=dict)
     turnarounds: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    protocol: str = "modbus"
 
     @property
     def turnaround(self) -> float | None:
@@ -132,6 +135,7 @@ class Figures:
         self._count(unit, exchange, exchange.request)
 
     def _count(self, unit: UnitFigures, exchange: Exchange, request: bytes) -> None:
+        unit.protocol = exchange.protocol
         unit.requests += 1
         unit.repeated += exchange.repeated > 0
         unit.answers += exchange.answer is not None
@@ -156,6 +160,12 @@ class Figures:
         asked = sum(unit.requests for unit in self.units.values())
         damaged = sum(unit.damaged for unit in self.units.values())
         for address, unit in sorted(self.units.items()):
+            if unit.protocol == "huanyang":
+                yield (
+                    f"unit {address} speaks {huanyang.NAME}, which has the CRC of Modbus and nothing else of it: no "
+                    "program for Modbus can command it, and it may take what is meant for others on this line for its own"
+                )
+                continue
             if address and unit.requests >= _SOME and not unit.answers and not unit.damaged:
                 yield (
                     f"unit {address} was asked {unit.requests} times and never answered: it is off, has another "

@@ -13,6 +13,7 @@ from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refuse
 from drivebus.profile import Profile
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.families import Families
+from drivebus.sniffer.foreign import Foreign
 
 __all__ = ["Pairing", "exchanges_in"]
 
@@ -49,30 +50,42 @@ class Pairing:
         self._unanswered: bytes = b""
         self._repeated = 0
         self._lump = 0.0
+        self._foreign = Foreign(families, ahead)
 
     def receive(self, at: float, data: bytes) -> Iterator[Exchange]:
         """Takes *data*, handed over at *at* on the line's clock; yields what is decided by then."""
         yield from self._told(self._sniffer.receive(at, data) if data else self._sniffer.poll(at))
         if self._open is not None and at - self._open[3] > _GIVEN_UP:
             yield self._unheard(self._open)
+        yield from self._foreign.settle(at - _GIVEN_UP)
 
     def take(self, pieces: Iterable[_Piece]) -> Iterator[Exchange]:
         """The exchanges in *pieces* that were told apart elsewhere."""
         yield from self._told(pieces)
         if self._open is not None:
             yield self._unheard(self._open, is_last=True)
+        yield from self._foreign.settle()
 
     def finish(self) -> Iterator[Exchange]:
         """The rest: nothing more will come."""
         yield from self._told(self._sniffer.finish())
         if self._open is not None:
             yield self._unheard(self._open, is_last=True)
+        yield from self._foreign.settle()
 
     def _told(self, pieces: Iterable[_Piece]) -> Iterator[Exchange]:
         for piece in pieces:
             role, data, *_ = piece
             if role != "noise":
                 self._lump = max(self._lump, piece[5])
+            before = self._open
+            if self._foreign.takes(piece, before):
+                if before is not None and self._foreign.has(before):
+                    # What was taken for a request of Modbus.
+                    self._open = None
+                    yield from self._foreign.hear(before, self._lump)
+                yield from self._foreign.hear(piece, self._lump)
+                continue
             if role == "request":
                 if self._open is not None:
                     yield self._unheard(self._open)
