@@ -92,15 +92,16 @@ def test_both_on_one_line() -> None:
     modbus = (frame("02 03 30 00 00 01"), frame("02 03 02 13 88"))
     foreign = [(frame(request), frame(answer)) for request, answer, *_ in TALK]
     found = heard([pair for one in foreign for pair in (modbus, one)])
-    assert [(one.unit, one.protocol, one.error) for one in found] == [
-        (2, "modbus", None), (1, "huanyang", None)
-    ] * len(foreign)
+    assert [(one.unit, one.protocol, one.error) for one in found] == [(2, "modbus", None), (1, "huanyang", None)] * len(
+        foreign
+    )
 
 
 def test_a_request_that_nobody_answers_is_told() -> None:
     found = heard([(frame("01 03 01 01"), b""), (frame("01 05 02 13 88"), frame("01 05 02 13 88"))])
     assert [(one.request, str(one.error)) for one in found] == [
-        (frame("01 03 01 01"), "unit 1 did not answer"), (frame("01 05 02 13 88"), "None")
+        (frame("01 03 01 01"), "unit 1 did not answer"),
+        (frame("01 05 02 13 88"), "None"),
     ]
 
 
@@ -111,7 +112,11 @@ def test_decode_names_a_frame_and_a_file(tmp_path: Path) -> None:
         assert said in result.stdout
         assert "Huanyang's own protocol, no Modbus" in result.stdout
     file = tmp_path / "line.txt"
-    lines = [f"{'TX' if at == 0 else 'RX'} {frame(text).hex(' ').upper()}" for pair in TALK for at, text in enumerate(pair[:2])]
+    lines = [
+        f"{'TX' if at == 0 else 'RX'} {frame(text).hex(' ').upper()}"
+        for pair in TALK
+        for at, text in enumerate(pair[:2])
+    ]
     file.write_text("\n".join(lines) + "\n")
     shown = CliRunner().invoke(cli, ["decode", str(file)])
     assert shown.exit_code == 0, shown.output
@@ -119,7 +124,9 @@ def test_decode_names_a_frame_and_a_file(tmp_path: Path) -> None:
         assert asked in shown.stdout
         assert told in shown.stdout
     assert "CRC" not in shown.stdout
-    records = [json.loads(line) for line in CliRunner().invoke(cli, ["--json", "decode", str(file)]).stdout.splitlines()]
+    records = [
+        json.loads(line) for line in CliRunner().invoke(cli, ["--json", "decode", str(file)]).stdout.splitlines()
+    ]
     assert [record["protocol"] for record in records] == ["huanyang"] * len(TALK)
 
 

@@ -143,7 +143,8 @@ def test_a_family_is_told_or_guessed_or_left_open() -> None:
     list(exchanges_in(talk(">01 03 21 03 00 01", "<01 03 02 01 A0"), LINE, told))
     assert (told.of(1), told.is_guess(1)) == (drivebus.Profile.builtin("gd350"), False)
     guessed = Families()
-    list(exchanges_in(talk(">02 03 70 00 00 08", "<02 03 10" + " 00 00" * 8), LINE, guessed))
+    twice = ">02 03 70 00 00 08", "<02 03 10" + " 00 00" * 8, ">02 03 70 01 00 01", "<02 03 02 00 00"
+    list(exchanges_in(talk(*twice), LINE, guessed))
     profile = guessed.of(2)
     assert profile is not None
     assert (profile.name, guessed.is_guess(2)) == ("vfd500", True)
@@ -153,8 +154,53 @@ def test_a_family_is_told_or_guessed_or_left_open() -> None:
     assert dict(exchange.values) == {0x4E20: 1, 0x4E21: 2, 0x4E22: 3, 0x4E23: 4}
 
 
-POLLED = ">01 03 30 00 00 06", "<01 03 0C" + " 00 00" * 6
-"""What six families mean the same by."""
+POLLED = ">01 03 30 00 00 02", "<01 03 04 00 00 00 00"
+"""What all Goodrives mean the same by."""
+BEFORE = ">01 03 30 03 00 03", "<01 03 06" + " 00 00" * 3
+"""Another request: one alone says nothing."""
+
+
+def test_one_read_of_a_few_words_is_nobody_s() -> None:
+    """A thermometer: 24.6 degrees, 63.3 % and a count. No family from one read, however often it comes."""
+    thermometer = ">05 03 00 00 00 03", "<05 03 06 00 F6 02 79 00 0C"
+    families = Families()
+    heard = list(exchanges_in(talk(*thermometer * 3), LINE, families))
+    assert [dict(each.values) for each in heard] == [{0: 0xF6, 1: 0x279, 2: 12}] * 3
+    assert families.of(5) is None
+    # Nor from several: P00.01 of a Goodrive ends at 2, and so on.
+    list(exchanges_in(talk(*thermometer, ">05 03 00 01 00 01", "<05 03 02 02 79", *thermometer), LINE, families))
+    assert families.of(5) is None
+
+
+@pytest.mark.parametrize(
+    ("said", "family"),
+    [
+        # 2100H of a Goodrive is 1 to 6; 3007H of it ends at 250.0 %.
+        (("<01 03 02 00 03", "<01 03 02 00 00"), "gd350"),
+        (("<01 03 02 00 07", "<01 03 02 00 00"), None),
+        (("<01 03 02 00 03", "<01 03 02 40 00"), None),
+        # What it refuses as no address, the family must not have.
+        (("<01 03 02 00 03", "<01 83 02"), None),
+        (("<01 03 02 00 03", "<01 83 09"), "gd350"),
+    ],
+)
+def test_a_family_is_guessed_only_where_it_can_say_what_was_said(said: tuple[str, str], family: str | None) -> None:
+    asked = ">01 03 21 00 00 01", ">01 03 30 07 00 01"
+    pairs = [text for pair in zip(asked, said, strict=True) for text in pair]
+    families = Families()
+    list(exchanges_in(talk(*BEFORE, *pairs), LINE, families))
+    profile = families.of(1)
+    assert (None if profile is None else profile.name) == family
+
+
+def test_a_guess_is_marked_in_text_as_it_is_in_json(tmp_path: Path) -> None:
+    path = kept(tmp_path / "polled.pcapng", *BEFORE, *POLLED)
+    shown = CliRunner().invoke(cli, ["decode", str(path)]).stdout.splitlines()
+    assert ["unit 1 (gd350, guessed): " in line for line in shown] == [False, True]
+    told = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(path)]).stdout
+    assert "guessed" not in told
+    records = CliRunner().invoke(cli, ["--json", "decode", str(path)]).stdout.splitlines()
+    assert [json.loads(record)["guessed"] for record in records] == [False, True]
 
 
 def test_a_guess_stays_where_the_next_register_does_not_tell_which_family_it_is() -> None:
@@ -162,7 +208,7 @@ def test_a_guess_stays_where_the_next_register_does_not_tell_which_family_it_is(
     other = ">01 06 20 00 00 07", "<01 06 20 00 00 07", ">01 03 99 99 00 01", "<01 83 02"
     told = ">01 03 20 01 00 01", "<01 03 02 00 00"
     families = Families()
-    heard = list(exchanges_in(talk(*POLLED, *other, *POLLED, *told, *other, *POLLED), LINE, families))
+    _, *heard = exchanges_in(talk(*BEFORE, *POLLED, *other, *POLLED, *told, *other, *POLLED), LINE, families)
     assert [next(iter(each.values), None) for each in heard] == [
         "running_frequency", 0x2000, None, "running_frequency", "set_frequency", "control_command", None,
         "running_frequency",
@@ -176,16 +222,18 @@ def test_a_guess_stays_where_the_next_register_does_not_tell_which_family_it_is(
 def test_a_guess_that_does_not_hold_is_taken_back_and_that_is_said(tmp_path: Path) -> None:
     foreign = ">01 03 9A 00 00 01", "<01 03 02 00 01"
     families = Families()
-    heard = list(exchanges_in(talk(*POLLED, *foreign, *POLLED), LINE, families))
+    _, *heard = exchanges_in(talk(*BEFORE, *POLLED, *foreign, *POLLED), LINE, families)
     assert [next(iter(each.values)) for each in heard] == ["running_frequency", 0x9A00, 0x3000]
     assert families.withdrawn() == [(1, "gd350", 0x9A00)]
     assert families.withdrawn() == [], "once"
-    path = kept(tmp_path / "polled.pcapng", *POLLED, *foreign, *POLLED)
+    path = kept(tmp_path / "polled.pcapng", *BEFORE, *POLLED, *foreign, *POLLED)
     done = CliRunner().invoke(cli, ["decode", str(path)])
-    assert done.stderr.startswith("unit 1 was taken for gd350 by what it was asked. It was asked for 9A00H now, ")
+    assert done.stderr.startswith(
+        "unit 1 was taken for gd350 by what it was asked and answered. What came of 9A00H now "
+    )
     assert "`--profile 1=FAMILY` names them." in done.stderr
     named = CliRunner().invoke(cli, ["--profile", "1=gd350", "decode", str(path)])
-    assert [" running_frequency" in line for line in named.stdout.splitlines()] == [True, False, True]
+    assert [" running_frequency" in line for line in named.stdout.splitlines()] == [False, True, False, True]
     assert named.stderr == ""
 
 
@@ -251,22 +299,24 @@ def test_the_commands_show_a_capture(capture: Path) -> None:
 
 def test_sniff_writes_what_it_hears(simulator: Simulator, tmp_path: Path) -> None:
     path = tmp_path / "heard.pcapng"
-    words = ["-f", "8N1", "--json", "sniff", simulator.port, "-n", "2", "-w", str(path)]
+    words = ["-f", "8N1", "--json", "sniff", simulator.port, "-n", "4", "-w", str(path)]
     with (
         drivebus.Bus(simulator.port, parity="N") as bus,
         subprocess.Popen([sys.executable, "-m", "drivebus", *words], stdout=subprocess.PIPE, text=True) as process,
     ):
         while process.poll() is None:
-            bus.read(1, 0x2100, 3)
+            bus.read(1, 0x2100, 2)
+            bus.read(1, 0x3000, 4)
         assert process.stdout is not None
         rows = [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
-    assert [row["unit"] for row in rows[:2]] == [1, 1]
-    assert rows[0]["values"]["status_word_1"] == {"value": 3, "label": "stopped"}
-    assert (rows[0]["profile"], rows[0]["guessed"]) == ("gd350", True)
-    assert rows[2]["answered"] == 2
+    assert [row["unit"] for row in rows[:4]] == [1, 1, 1, 1]
+    named = [row["values"]["status_word_1"] for row in rows[2:4] if "status_word_1" in row["values"]]
+    assert named == [{"value": 3, "label": "stopped"}]
+    assert {(row["profile"], row["guessed"]) for row in rows[2:4]} == {("gd350", True)}
+    assert rows[4]["answered"] == 4
     kept = list(read(path))
-    assert [each.asks for each in kept] == [True, False, True, False]
+    assert [each.asks for each in kept] == [True, False] * 4
     # What is there already is not replaced unasked.
     again = CliRunner().invoke(cli, ["sniff", simulator.port, "-w", str(path), "--for", "0"])
     assert again.exit_code == 2

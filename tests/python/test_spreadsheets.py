@@ -49,8 +49,11 @@ SAVED: dict[str, bytes] = {
     "tabs, UTF-16": table(ROWS, "\t", comma=True, end="\r\n").encode("utf-16"),
     "UTF-16, the high byte first": b"\xfe\xff" + GERMAN.encode("utf-16-be"),
     "every cell in quotes": "".join(
-        ";".join(f'"{cell}"' for cell in line) + "\r\n" for line in csv.reader(GERMAN.replace('""', "''").splitlines(), delimiter=";")
-    ).replace("''", '""').encode(),
+        ";".join(f'"{cell}"' for cell in line) + "\r\n"
+        for line in csv.reader(GERMAN.replace('""', "''").splitlines(), delimiter=";")
+    )
+    .replace("''", '""')
+    .encode(),
     "columns of nothing behind the last": f"{KEPT}\r\n".encode(),
     "rows of nothing": f"{GERMAN};;;;;;\r\n\r\n ;;\r\n".replace("\r\n20", "\r\n;;;;;;\r\n20").encode(),
     "commas, and numbers in quotes": table(ROWS, comma=True).encode(),
@@ -85,7 +88,10 @@ def test_a_number_that_may_be_two_is_told_and_not_guessed(tmp_path: Path) -> Non
         rows = [[cells.get(cell, cell) for cell in row] for row in ROWS]
         with pytest.raises(NotAllowed, match=said):
             recording(tmp_path, table(rows, ";").encode())
-    rows = [["1,234" if cell == "12.0" else cell.replace(".", ",") if "." in cell[:5] else cell for cell in row] for row in ROWS]
+    rows = [
+        ["1,234" if cell == "12.0" else cell.replace(".", ",") if "." in cell[:5] else cell for cell in row]
+        for row in ROWS
+    ]
     found = recording(tmp_path, table(rows, ";").encode())
     assert found.values["gd350, unit 1"]["output_current [A]"] == [1.5, 1.234]
 
@@ -164,5 +170,7 @@ def test_what_a_profile_cannot_mean_is_told_with_its_line(tmp_path: Path) -> Non
         csv.writer(out, delimiter=";", lineterminator="").writerow(cells)
         return "\r\n".join([lines[0], out.getvalue()]).encode()
 
-    told = [problem for problem in Profile.check(spoilt(tmp_path, change)) if "may be 1.234 or 1234" in problem["reason"]]
+    told = [
+        problem for problem in Profile.check(spoilt(tmp_path, change)) if "may be 1.234 or 1234" in problem["reason"]
+    ]
     assert [problem["line"] for problem in told] == [2, 2]

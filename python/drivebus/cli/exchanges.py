@@ -145,6 +145,6 @@ def taken_back(families: Families) -> Iterator[str]:
     """What is to be said of guesses that did not hold."""
     for unit, name, address in families.withdrawn():
         yield (
-            f"unit {unit} was taken for {name} by what it was asked. It was asked for {places.shown(address)} now, "
-            f"which does not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
+            f"unit {unit} was taken for {name} by what it was asked and answered. What came of {places.shown(address)} "
+            f"now does not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
         )

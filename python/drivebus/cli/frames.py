@@ -13,6 +13,7 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.line import huanyang
 from drivebus.line.trace import LOGGER as TRACE_LOGGER
 from drivebus.line.trace import meaning
 
@@ -60,6 +61,10 @@ def decode(session: Session, data: tuple[str, ...]) -> None:
         return
     frame = names.parse_hex(data)
     kind = drivebus.rtu.decode(frame).kind
+    if huanyang.is_sure(frame):
+        show_frame(session.out, "frame", frame, True)
+        session.out.say(f"{'':<7}or the answer to such a request, which has the same form")
+        return
     profile = None if session.profile is None else drivebus.Profile.find(session.profile)
     show_frame(session.out, "frame", frame, kind in _REQUESTS, profile=profile)
     if kind in _ALIKE:

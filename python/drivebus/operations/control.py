@@ -15,7 +15,15 @@ from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Control, ControlItem
 
-__all__ = ["check_control", "check_heeded", "check_set", "prepare_control", "wanted_always", "wanted_for", "wanted_of_commands"]
+__all__ = [
+    "check_control",
+    "check_heeded",
+    "check_set",
+    "prepare_control",
+    "wanted_always",
+    "wanted_for",
+    "wanted_of_commands",
+]
 
 
 async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: bool = False) -> Control:

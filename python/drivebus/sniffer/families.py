@@ -22,6 +22,8 @@ _LEAST = 3
 """Registers that a unit has answered with before a guess is made of them."""
 _REQUESTS = 2
 """Different requests that it answered by then: one read of a few words says nothing of a family."""
+_MANY = 6
+"""Registers that say as much, where one family alone has all of them."""
 _NO_SUCH_ADDRESS = 0x02
 _MOST_WORDS = 16
 """Different words of one register that are held against a family."""
@@ -34,8 +36,8 @@ class Families:
     several requests that it answered: any that has all registers that it answers with, can have the values that are in
     them, and has none that the unit says it has not. Where several are left, names are those on which
     they agree, so a guess stays where the next request brings a register on which they differ. A family that is told by
-    what its units answer is guessed only when they were asked for that, if another fits too: makers use the same
-    addresses. Where no family has all of them any more, it is taken back; see `withdrawn`.
+    what its units answer is guessed only when they were asked for that, or where many registers fit nobody else: makers
+    use the same addresses. Where no family has all of them any more, it is taken back; see `withdrawn`.
 
     Args:
         given: A profile for each unit by its address, one for all, or None.
@@ -166,10 +168,14 @@ class Families:
             for each in able
             if None not in _meant(each, asked) and _can_be(each, words) and not _denied(each, refused)
         )
-        self._likely[unit] = tuple(each for each in fitting if _shows_itself(each, asked)) or fitting
+        guessed = self._likely.get(unit)
+        likely = tuple(each for each in fitting if _shows_itself(each, asked))
+        if not likely and len(fitting) == 1 and len(asked) >= _MANY:
+            likely = fitting
+        self._likely[unit] = likely
         self._agreed.clear()
-        if before and not fitting:
-            self._withdrawn.append((unit, before[0].name, _misfit(before[0], new)))
+        if guessed and not likely:
+            self._withdrawn.append((unit, guessed[0].name, _misfit(guessed[0], new)))
 
     def _agree(self, fitting: tuple[Profile, ...], request: bytes) -> bool:
         """Whether sisters mean the same by what *request* asks for: then it does not matter which of them it is."""
@@ -192,9 +198,7 @@ def _shows_itself(profile: Profile, asked: set[int]) -> bool:
 def _can_be(profile: Profile, words: Mapping[int, Iterable[tuple[int, bool]]]) -> bool:
     """Whether a unit of *profile* can have these *words*, by address; each with whether it was written."""
     return all(
-        _allows(profile, address, word, is_written)
-        for address, seen in words.items()
-        for word, is_written in seen
+        _allows(profile, address, word, is_written) for address, seen in words.items() for word, is_written in seen
     )
 
 
