@@ -1,8 +1,8 @@
 """A Schneider Altivar 312: three words start it, each seen in ETA before the next, and not one of them goes out twice.
 
-The words and states are those of the Altivar 12 Modbus manual (BBV28590), as nobrega8/mbmap-library has them: 6, 7 and
-15 to CMD (8501); ETA (3201) shows 0050H, 0031H, 0033H, 0037H. 080FH runs in reverse. The frames are written by hand,
-their CRCs computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02, section 6.2.2.
+The words and states are those of its maker's manual of communication variables (BBV51701), pp. 10 to 13: 6, 7 and 15 to
+CMD (8501); ETA (3201) shows 0240H, 0221H, 0223H, 0227H, with bit 9 (p. 21). 080FH runs in reverse. The frames are written
+by hand, their CRCs computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02, section 6.2.2.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def test_eta_shows_the_state_on_the_way(drive: Drive) -> None:
     for word in (0x00, 0x06, 0x07, 0x0F):
         drive.write_words(CMD, word)
         shown.append(drive.bus.read(1, ETA)[0])
-    assert shown == [0x0050, 0x0031, 0x0033, 0x0037]
+    assert shown == [0x0240, 0x0221, 0x0223, 0x0227]
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_a_drive_that_is_stuck_after_06h_gets_no_07h(
 def test_a_drive_that_is_stuck_after_07h_gets_no_run(
     line: Simulator, drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    held(drive.bus, monkeypatch, 0x0031)
+    held(drive.bus, monkeypatch, 0x0221)
     with pytest.raises(Unconfirmed, match=r"switch on \(0007H\) was sent, once, .*switched_on off and not on"):
         drive.run(10.0)
     assert written(line) == [SHUTDOWN, SWITCH_ON]
@@ -249,18 +249,43 @@ def test_a_whole_job_awaited(line: Simulator) -> None:
     assert written(line) == WHOLE
 
 
-def test_all_of_it_takes_a_word_of_trust(line: Simulator) -> None:
+def test_its_maker_prints_all_that_it_takes(line: Simulator) -> None:
     with Bus(line) as bus:
         drive = bus.drive(1, "atv312")
-        with pytest.raises(NotAllowed, match=r"not verified: No page of the maker is at hand.*unverified=True"):
+        with pytest.raises(NotAllowed, match=r"Fr1 .*: 1, needs 164"):
             drive.run(10.0)
         assert written(line) == []
         assert bus.identify(1).candidates == ("atv312",)
+        drive.prepare_control(store=True)
+        drive.run(10.0)
+        assert written(line) == [SHUTDOWN, SWITCH_ON, FORWARD_10_HZ]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_at_another_level_of_access_nothing_is_started_and_nothing_set(line: Simulator, level: int) -> None:
+    """BBV51701, pp. 11 and 35: at L1 and L2 Modbus is no source, and ETA shows operation enabled at rest; L3 puts Fr1, Cd1,
+    CHCF and tCC back, and only a return to the factory settings takes it back."""
+    with Bus(line) as bus:
+        drive = bus.drive(1, "atv312")
+        drive.prepare_control(store=True)
+        drive.write("LAC", level, store=True)
+        before = len(line.drive(1).writes())
+        for start in (lambda: drive.run(10.0), lambda: drive.run(reverse=True)):
+            with pytest.raises(NotAllowed, match=rf"has its words elsewhere:\nLAC .*: {level}, needs 2"):
+                start()
+        with pytest.raises(NotAllowed, match=rf"LAC of unit 1 is {level}, and must be 2 .*Fr1, Cd1, CHCF and tCC"):
+            drive.prepare_control(store=True)
+        assert [item.ok for item in drive.check_control()] == [False, True]
+        assert len(line.drive(1).writes()) == before
+        # A stop asks for nothing.
+        drive.stop(confirm=0)
+        assert written(line)[-1] == STOP
 
 
 def test_the_command_line_says_the_words() -> None:
     told = CliRunner().invoke(cli, ["profiles", "show", "atv312"]).stdout
-    assert "2063 run reverse (080FH) [unverified]" in told
+    assert "2063 run reverse (080FH)" in told
+    assert "LAC = 2" in told
     assert "before a run or jog from rest: 6 shutdown, until fault = 0" in told
     assert Profile.builtin("atv312").command("run_reverse") == (CMD, 0x080F)
     result = CliRunner().invoke(

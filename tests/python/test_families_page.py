@@ -57,7 +57,7 @@ def rows_of(family: str) -> dict[str, list[Row]]:
         for row in rows:
             sure = "faults" in confirmed if kind == "faults" else bool(names_of(row) & confirmed)
             if kind == "faults":
-                replaced = row["code"] in numbers
+                replaced = row["code"] in numbers or "faults" in gone
             else:
                 replaced = bool(names_of(row) & (gone | stated)) or address_of(row) in addresses
             if not replaced:
