@@ -6,13 +6,18 @@ hy_comm.c. CRCs were computed with the bit-by-bit loop of *Modbus over Serial Li
 
 from __future__ import annotations
 
+import asyncio
 import json
+import time
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from drivebus import BadAnswer, Bus, Simulator
 from drivebus.cli import cli
+from drivebus.doctor.traffic import heard as heard_by
+from drivebus.identify.scan import look_for
 from drivebus.line import huanyang
 from drivebus.sniffer import Exchange, Families, exchanges_in
 from drivebus.sniffer.pairing import Pairing
@@ -150,3 +155,25 @@ def test_a_frame_is_sure_only_where_modbus_has_none_like_it() -> None:
     assert [huanyang.has_form(frame(text)) and not huanyang.is_sure(frame(text)) for text in unsure] == [True] * 5
     assert [huanyang.has_form(frame(text)) for text in no_form] == [False] * len(no_form)
     assert not huanyang.has_form(bytes.fromhex("01 03 01 01 31 89"))
+
+
+def test_a_scan_names_a_unit_that_answers_so() -> None:
+    """Whatever it is asked, such a unit answers in its own frames, or not at all."""
+
+    async def read(unit: int, address: int, **table: str) -> list[int]:
+        raise BadAnswer("unit 1 answered otherwise", unit=unit, raw=frame("01 03 01 09"))
+
+    found = asyncio.run(look_for(read, time.monotonic, 1))
+    assert found is not None
+    assert (found.profile, found.protocol) == (None, "huanyang")
+    assert "speaks Huanyang's own protocol" in str(found.problem)
+
+
+def test_the_doctor_names_what_it_hears(monkeypatch: pytest.MonkeyPatch) -> None:
+    came = b"".join(frame(text) for pair in TALK for text in pair[:2])
+    with Simulator({1: "gd350"}, transport="process", clock="virtual") as line, Bus(line) as bus:
+        monkeypatch.setattr(bus, "listen", lambda seconds: [(0.0, came)])
+        finding = heard_by(bus, 1.0)
+    assert finding.values["protocol"] == "huanyang"
+    assert "of Huanyang's own protocol: 01 04 03 00 00 00 F0 4E = unit 1: read status 0 (set frequency)" in finding.text
+    assert "no Modbus" in finding.text

@@ -5,6 +5,7 @@ from __future__ import annotations
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer
+from drivebus.line import huanyang
 from drivebus.line.frames import frames_in, in_words
 from drivebus.searching.settings import Settings
 
@@ -63,6 +64,25 @@ def _quiet(seconds: float) -> Finding:
 def _other_master(frames: list[bytes], seconds: float, bus: Bus) -> Finding:
     settings = str(Settings.of(bus))
     shown = [(frame.hex(" ").upper(), in_words(frame)) for frame in frames[:_SHOWN]]
+    foreign = [frame for frame in frames if huanyang.is_sure(frame)]
+    if foreign:
+        return Finding(
+            "line",
+            OTHER_MASTER,
+            Severity.FAULT,
+            f"{len(frames)} whole frames came in {seconds:g} s at {settings} while nothing was asked, of "
+            f"{huanyang.NAME}: " + "; ".join(f"{wire} = {words}" for wire, words in shown),
+            f"another program speaks to unit {foreign[0][0]} there, in a protocol that has the CRC of Modbus and nothing "
+            "else of it: drivebus has no command for that drive. Units for Modbus need a line of their own, or that "
+            "program stopped and that drive off",
+            values={
+                "seconds": seconds,
+                "settings": settings,
+                "frames": [wire for wire, _ in shown],
+                "protocol": "huanyang",
+            },
+            error=BadAnswer,
+        )
     return Finding(
         "line",
         OTHER_MASTER,

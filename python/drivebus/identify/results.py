@@ -19,6 +19,7 @@ class Found:
         problem: What was wrong with its answer, or None.
         certainty: How sure that family is, as `Identification.certainty` says it.
         candidates: The families that it may be.
+        protocol: `"modbus"`, or `"huanyang"` where it answers in that maker's own protocol.
     """
 
     unit: int
@@ -28,6 +29,7 @@ class Found:
     problem: str | None = None
     certainty: str = "unknown"
     candidates: tuple[str, ...] = ()
+    protocol: str = "modbus"
 
 
 @dataclass(frozen=True)

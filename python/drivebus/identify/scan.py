@@ -12,6 +12,8 @@ from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
 from drivebus.identify.choose import usable
 from drivebus.identify.identify import Read, identify
 from drivebus.identify.results import Found
+from drivebus.line import huanyang
+from drivebus.line.frames import frames_in
 
 __all__ = ["look_for", "time_for", "units"]
 
@@ -45,10 +47,11 @@ async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | N
 
     try:
         found = await identify(timed, unit)
-    except NoAnswer:
-        return None
-    except BadAnswer as error:
-        return Found(unit, None, None, took[0], str(error))
+    except (NoAnswer, BadAnswer) as error:
+        if any(frame[0] == unit and huanyang.is_sure(frame) for frame in frames_in(error.raw)):
+            said = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
+            return Found(unit, None, None, took[0], said, protocol="huanyang")
+        return None if isinstance(error, NoAnswer) else Found(unit, None, None, took[0], str(error))
     family = usable(found, unverified=True) or found.family
     problem = found.reason if found.certainty == "unknown" and found.code is None else None
     return Found(unit, family, found.code, took[0], problem, found.certainty, found.candidates)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from drivebus import rtu
 from drivebus._native import crc16
+from drivebus.line import huanyang
 
 __all__ = ["frames_in", "in_words", "is_frame"]
 
@@ -44,6 +45,8 @@ def _lengths(data: bytes, at: int) -> Iterator[int]:
         yield 8
     elif function in (0x05, 0x06, 0x08):
         yield 8
+        if huanyang.is_sure(data[at : at + 5 + head[2]]):
+            yield 5 + head[2]
     elif function in (0x0F, 0x10):
         yield 8
         if len(head) == 7:
@@ -57,5 +60,7 @@ def is_frame(data: bytes) -> bool:
 
 def in_words(frame: bytes) -> str:
     """The fields of *frame*, each with its name."""
+    if huanyang.is_sure(frame):
+        return huanyang.words(frame, True)
     fields = {name: value for name, value in vars(rtu.decode(frame)).items() if value is not None and name != "crc"}
     return ", ".join(f"{name} {value}" for name, value in fields.items())
