@@ -1,8 +1,8 @@
 """A Schneider Altivar 312: three words start it, each seen in ETA before the next, and not one of them goes out twice.
 
 The words and states are those of its maker's manual of communication variables (BBV51701), pp. 10 to 13: 6, 7 and 15 to
-CMD (8501); ETA (3201) shows 0240H, 0221H, 0223H, 0227H, with bit 9 (p. 21). 080FH runs in reverse. The frames are written
-by hand, their CRCs computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02, section 6.2.2.
+CMD (8501); ETA (3201) shows 0240H, 0221H, 0223H, 0227H, with bit 9 (p. 21). 080FH runs in reverse. The frames are
+written by hand, their CRCs computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02, section 6.2.2.
 """
 
 from __future__ import annotations
@@ -263,16 +263,18 @@ def test_its_maker_prints_all_that_it_takes(line: Simulator) -> None:
 
 @pytest.mark.parametrize("level", [0, 1])
 def test_at_another_level_of_access_nothing_is_started_and_nothing_set(line: Simulator, level: int) -> None:
-    """BBV51701, pp. 11 and 35: at L1 and L2 Modbus is no source, and ETA shows operation enabled at rest; L3 puts Fr1, Cd1,
-    CHCF and tCC back, and only a return to the factory settings takes it back."""
+    """BBV51701, pp. 11 and 35: at L1 and L2 Modbus is no source, and ETA shows operation enabled at rest.
+
+    L3 puts Fr1, Cd1, CHCF and tCC back, and only a return to the factory settings takes it back.
+    """
     with Bus(line) as bus:
         drive = bus.drive(1, "atv312")
         drive.prepare_control(store=True)
         drive.write("LAC", level, store=True)
         before = len(line.drive(1).writes())
-        for start in (lambda: drive.run(10.0), lambda: drive.run(reverse=True)):
+        for hz, reverse in ((10.0, False), (None, True)):
             with pytest.raises(NotAllowed, match=rf"has its words elsewhere:\nLAC .*: {level}, needs 2"):
-                start()
+                drive.run(hz, reverse=reverse)
         with pytest.raises(NotAllowed, match=rf"LAC of unit 1 is {level}, and must be 2 .*Fr1, Cd1, CHCF and tCC"):
             drive.prepare_control(store=True)
         assert [item.ok for item in drive.check_control()] == [False, True]

@@ -1,4 +1,4 @@
-"""Huanyang's own protocol: the CRC of Modbus, and lengths of its own. It is named, and never taken for Modbus with errors.
+"""Huanyang's own protocol, with the CRC of Modbus and its own lengths: named, and never taken for Modbus with errors.
 
 Frames and their meaning: LinuxCNC, src/hal/user_comps/huanyang-vfd/hy_modbus.c (functions 01 to 05, their lengths) and
 hy_comm.c. CRCs were computed with the bit-by-bit loop of *Modbus over Serial Line* V1.02, section 6.2.2.
@@ -14,14 +14,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from drivebus import BadAnswer, Bus, Simulator
+from drivebus import BadAnswer, Bus, SerialFormat, Simulator
 from drivebus.cli import cli
 from drivebus.doctor.traffic import heard as heard_by
 from drivebus.identify.scan import look_for
 from drivebus.line import huanyang
-from drivebus.sniffer import Exchange, Families, exchanges_in
+from drivebus.sniffer import Exchange, Families
 from drivebus.sniffer.pairing import Pairing
-from drivebus._native import SerialFormat
 
 READ_STATUS = "01 04 03 00 00 00 F0 4E"
 CONTROL = "01 03 01 01 31 88"
@@ -160,7 +159,7 @@ def test_a_frame_is_sure_only_where_modbus_has_none_like_it() -> None:
 def test_a_scan_names_a_unit_that_answers_so() -> None:
     """Whatever it is asked, such a unit answers in its own frames, or not at all."""
 
-    async def read(unit: int, address: int, **table: str) -> list[int]:
+    async def read(unit: int, _address: int, **_table: str) -> list[int]:
         raise BadAnswer("unit 1 answered otherwise", unit=unit, raw=frame("01 03 01 09"))
 
     found = asyncio.run(look_for(read, time.monotonic, 1))
@@ -172,7 +171,7 @@ def test_a_scan_names_a_unit_that_answers_so() -> None:
 def test_the_doctor_names_what_it_hears(monkeypatch: pytest.MonkeyPatch) -> None:
     came = b"".join(frame(text) for pair in TALK for text in pair[:2])
     with Simulator({1: "gd350"}, transport="process", clock="virtual") as line, Bus(line) as bus:
-        monkeypatch.setattr(bus, "listen", lambda seconds: [(0.0, came)])
+        monkeypatch.setattr(bus, "listen", lambda _: [(0.0, came)])
         finding = heard_by(bus, 1.0)
     assert finding.values["protocol"] == "huanyang"
     assert "of Huanyang's own protocol: 01 04 03 00 00 00 F0 4E = unit 1: read status 0 (set frequency)" in finding.text

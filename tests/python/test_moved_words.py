@@ -1,8 +1,8 @@
-"""A Goodrive200A whose P14.06 moves its commands elsewhere, where 2000H = 5 is no stop but a speed: it is asked before each start.
+"""A Goodrive200A whose P14.06 moves its commands elsewhere, so that 2000H = 5 is no stop but a speed: it is asked.
 
-GD200A operation manual (INVT, Operation Manual Goodrive200A), pp. 93 and 94: the hundreds digit is 0 for the addresses of
-this series, 1 for those in P14.07 (commands, 1000H) and P14.08 (frequency, 2000H), 2 for those of a CHF100A; the tens digit
-encrypts, the ones digit leaves writes unanswered.
+GD200A operation manual (INVT, Operation Manual Goodrive200A), pp. 93 and 94: the hundreds digit is 0 for the addresses
+of this series, 1 for those in P14.07 (commands, 1000H) and P14.08 (frequency, 2000H), 2 for those of a CHF100A; the
+tens digit encrypts, the ones digit leaves writes unanswered.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ STARTS: list[Callable[[Drive], object]] = [
 
 @pytest.mark.parametrize("word", [0x100, 0x200, 0x010, 0x001, 0x211])
 @pytest.mark.parametrize("start", STARTS)
-def test_nothing_that_moves_it_is_sent(line: Simulator, drive: Drive, start: Callable[[Drive], object], word: int) -> None:
+def test_nothing_that_moves_it_is_sent(
+    line: Simulator, drive: Drive, start: Callable[[Drive], object], word: int
+) -> None:
     drive.write("P14.06", word, store=True)
     with pytest.raises(NotAllowed, match=rf"unit 1 has its words elsewhere:\nP14.06 .*: {word}, needs 0"):
         start(drive)
@@ -71,13 +73,13 @@ def test_it_is_asked_each_time_and_not_set(line: Simulator, drive: Drive) -> Non
     drive.stop(confirm=0)
     line.advance(60.0)
     drive.write("P14.06", 0x100, store=True)
-    with pytest.raises(NotAllowed, match=r"P14.06 of unit 1 is 256, and must be 0 .*takes the drive away from a master"):
+    with pytest.raises(NotAllowed, match=r"P14.06 of unit 1 is 256, and must be 0 .*away from a master"):
         drive.prepare_control(store=True)
     assert drive.read("P14.06") == 0x100
     assert [item.code for item in drive.check_control() if not item.ok] == ["P14.06"]
 
 
-def test_other_families_are_not_asked(line: Simulator) -> None:
+def test_other_families_are_not_asked() -> None:
     with Simulator({1: "gd350"}, transport="process", clock="virtual") as other, Bus(other) as bus:
         drive = bus.drive(1, "gd350")
         drive.prepare_control(store=True, unverified=True)

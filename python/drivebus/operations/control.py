@@ -69,8 +69,8 @@ async def prepare_control(
         if item.actual is not None and row["by_hand"]:
             raise NotAllowed(
                 f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
-                f"({item.label}). prepare_control() does not set it: {item.note} Nothing was written. If that is meant, "
-                f'write("{item.code}", {int(item.wanted)}, store=True) (`drivebus write {item.code} '
+                f"({item.label}). prepare_control() does not set it: {item.note} Nothing was written. If that is "
+                f'meant, write("{item.code}", {int(item.wanted)}, store=True) (`drivebus write {item.code} '
                 f"{int(item.wanted)} --store`) comes first",
                 unit=unit.address,
             )

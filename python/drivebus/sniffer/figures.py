@@ -163,7 +163,7 @@ class Figures:
             if unit.protocol == "huanyang":
                 yield (
                     f"unit {address} speaks {huanyang.NAME}, which has the CRC of Modbus and nothing else of it: no "
-                    "program for Modbus can command it, and it may take what is meant for others on this line for its own"
+                    "program for Modbus can command it, and it may take what is meant for others here for its own"
                 )
                 continue
             if address and unit.requests >= _SOME and not unit.answers and not unit.damaged:

@@ -1,4 +1,4 @@
-"""Exchanges in Huanyang's own protocol among those of Modbus: the core tells its frames as strays, requests or noise."""
+"""Exchanges in Huanyang's own protocol among those of Modbus: the core tells its frames as strays, requests, noise."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Foreign:
         self._asked: tuple[bytes, _Piece, float] | None = None
         self._unsure: bytes | None = None
 
-    def takes(self, piece: _Piece, before: _Piece | None) -> bool:
-        """Whether *piece* is of such a unit. *before* is the request of Modbus that waits for its answer."""
+    def takes(self, piece: _Piece) -> bool:
+        """Whether *piece* is of such a unit."""
         role, data = piece[:2]
         unsure, self._unsure = self._unsure, None
         frames = huanyang.frames_in(data)

@@ -79,7 +79,7 @@ class Pairing:
             if role != "noise":
                 self._lump = max(self._lump, piece[5])
             before = self._open
-            if self._foreign.takes(piece, before):
+            if self._foreign.takes(piece):
                 if before is not None and self._foreign.has(before):
                     # What was taken for a request of Modbus.
                     self._open = None
