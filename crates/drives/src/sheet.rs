@@ -57,15 +57,15 @@ pub fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, SheetError> {
         [0xFE, 0xFF, ..] => return wide(u16::from_be_bytes),
         _ => {}
     }
-    let text = match str::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(error) => {
-            let valid = str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default();
-            return wrong(lines(valid), "not UTF-8; save the file in this encoding");
-        }
+    let (text, is_whole) = match str::from_utf8(bytes) {
+        Ok(text) => (text, true),
+        Err(error) => (str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(), false),
     };
     if let Some((before, _)) = text.split_once('\0') {
         return wrong(lines(before), "there is a zero byte, as in UTF-16 without its mark; save the file as UTF-8");
+    }
+    if !is_whole {
+        return wrong(lines(text), "not UTF-8; save the file in this encoding");
     }
     Ok(Cow::Borrowed(text.strip_prefix('\u{feff}').unwrap_or(text)))
 }
