@@ -176,8 +176,8 @@ fn plain(cell: &str, comma: Option<&(u64, String)>, point: Option<&(u64, String)
         (Written::Text, ..) | (Written::Point | Written::PointOrThousands, None, _) => Ok(None),
         (Written::Comma, _, None) | (Written::CommaOrThousands, Some(_), None) => Ok(Some(cell.replace(',', "."))),
         (Written::Grouped, ..) => Err(format!("\"{cell}\" has its thousands apart: write the number without that")),
-        (Written::Point | Written::PointOrThousands, Some(other), _) => Err(both(other)),
-        (Written::Comma | Written::CommaOrThousands, _, Some(other)) => Err(both(other)),
+        (Written::Point | Written::PointOrThousands, Some(other), _)
+        | (Written::Comma | Written::CommaOrThousands, _, Some(other)) => Err(both(other)),
         (Written::CommaOrThousands, None, None) => {
             let whole = cell.replace(',', "");
             Err(format!("\"{cell}\" may be {} or {whole}: write it as one of them", cell.replace(',', ".")))
