@@ -1,5 +1,6 @@
 //! What can become of a call, and whether the unit may have acted.
 
+mod came;
 pub(crate) mod kind;
 
 use std::fmt;
@@ -44,9 +45,17 @@ impl fmt::Display for CallError {
         if let Some(request) = request {
             write!(f, ", {}", Asked { request, pdu })?;
         }
-        write!(f, ": {}", self.failure)?;
+        match self.failure {
+            Failure::NoAnswer { timeout, attempts } if !self.raw.is_empty() => {
+                write!(f, ": no right answer within {} ms{}", timeout.as_millis(), times(attempts))?;
+            }
+            _ => write!(f, ": {}", self.failure)?,
+        }
         if !self.raw.is_empty() {
             write!(f, "; came: {}", Hex(&self.raw))?;
+            if let Some(words) = self.came_in_words() {
+                write!(f, ", {words}")?;
+            }
         }
         match (request, self.sent, &self.failure) {
             (_, _, Failure::Refused { code, .. }) if code.meaning() == Meaning::Taken => {
@@ -69,6 +78,19 @@ impl fmt::Display for CallError {
             }
             _ => Ok(()),
         }
+    }
+}
+
+impl CallError {
+    /// What came, where the failure does not say it.
+    fn came_in_words(&self) -> Option<String> {
+        let request = Frame::parse(&self.request).ok()?;
+        let is_told = match self.failure {
+            Failure::NoAnswer { .. } => false,
+            Failure::Wrong(_) | Failure::Corrupt(_) => self.raw != self.request,
+            _ => true,
+        };
+        (!is_told).then(|| came::in_words(&request, &self.raw))
     }
 }
 
@@ -106,7 +128,7 @@ impl fmt::Display for Asked<'_> {
 }
 
 /// Bytes as they are on the wire.
-struct Hex<'a>(&'a [u8]);
+pub(crate) struct Hex<'a>(pub(crate) &'a [u8]);
 
 impl fmt::Display for Hex<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -92,7 +92,7 @@ pub use bus::errand::{Errand, Reply};
 pub use bus::workers::Running;
 pub use error::kind::ErrorKind;
 pub use error::{CallError, Failure};
-pub use health::hint::Hint;
+pub use health::hint::{By, Hint};
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Program, Stats};
 pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};

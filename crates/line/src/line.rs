@@ -66,6 +66,11 @@ pub trait Line: Send + fmt::Debug {
         None
     }
 
+    /// The next frame that came and is known to answer nothing that was asked, where frames are told apart so.
+    fn take_strange(&mut self) -> Option<Vec<u8>> {
+        None
+    }
+
     /// Whether its clock is a simulation's, which only moves while somebody waits.
     fn is_virtual(&self) -> bool {
         false

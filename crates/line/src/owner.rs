@@ -42,6 +42,8 @@ pub(crate) struct Owner {
     lumps: Lumps,
     format: SerialFormat,
     stats: Arc<Mutex<Stats>>,
+    /// Whether nothing was asked since the line was opened.
+    is_new: bool,
     /// Where somebody watches the line, or has.
     trace: Option<Trace>,
 }
@@ -73,6 +75,7 @@ impl Owner {
             lumps: Lumps::of_no_line(),
             format,
             stats,
+            is_new: true,
             trace: None,
         }
     }
@@ -122,7 +125,11 @@ impl Owner {
     fn count_strays(&mut self) {
         let tally = self.known.take_strays();
         if tally != Tally::default() {
-            self.stats().count(None, |counters| counters.add(tally));
+            let is_noisy = tally.noise > 0 && !self.is_new;
+            self.stats().count(None, |counters| {
+                counters.add(tally);
+                counters.noise_events += u64::from(is_noisy);
+            });
         }
     }
 
@@ -150,6 +157,7 @@ impl Owner {
         self.known.opened(line.now(), &opened);
         self.clock = line.clock();
         self.lumps = Lumps::of(line.as_ref());
+        self.is_new = true;
         self.line = Some(match &self.trace {
             Some(trace) => Box::new(Watched::new(line, trace.clone())),
             None => line,
@@ -191,14 +199,23 @@ impl Owner {
         });
     }
 
-    /// Keeps what one request of `ask` came to: its answer, or `failure`.
-    fn keep(&mut self, ask: &Ask<'_>, exchange: &Exchange<'_>, failure: Option<&Failure>) {
-        let unit = ask.unit();
-        while let Some(line) = self.line.as_deref_mut()
-            && let Some(late) = line.take_late()
-        {
+    /// Takes what came by other means than bytes of the line: answers to earlier requests, and into `strange` what answers
+    /// none.
+    fn take_late(&mut self, strange: &mut Vec<u8>) {
+        strange.clear();
+        let Some(line) = self.line.as_deref_mut() else { return };
+        while let Some(late) = line.take_late() {
             self.known.saw_late(line.now(), &late);
         }
+        while let Some(frame) = line.take_strange() {
+            strange.extend_from_slice(&frame);
+        }
+    }
+
+    /// Keeps what one request of `talk` came to: its answer, or `failure`.
+    fn keep(&mut self, talk: &Talk<'_, '_>, exchange: &Exchange<'_>, failure: Option<&Failure>) {
+        let ask = talk.ask;
+        let unit = ask.unit();
         let delay = exchange.sent.filter(|_| failure.is_none()).map(|sent| self.delay(exchange, sent));
         if let (Some(unit), Some(delay), Request::Read { .. }) = (unit, delay, exchange.request) {
             self.delays.answered(unit, delay);
@@ -216,8 +233,14 @@ impl Owner {
         }
         let tally = exchange.tally;
         let has_seen_more = tally != Tally::default();
+        // What a server says to whoever connects is no noise of its line.
+        let greets = std::mem::take(&mut self.is_new);
+        let is_noisy = tally.noise > 0 && !greets;
+        let is_strange = !talk.strange.is_empty();
+        let is_other = exchange.bytes > 0 || is_strange;
         self.stats().count(unit, |counters| {
             counters.requests += u64::from(exchange.sent.is_some());
+            counters.noise_events += u64::from(is_noisy);
             if has_seen_more {
                 counters.add(tally);
             }
@@ -225,7 +248,13 @@ impl Owner {
                 (None, Some(sent)) => {
                     counters.answered(exchange.ended.saturating_duration_since(sent), delay.unwrap_or_default());
                 }
-                (Some(Failure::NoAnswer { .. } | Failure::Unreached), _) => counters.timeouts += 1,
+                (Some(Failure::NoAnswer { .. }), _) => {
+                    counters.timeouts += 1;
+                    counters.other_answers += u64::from(is_other);
+                    counters.other_functions += u64::from(tally.misfit > 0);
+                    counters.other_transactions += u64::from(is_strange);
+                }
+                (Some(Failure::Unreached), _) => counters.timeouts += 1,
                 (Some(Failure::Corrupt(_)), _) => counters.crc_errors += 1,
                 (Some(Failure::Wrong(_)), _) => counters.bad_answers += 1,
                 (Some(Failure::Refused { .. }), _) => counters.refusals += 1,

@@ -225,6 +225,14 @@ impl Line for Watched {
         Some(late)
     }
 
+    fn take_strange(&mut self) -> Option<Vec<u8>> {
+        let strange = self.line.take_strange()?;
+        let now = self.line.now();
+        self.trace.tell_ears(now, Direction::Heard, &strange);
+        self.show(now, now, Direction::Heard, &strange);
+        Some(strange)
+    }
+
     fn is_virtual(&self) -> bool {
         self.line.is_virtual()
     }

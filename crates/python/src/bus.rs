@@ -415,6 +415,10 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
     all.set_item("noise_bytes", figures.noise_bytes)?;
     all.set_item("noise_idle", figures.noise_idle)?;
     all.set_item("own_echoes", figures.own_echoes)?;
+    all.set_item("other_answers", figures.other_answers)?;
+    all.set_item("other_functions", figures.other_functions)?;
+    all.set_item("other_transactions", figures.other_transactions)?;
+    all.set_item("noise_events", figures.noise_events)?;
     for (name, latency) in [("round_trip", &figures.round_trip), ("delay", &figures.delay)] {
         let times = PyDict::new(py);
         times.set_item("min", latency.min.as_secs_f64())?;

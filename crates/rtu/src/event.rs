@@ -44,6 +44,8 @@ pub struct Tally {
     pub late: u32,
     /// Whole frames of other units or functions while an answer was waited for.
     pub foreign: u32,
+    /// Those of them that are of the unit that was asked.
+    pub misfit: u32,
     /// Bytes that belong to no frame.
     pub noise: u32,
     /// Those of them that are 00H or FFH, as an idle line gives them that nothing pulls to its rest.
@@ -55,11 +57,13 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub(crate) const EMPTY: Self = Self { late: 0, foreign: 0, noise: 0, noise_idle: 0, own_echo: 0, own_remnant: 0 };
+    pub(crate) const EMPTY: Self =
+        Self { late: 0, foreign: 0, misfit: 0, noise: 0, noise_idle: 0, own_echo: 0, own_remnant: 0 };
 
     pub(crate) const fn add(&mut self, more: &Self) {
         self.late = self.late.saturating_add(more.late);
         self.foreign = self.foreign.saturating_add(more.foreign);
+        self.misfit = self.misfit.saturating_add(more.misfit);
         self.noise = self.noise.saturating_add(more.noise);
         self.noise_idle = self.noise_idle.saturating_add(more.noise_idle);
         self.own_echo = self.own_echo.saturating_add(more.own_echo);
@@ -78,6 +82,10 @@ impl Tally {
 
     pub(crate) fn add_foreign(&mut self) {
         self.foreign = self.foreign.saturating_add(1);
+    }
+
+    pub(crate) fn add_misfit(&mut self) {
+        self.misfit = self.misfit.saturating_add(1);
     }
 
     pub(crate) fn add_own_echo(&mut self) {
@@ -125,6 +133,7 @@ mod tests {
         let full = Tally {
             late: u32::MAX,
             foreign: u32::MAX,
+            misfit: u32::MAX,
             noise: u32::MAX,
             noise_idle: u32::MAX,
             own_echo: u32::MAX,
@@ -134,6 +143,7 @@ mod tests {
         tally.add_noise(&[0x00, 0x55]);
         tally.add_late();
         tally.add_foreign();
+        tally.add_misfit();
         tally.add_own_echo();
         tally.add_own_remnant(true);
         assert_eq!(tally, full);

@@ -7,6 +7,7 @@
 //! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
 mod beside;
+mod instead;
 mod judge;
 mod overheard;
 mod remnant;
@@ -24,6 +25,7 @@ use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 use beside::Beside;
+use instead::Instead;
 use torn::Torn;
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
@@ -69,10 +71,13 @@ pub struct Master {
     request: Adu,
     /// The adapter is known to send every request back.
     strips_echo: bool,
+    /// The adapter is known to send none back.
+    never_echoes: bool,
     /// It has yet to send back the one in flight.
     echo_due: bool,
     /// What came beside the answer that is waited for.
     beside: Beside,
+    instead: Instead,
     torn: Torn,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
@@ -130,8 +135,10 @@ impl Master {
             state: State::Idle,
             request: Adu::new(),
             strips_echo: false,
+            never_echoes: false,
             echo_due: false,
             beside: Beside::NOTHING,
+            instead: Instead::NOTHING,
             torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,
@@ -290,6 +297,7 @@ impl Master {
                     self.doubts.goes_out();
                     self.others.goes_out();
                     self.beside.clear();
+                    self.instead.clear();
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {
@@ -405,6 +413,18 @@ impl Master {
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.
     pub const fn strip_echo(&mut self, strip: bool) {
         self.strips_echo = strip;
+    }
+
+    /// Whether the adapter is known to send no request back, so that one that comes back was said by the unit.
+    pub(crate) const fn never_echoes(&mut self, never: bool) {
+        self.never_echoes = never;
+    }
+
+    /// What came since the latest request went out and was not its answer: bytes that are no frame, and whole frames of others
+    /// or of another function. Not what is known to be late, or another master's.
+    #[must_use]
+    pub fn instead(&self) -> &[u8] {
+        self.instead.as_slice()
     }
 
     /// What was seen beside answers since the last call.

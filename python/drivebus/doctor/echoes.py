@@ -10,7 +10,7 @@ from typing import Any
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
-from drivebus.line.frames import frames_in, is_frame
+from drivebus.line.frames import frames_in, is_frame, may_be_of
 
 __all__ = ["Echoes"]
 
@@ -81,8 +81,10 @@ class Echoes:
             if frames_in(error.raw) or is_frame(error.raw):
                 self.bad += 1
                 self.last = str(error)
-            else:
+            elif may_be_of(self.unit, error.raw):
                 self.damaged += 1
+            else:
+                self.silent += 1
 
     @property
     def answered(self) -> int:

@@ -14,6 +14,7 @@ _HINTS: Mapping[str, tuple[Severity, type[BadAnswer | NoAnswer] | None]] = {
     "no_bias": (Severity.WARNING, BadAnswer),
     "interference": (Severity.WARNING, BadAnswer),
     "other_master": (Severity.FAULT, BadAnswer),
+    "other_answers": (Severity.WARNING, BadAnswer),
     "timeout_too_short": (Severity.WARNING, NoAnswer),
     "adapter_echo": (Severity.NOTE, None),
 }

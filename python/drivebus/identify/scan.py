@@ -13,7 +13,7 @@ from drivebus.identify.choose import usable
 from drivebus.identify.identify import Read, identify
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
-from drivebus.line.frames import frames_in
+from drivebus.line.frames import frames_in, may_be_of
 
 __all__ = ["look_for", "time_for", "units"]
 
@@ -51,7 +51,9 @@ async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | N
         if any(frame[0] == unit and huanyang.is_sure(frame) for frame in frames_in(error.raw)):
             said = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
             return Found(unit, None, None, took[0], said, protocol="huanyang")
-        return None if isinstance(error, NoAnswer) else Found(unit, None, None, took[0], str(error))
+        if isinstance(error, NoAnswer) or not may_be_of(unit, error.raw):
+            return None  # silence, noise, or somebody else's
+        return Found(unit, None, None, took[0], str(error))
     family = usable(found, unverified=True) or found.family
     problem = found.reason if found.certainty == "unknown" and found.code is None else None
     return Found(unit, family, found.code, took[0], problem, found.certainty, found.candidates)

@@ -8,7 +8,7 @@ from drivebus import rtu
 from drivebus._native import crc16
 from drivebus.line import huanyang
 
-__all__ = ["frames_in", "in_words", "is_frame"]
+__all__ = ["frames_in", "in_words", "is_frame", "may_be_of"]
 
 
 def frames_in(data: bytes) -> list[bytes]:
@@ -56,6 +56,15 @@ def _lengths(data: bytes, at: int) -> Iterator[int]:
 def is_frame(data: bytes) -> bool:
     """Whether *data* ends with its own CRC."""
     return len(data) >= 4 and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
+
+
+def may_be_of(unit: int, data: bytes) -> bool:
+    """Whether *data*, which came where *unit* was asked, may hold an answer of it, whole or damaged.
+
+    Noise, and what others say, does not: then the unit was as silent as if nothing had come.
+    """
+    frames = frames_in(data)
+    return any(frame[0] == unit for frame in frames) or (not frames and unit in data[:-1])
 
 
 def in_words(frame: bytes) -> str:

@@ -16,6 +16,7 @@ from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.harm import halt_of, harmed, harms
+from drivebus.line.frames import may_be_of
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile, profiles
 
@@ -78,11 +79,11 @@ class Aim:
                 raise _undecided(unit, command, verdict.others)
             try:
                 answer = await answer_once(read, unit.address, verdict.ask)
-            except NoAnswer:
+            except (NoAnswer, BadAnswer) as error:
+                if may_be_of(unit.address, error.raw):
+                    return None
                 # Silence is no evidence. Where it spoke before, the line lost this one.
                 return None if self._apart.is_asked or self._doubted else Target(unit, command)
-            except BadAnswer:
-                return None
             if not self._apart.heard(answer):
                 return None
         raise _undecided(unit, command, ())

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
 from drivebus.identify.harm import harmed
+from drivebus.line.frames import may_be_of
 from drivebus.operations import commands, state, words
 from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
 from drivebus.operations.unit import Unit
@@ -95,7 +96,7 @@ class Halt:
             self._heard, self._failure = self.unit.bus.now(), error
             self._doubt_named()
         except LINE_ERRORS as error:
-            if isinstance(error, BadAnswer):
+            if isinstance(error, BadAnswer) and may_be_of(self.unit.address, error.raw):
                 self._heard = self.unit.bus.now()
             # That one went out tells more than that a later one could not.
             if error.started is not None or self._failure is None or self._failure.started is None:

@@ -15,7 +15,7 @@ from drivebus import checks
 from drivebus.bus import Bus
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
 from drivebus.line import ports
-from drivebus.line.frames import frames_in
+from drivebus.line.frames import frames_in, may_be_of
 from drivebus.searching.located import Located, Progress
 from drivebus.searching.order import longest_delay
 from drivebus.searching.plan import Plan
@@ -187,6 +187,8 @@ class Search(Iterator[Located]):
             except NoAnswer:
                 break
             except BadAnswer as error:
+                if not may_be_of(unit, error.raw):
+                    break
                 located = Located(settings, unit, None, str(error))
         return located
 

@@ -55,7 +55,7 @@ matched!(
 );
 matched!(Attribution, "drivebus::rtu::Attribution", "Certain", "Repeat { .. }", "Wait(_)", "Others(_)");
 matched!(Role, "drivebus::rtu::Role", "Request", "Answer", "Late", "Doubtful", "Stray", "Noise(_)");
-taken_apart!(Tally, "drivebus::rtu::Tally", "late, foreign, noise, noise_idle, own_echo, own_remnant");
+taken_apart!(Tally, "drivebus::rtu::Tally", "late, foreign, misfit, noise, noise_idle, own_echo, own_remnant");
 taken_apart!(Patience, "drivebus::rtu::Patience", "pause, usual");
 taken_apart!(CallError, "drivebus::line::CallError", "failure, destination, request, raw, sent, ended");
 taken_apart!(PortError, "drivebus::line::PortError", "kind, port, message");

@@ -63,6 +63,17 @@ pub enum Hint {
         /// The slowest answer that came in time; zero if none did.
         slowest: Duration,
     },
+    /// Requests to a unit are answered by something else than the answer.
+    OtherAnswers {
+        /// Whose.
+        unit: UnitAddress,
+        /// How many of them.
+        others: u64,
+        /// How often it was asked.
+        requests: u64,
+        /// By what.
+        by: By,
+    },
     /// A unit is silent while others answer.
     SilentUnit {
         /// Which.
@@ -72,6 +83,18 @@ pub enum Hint {
         /// How often it was asked.
         requests: u64,
     },
+}
+
+/// What comes in the place of answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum By {
+    /// Whole frames of the unit, of another function than asked.
+    Functions,
+    /// Answers under another transaction number than asked.
+    Transactions,
+    /// Bytes that are no frame.
+    Bytes,
 }
 
 impl Hint {
@@ -86,6 +109,7 @@ impl Hint {
             Self::AdapterEcho { .. } => "adapter_echo",
             Self::OtherMaster { .. } => "other_master",
             Self::TimeoutTooShort { .. } => "timeout_too_short",
+            Self::OtherAnswers { .. } => "other_answers",
             Self::SilentUnit { .. } => "silent_unit",
         }
     }
@@ -94,13 +118,34 @@ impl Hint {
     pub fn unit(&self) -> Option<UnitAddress> {
         match *self {
             Self::Damaged { unit, .. } => unit,
-            Self::TimeoutTooShort { unit, .. } | Self::SilentUnit { unit, .. } => Some(unit),
+            Self::TimeoutTooShort { unit, .. } | Self::OtherAnswers { unit, .. } | Self::SilentUnit { unit, .. } => {
+                Some(unit)
+            }
             Self::NoBias { .. }
             | Self::Interference { .. }
             | Self::WrongFormat { .. }
             | Self::NobodyAnswers { .. }
             | Self::AdapterEcho { .. }
             | Self::OtherMaster { .. } => None,
+        }
+    }
+}
+
+impl By {
+    const fn in_words(self) -> &'static str {
+        match self {
+            Self::Functions => {
+                "by another function than asked. Either the unit, or a gateway before it, does not know the function and \
+                 does not refuse it as it should, or another master asks the same unit"
+            }
+            Self::Transactions => {
+                "under another transaction number than asked, so nothing tells what they answer: the gateway does not give \
+                 the number back. Look for newer firmware, or a mode that passes RTU through (socket://)"
+            }
+            Self::Bytes => {
+                "by bytes that are no frame. Its errors show them: what the unit says outside of Modbus, a second unit \
+                 with its address, another baud rate or parity, or an adapter that cuts bytes off"
+            }
         }
     }
 }
@@ -156,12 +201,15 @@ impl fmt::Display for Hint {
             Self::TimeoutTooShort { late, slowest, .. } => {
                 write!(f, "{late} answers came after the time-out")?;
                 if !slowest.is_zero() {
-                    write!(f, ", and the slowest in time took {:.1} ms", slowest.as_secs_f64() * 1e3)?;
+                    write!(f, ", while none of the others took longer than {:.1} ms", slowest.as_secs_f64() * 1e3)?;
                 }
                 f.write_str(
-                    ": the time-out is most likely too short for this unit. Wait longer, or lower its response delay \
+                    ": at times the unit takes longer than it is given. Wait longer, or lower its response delay \
                      (INVT: P14.03)",
                 )
+            }
+            Self::OtherAnswers { others, requests, by, .. } => {
+                write!(f, "{others} of {requests} requests were answered, but {}", by.in_words())
             }
             Self::SilentUnit { timeouts, requests, .. } => write!(
                 f,
@@ -182,6 +230,7 @@ mod tests {
 
     #[test]
     fn a_hint_says_who_what_and_what_to_do() {
+        let other = |by| Hint::OtherAnswers { unit: unit(4), others: 2, requests: 9, by };
         let hints = [
             (Hint::NoBias { noise: 10, idle: 9 }, "line: 9 of 10 bytes", "Add bias"),
             (Hint::Interference { noise: 7 }, "line: 7 bytes", "motor cables"),
@@ -196,6 +245,9 @@ mod tests {
                 "unit 4: 2 answers",
                 "480.5 ms",
             ),
+            (other(By::Functions), "unit 4: 2 of 9 requests", "another function"),
+            (other(By::Transactions), "unit 4: 2 of 9 requests", "transaction number"),
+            (other(By::Bytes), "unit 4: 2 of 9 requests", "no frame"),
             (Hint::SilentUnit { unit: unit(4), timeouts: 3, requests: 3 }, "unit 4: silent", "P14.00"),
         ];
         for (hint, beginning, advice) in hints {

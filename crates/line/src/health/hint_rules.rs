@@ -2,7 +2,7 @@
 
 use drivebus_rtu::UnitAddress;
 
-use crate::health::hint::Hint;
+use crate::health::hint::{By, Hint};
 use crate::health::stats::{Counters, Stats};
 
 /// One default read that brings nothing is three requests; of fewer nothing is said.
@@ -10,6 +10,9 @@ const ENOUGH_REQUESTS: u64 = 3;
 
 /// So many of a kind are no accident: a contactor nearby spoils one frame, or two.
 const NO_ACCIDENT: u64 = 3;
+
+/// What happened once may have come in one burst, or with a plug; twice is no chance.
+const MORE_THAN_ONE: u64 = 2;
 
 /// Noise is worth a word from one byte in so many requests on; a sound line brings none in days.
 const REQUESTS_PER_NOISE: u64 = 100;
@@ -43,15 +46,17 @@ impl Stats {
         } else {
             hints.extend(self.of_noise());
             hints.extend(self.of_damage());
+            hints.extend(self.of_other_answers());
             hints.extend(self.of_silence());
         }
-        if total.own_echoes > 0 {
+        if total.own_echoes >= MORE_THAN_ONE {
             hints.push(Hint::AdapterEcho { echoes: total.own_echoes });
         }
         let unasked = total.late.saturating_sub(total.left_open());
         let unasked = if unasked >= UNASKED && UNASKED_SHARE.is_reached(unasked, total.requests) { unasked } else { 0 };
-        if total.foreign + unasked >= NO_ACCIDENT {
-            hints.push(Hint::OtherMaster { frames: total.foreign + unasked });
+        let foreign = total.foreign.saturating_sub(total.other_functions);
+        if foreign + unasked >= NO_ACCIDENT {
+            hints.push(Hint::OtherMaster { frames: foreign + unasked });
         }
         hints
     }
@@ -60,11 +65,19 @@ impl Stats {
     fn of_no_answer(&self) -> Vec<Hint> {
         let &Counters { requests, noise_bytes: noise, noise_idle: idle, crc_errors: damaged, .. } = &self.total;
         let floats = FLOATING.is_reached(idle, noise) && damaged == 0;
+        let others = self.of_other_answers();
+        if others.iter().any(|hint| !matches!(hint, Hint::OtherAnswers { by: By::Bytes, .. })) {
+            return others;
+        }
         let mut hints = Vec::new();
-        if noise + damaged >= requests && !floats {
+        let is_noisy = self.total.noise_events >= MORE_THAN_ONE || damaged > 0;
+        if is_noisy && noise + damaged >= requests && !floats {
             hints.push(Hint::WrongFormat { requests, noise, damaged });
         } else {
-            hints.push(Hint::NobodyAnswers { requests });
+            // Whole frames of others are told by themselves.
+            if self.total.foreign < NO_ACCIDENT {
+                hints.push(Hint::NobodyAnswers { requests });
+            }
             hints.extend(self.of_noise());
         }
         hints
@@ -72,10 +85,32 @@ impl Stats {
 
     fn of_noise(&self) -> Option<Hint> {
         let &Counters { requests, noise_bytes: noise, noise_idle: idle, .. } = &self.total;
-        if noise < NO_ACCIDENT || noise * REQUESTS_PER_NOISE < requests {
+        let events = self.total.noise_events;
+        if noise < NO_ACCIDENT || noise * REQUESTS_PER_NOISE < requests || events < MORE_THAN_ONE {
             return None;
         }
-        Some(if FLOATING.is_reached(idle, noise) { Hint::NoBias { noise, idle } } else { Hint::Interference { noise } })
+        if FLOATING.is_reached(idle, noise) {
+            return Some(Hint::NoBias { noise, idle });
+        }
+        let in_place_of_answers = |figures: &Counters| figures.noise_events.min(figures.other_answers);
+        let told = self.units.values().filter(|figures| figures.says_no_frames()).map(in_place_of_answers).sum::<u64>();
+        (events.saturating_sub(told) >= MORE_THAN_ONE).then_some(Hint::Interference { noise })
+    }
+
+    /// Units whose requests were answered by something else, each with what it was most often.
+    fn of_other_answers(&self) -> Vec<Hint> {
+        let by = |figures: &Counters| {
+            let &Counters { other_functions: functions, other_transactions: transactions, .. } = figures;
+            if transactions >= MORE_THAN_ONE {
+                Some((By::Transactions, transactions))
+            } else if functions >= MORE_THAN_ONE {
+                Some((By::Functions, functions))
+            } else {
+                figures.says_no_frames().then_some((By::Bytes, figures.other_answers))
+            }
+        };
+        let told = self.units.iter().filter_map(|(&unit, figures)| Some((unit, figures.requests, by(figures)?)));
+        told.map(|(unit, requests, (by, others))| Hint::OtherAnswers { unit, others, requests, by }).collect()
     }
 
     fn of_damage(&self) -> Option<Hint> {
@@ -98,12 +133,14 @@ impl Stats {
         let late = self.total.late.min(self.total.left_open());
         let slow = if late >= LATE { self.slow_units(late) } else { Vec::new() };
         let is_silent = |figures: &Counters| {
-            figures.timeouts >= NO_ACCIDENT && SILENT.is_reached(figures.timeouts, figures.requests)
+            let silent = figures.timeouts.saturating_sub(figures.other_answers);
+            silent >= NO_ACCIDENT && SILENT.is_reached(silent, figures.requests)
         };
         let one_answers = self.units.values().any(|figures| figures.right() > 0 && !is_silent(figures));
         let mut hints = Vec::new();
         for (&unit, figures) in &self.units {
-            let &Counters { requests, timeouts, .. } = figures;
+            let &Counters { requests, other_answers, .. } = figures;
+            let timeouts = figures.timeouts.saturating_sub(other_answers);
             if slow.contains(&unit) {
                 hints.push(Hint::TimeoutTooShort { unit, late, slowest: figures.round_trip.max });
             } else if one_answers && is_silent(figures) {
@@ -135,6 +172,14 @@ impl Counters {
     /// All that came as an answer.
     fn came(&self) -> u64 {
         self.right() + self.crc_errors + self.bad_answers
+    }
+
+    /// Whether most of what it did not answer brought bytes that are no frame instead, and other ones than an idle line gives.
+    fn says_no_frames(&self) -> bool {
+        let others = self.other_answers.min(self.noise_events);
+        others >= MORE_THAN_ONE
+            && SILENT.is_reached(others, self.timeouts)
+            && !FLOATING.is_reached(self.noise_idle, self.noise_bytes)
     }
 
     /// Requests whose answer could still come.
@@ -182,6 +227,10 @@ mod tests {
                 counters.noise_bytes += figures.noise_bytes;
                 counters.noise_idle += figures.noise_idle;
                 counters.own_echoes += figures.own_echoes;
+                counters.other_answers += figures.other_answers;
+                counters.other_functions += figures.other_functions;
+                counters.other_transactions += figures.other_transactions;
+                counters.noise_events += figures.noise_events;
             });
         }
         stats
@@ -209,6 +258,7 @@ mod tests {
             foreign: 1,
             noise_bytes: 12,
             noise_idle: 6,
+            noise_events: 4,
             ..sound(10_000)
         };
         assert_eq!(bus([(1, figures), (2, sound(10_000))]).hints(), []);
@@ -218,22 +268,51 @@ mod tests {
 
     #[test]
     fn noise_is_told_by_what_it_is() {
-        let noisy = |noise_bytes, noise_idle| bus([(1, Counters { noise_bytes, noise_idle, ..sound(1_000) })]).hints();
+        let figures = |noise_bytes, noise_idle, noise_events| {
+            bus([(1, Counters { noise_bytes, noise_idle, noise_events, ..sound(1_000) })]).hints()
+        };
+        let noisy = |noise_bytes, noise_idle| figures(noise_bytes, noise_idle, 2);
         assert_eq!(noisy(10, 9), [Hint::NoBias { noise: 10, idle: 9 }]);
         assert_eq!(noisy(10, 1), [Hint::Interference { noise: 10 }]);
         assert_eq!(noisy(9, 9), [], "less than one in a hundred requests");
+        assert_eq!(figures(10, 9, 1), [], "all at once");
+        assert_eq!(figures(90, 2, 1), [], "all at once");
     }
 
     #[test]
     fn not_one_right_answer_is_told_by_what_came_instead() {
         let none = |figures: Counters| bus([(1, figures)]).hints();
         assert_eq!(none(silent(3)), [Hint::NobodyAnswers { requests: 3 }]);
-        let garbled = Counters { noise_bytes: 20, noise_idle: 4, ..silent(3) };
+        let garbled = Counters { noise_bytes: 20, noise_idle: 4, noise_events: 3, ..silent(3) };
         assert_eq!(none(garbled), [Hint::WrongFormat { requests: 3, noise: 20, damaged: 0 }]);
         let damaged = Counters { requests: 3, crc_errors: 3, ..Counters::default() };
         assert_eq!(none(damaged), [Hint::WrongFormat { requests: 3, noise: 0, damaged: 3 }]);
-        let floating = Counters { noise_bytes: 3, noise_idle: 3, ..silent(3) };
+        let floating = Counters { noise_bytes: 3, noise_idle: 3, noise_events: 3, ..silent(3) };
         assert_eq!(none(floating), [Hint::NobodyAnswers { requests: 3 }, Hint::NoBias { noise: 3, idle: 3 }]);
+    }
+
+    #[test]
+    fn a_greeting_is_no_wrong_format() {
+        let greeted = Counters { noise_bytes: 60, ..silent(3) };
+        assert_eq!(bus([(1, greeted)]).hints(), [Hint::NobodyAnswers { requests: 3 }]);
+    }
+
+    #[test]
+    fn what_comes_in_the_place_of_answers_is_neither_noise_nor_silence() {
+        let of = |by| [Hint::OtherAnswers { unit: unit(1), others: 3, requests: 13, by }];
+        let others = Counters { requests: 13, answers: 10, timeouts: 3, other_answers: 3, ..Counters::default() };
+        let bytes = Counters { noise_bytes: 6, noise_events: 3, ..others.clone() };
+        assert_eq!(bus([(1, bytes.clone())]).hints(), of(By::Bytes));
+        let functions = Counters { other_functions: 3, foreign: 3, ..others.clone() };
+        assert_eq!(bus([(1, functions.clone())]).hints(), of(By::Functions));
+        assert_eq!(bus([(1, Counters { other_transactions: 3, ..others.clone() })]).hints(), of(By::Transactions));
+        let other_unit = Counters { foreign: 3, ..others };
+        assert_eq!(bus([(1, other_unit)]).hints(), [Hint::OtherMaster { frames: 3 }]);
+        let all = Counters { requests: 3, answers: 0, ..functions };
+        let wanted = [Hint::OtherAnswers { unit: unit(1), others: 3, requests: 3, by: By::Functions }];
+        assert_eq!(bus([(1, all)]).hints(), wanted, "somebody answers");
+        let beside = Counters { noise_bytes: 40, noise_events: 9, ..sound(100) };
+        assert!(bus([(1, bytes), (2, beside)]).hints().contains(&Hint::Interference { noise: 46 }));
     }
 
     #[test]

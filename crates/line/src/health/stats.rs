@@ -65,7 +65,7 @@ pub struct Counters {
     pub resyncs: u64,
     /// Whole frames that came before the request went out, or that the unit still owed.
     pub late: u64,
-    /// Whole frames of others while an answer was waited for.
+    /// Whole frames of others, or of another function, while an answer was waited for.
     pub foreign: u64,
     /// Bytes that belong to no frame.
     pub noise_bytes: u64,
@@ -73,6 +73,16 @@ pub struct Counters {
     pub noise_idle: u64,
     /// Requests that the adapter sent back to us.
     pub own_echoes: u64,
+    /// Requests without an answer in time, but with something else in its place: frames of other functions, units or
+    /// transactions, or bytes that belong to no frame. They count as time-outs, too.
+    pub other_answers: u64,
+    /// Those of them to which the unit sent a whole frame of another function.
+    pub other_functions: u64,
+    /// Those of them that were answered under another transaction number.
+    pub other_transactions: u64,
+    /// How often bytes came that belong to no frame: beside a request, or between two. Not before or at the first request of
+    /// a connection: a server may greet.
+    pub noise_events: u64,
     /// From the first bit of the request to the last byte of the answer.
     pub round_trip: Latency,
     /// From the last character of the request to the first of the answer, as the times of characters are computed: how

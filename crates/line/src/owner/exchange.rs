@@ -39,11 +39,13 @@ pub(crate) struct Talk<'a, 'r> {
     is_wanted: &'a dyn Fn() -> bool,
     /// Why it was cut short the last time, and the one before.
     cuts: [Option<Failure>; 2],
+    /// What came during its latest request and is known to answer nothing that was asked.
+    pub(crate) strange: Vec<u8>,
 }
 
 impl<'a, 'r> Talk<'a, 'r> {
     pub(crate) fn new(call: Conversation<'r>, ask: &'a Ask<'r>, is_wanted: &'a dyn Fn() -> bool) -> Self {
-        Self { call, ask, is_wanted, cuts: [None, None] }
+        Self { call, ask, is_wanted, cuts: [None, None], strange: Vec::new() }
     }
 
     /// It is cut short at `now` by `failure`. A port that failed is opened again by who asks next.
@@ -63,6 +65,7 @@ impl<'a, 'r> Talk<'a, 'r> {
     /// What it came to; its answer goes to `take`.
     fn result(
         cuts: &mut [Option<Failure>; 2],
+        strange: &[u8],
         ask: &Ask<'_>,
         outcome: Outcome<'_>,
         take: &mut dyn FnMut(Answer<'_>),
@@ -78,6 +81,10 @@ impl<'a, 'r> Talk<'a, 'r> {
                 let cut = cuts[usize::from(before)].take();
                 let shows = shows.map(|words| words.iter().collect()).unwrap_or_default();
                 let failure = Failure::of(why, shows, cut);
+                let raw = match failure {
+                    Failure::NoAnswer { .. } if raw.is_empty() => strange,
+                    _ => raw,
+                };
                 Err(ask.failed(failure, sent, ended, raw))
             }
             // An outcome that this line does not know.
@@ -159,7 +166,9 @@ impl Owner {
             match talk.call.next(now, &mut self.known) {
                 Step::LetPass => return Then::LetPass,
                 Step::StandBy(until) => return Then::StandBy(until),
-                Step::Done(outcome) => return Then::Done(Talk::result(&mut talk.cuts, talk.ask, outcome, take)),
+                Step::Done(outcome) => {
+                    return Then::Done(Talk::result(&mut talk.cuts, &talk.strange, talk.ask, outcome, take));
+                }
                 Step::Send(frame) => {
                     let sent = match self.line.as_deref_mut() {
                         Some(line) => line.send(frame).map_err(|error| (line.now(), Failure::Port(error))),
@@ -251,13 +260,14 @@ impl Owner {
         exchange: &Exchange<'_>,
         give_up: &mut dyn FnMut() -> bool,
     ) {
+        self.take_late(&mut talk.strange);
         let failure = exchange.failure.map(|why| Failure::of(why, Vec::new(), talk.cuts[0].clone()));
         // Time-outs may be shorter than the time between two looks, and retries many.
         if failure.as_ref().is_some_and(may_be_given_up) && give_up() {
-            self.keep(talk.ask, exchange, Some(&Failure::Interrupted));
+            self.keep(talk, exchange, Some(&Failure::Interrupted));
             talk.cut_short(self, now, Failure::Interrupted);
         } else {
-            self.keep(talk.ask, exchange, failure.as_ref());
+            self.keep(talk, exchange, failure.as_ref());
         }
         talk.call.is_wanted((talk.is_wanted)());
         self.prepare_next(talk);

@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 
 use drivebus_rtu::{Duration, Instant, crc16};
 
+use crate::error::Hex;
 use crate::line::{Line, PortError, PortErrorKind};
 use crate::ports::tcp::Connection;
 use crate::system::clock::{monotonic, sleep_until};
@@ -52,6 +53,8 @@ pub struct ModbusTcp {
     open: VecDeque<u16>,
     /// Answers to them, as RTU frames, that nobody has taken yet.
     late: VecDeque<Vec<u8>>,
+    /// What came under other numbers, as RTU frames, that nobody has taken yet.
+    strange: VecDeque<Vec<u8>>,
 }
 
 impl ModbusTcp {
@@ -73,6 +76,7 @@ impl ModbusTcp {
             foreign: 0,
             open: VecDeque::new(),
             late: VecDeque::new(),
+            strange: VecDeque::new(),
         })
     }
 
@@ -85,8 +89,8 @@ impl ModbusTcp {
             if [protocol_high, protocol_low] != [0, 0] || !(MIN_BODY..=MAX_BODY).contains(&length) {
                 // Nothing tells where the next header begins, so nothing after this can be trusted.
                 return Err(self.connection.lost(format_args!(
-                    "{:02X?} is not a Modbus TCP header (a server that passes RTU through is opened as socket://)",
-                    &self.incoming[..PREFIX]
+                    "{} is not a Modbus TCP header (a server that passes RTU through is opened as socket://)",
+                    Hex(&self.incoming[..PREFIX])
                 )));
             }
             let end = PREFIX + length;
@@ -100,10 +104,16 @@ impl ModbusTcp {
                 self.frame.extend_from_slice(&crc16(body).to_le_bytes());
             } else {
                 self.foreign += 1;
+                let frame = [body, &crc16(body).to_le_bytes()].concat();
                 // One that comes twice is late once.
                 if let Some(place) = self.open.iter().position(|&open| open.to_be_bytes() == [high, low]) {
                     self.open.remove(place);
-                    self.late.push_back([body, &crc16(body).to_le_bytes()].concat());
+                    self.late.push_back(frame);
+                } else {
+                    if self.strange.len() == MAX_OPEN {
+                        self.strange.pop_front();
+                    }
+                    self.strange.push_back(frame);
                 }
             }
             self.incoming.drain(..end);
@@ -183,6 +193,10 @@ impl Line for ModbusTcp {
 
     fn take_late(&mut self) -> Option<Vec<u8>> {
         self.late.pop_front()
+    }
+
+    fn take_strange(&mut self) -> Option<Vec<u8>> {
+        self.strange.pop_front()
     }
 
     fn notes(&self) -> Vec<String> {

@@ -16,6 +16,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
         if tally.own_echo > 0 && (self.echo == OwnEcho::Unknown || !is_broadcast) {
             self.echo = OwnEcho::Present;
             self.master.strip_echo(true);
+            self.master.never_echoes(false);
             return;
         }
         if self.echo == OwnEcho::Absent || is_broadcast || ask.request.expected().may_repeat_request() {
@@ -31,7 +32,10 @@ impl<const U: usize, const P: usize> Known<U, P> {
                 Some(_) => false,
             };
         match self.echo {
-            OwnEcho::Unknown if clean => self.echo = OwnEcho::Absent,
+            OwnEcho::Unknown if clean => {
+                self.echo = OwnEcho::Absent;
+                self.master.never_echoes(true);
+            }
             // It did not echo this time: to be looked at again before anything depends on it.
             OwnEcho::Present if clean && failure.is_none() => {
                 self.echo = OwnEcho::Unknown;

@@ -64,6 +64,8 @@ pub(super) struct Flight<'r> {
     number: u32,
     /// Whether its unit may still answer another program.
     is_met: bool,
+    /// How many bytes came of an answer that began, and did not end.
+    begun: usize,
     /// What was seen beside its answer.
     tally: Tally,
 }
@@ -111,6 +113,7 @@ impl<'r> Conversation<'r> {
             is_out: false,
             number: known.begun.wrapping_add(1),
             is_met,
+            begun: 0,
             tally: Tally::default(),
         };
         known.master.keep_gap(self.question.gap);
@@ -189,7 +192,8 @@ impl<'r> Conversation<'r> {
                 Some(Unanswered::Corrupt(error))
             }
             Some(Event::NoAnswer { bytes }) => {
-                self.came.set(bytes);
+                flight.begun = bytes.len();
+                self.came.set(known.master.instead());
                 Some(Unanswered::NoAnswer { timeout, attempts: 1 })
             }
             Some(Event::Busy) => {
@@ -242,7 +246,11 @@ impl<'r> Conversation<'r> {
             Ok(times) => (None, times.ended, true),
             Err(slip) => (Some(slip.why), slip.ended, slip.sent.is_some()),
         };
-        let bytes = if result.is_err() { self.came.as_slice().len() } else { 0 };
+        let bytes = match failure {
+            None => 0,
+            Some(why) if why.is_silence() => flight.begun,
+            Some(_) => self.came.as_slice().len(),
+        };
         known.learn(ask, failure, bytes, flight.tally);
         let Some(unit) = unit else { return };
         let refused = failure.is_some_and(Unanswered::is_refused);

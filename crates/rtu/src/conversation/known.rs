@@ -143,6 +143,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             given => given,
         };
         self.master.strip_echo(self.echo == OwnEcho::Present);
+        self.master.never_echoes(self.echo == OwnEcho::Absent);
         // A connection of our own whose frames are told apart carries nobody else's answers.
         if !line.gapless {
             self.master.opened(now);

@@ -52,8 +52,8 @@ impl Master {
                     match judged {
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
                             self.beside.cut();
-                            self.see(now, range.clone());
-                            self.count_other(range, unit, doubted);
+                            self.count_other(now, &range, unit, doubted);
+                            self.see(now, range);
                         }
                         // Another word than the fresh one, another length than the one chosen: an earlier request's.
                         Err(_) if apart || self.doubts.owes(now, unit, &frame) => {
@@ -155,6 +155,7 @@ impl Master {
         {
             return passed_over(expected, frame, doubted);
         }
+        self.instead.add(self.framer.pending());
         self.beside.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() })
     }
 
@@ -252,21 +253,33 @@ impl Master {
     }
 
     fn add_beside(&mut self, range: Range<usize>) {
-        let rest = self.beside.add(self.framer.held(range));
-        self.tally.add_noise(rest);
+        let bytes = self.framer.held(range);
+        self.instead.add(bytes);
+        self.tally.add_noise(self.beside.add(bytes));
     }
 
     /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
     fn is_own_echo(&self, range: &Range<usize>, expected: Expected) -> bool {
-        (self.echo_due || !expected.may_repeat_request()) && self.framer.held(range.clone()) == self.request.as_bytes()
+        let is_adapters =
+            self.echo_due || !expected.may_repeat_request() && !(self.never_echoes && expected.is_write());
+        is_adapters && self.framer.held(range.clone()) == self.request.as_bytes()
     }
 
-    /// Counts a whole frame that is not the answer.
-    fn count_other(&mut self, range: Range<usize>, unit: UnitAddress, doubted: bool) {
-        if doubted && self.framer.held(range).first() == Some(&unit.get()) {
+    /// Counts a whole frame that is not the answer, and keeps it, unless it is late or may be another master's.
+    fn count_other(&mut self, now: Instant, range: &Range<usize>, unit: UnitAddress, doubted: bool) {
+        let frame = self.framer.frame(range.clone());
+        let is_met = self.doubts.first_contact_ends(now, unit).is_some();
+        let of_unit = frame.address() == unit.get();
+        if of_unit && doubted && (is_met || self.doubts.owes(now, unit, &frame)) {
             self.tally.add_late();
-        } else {
-            self.tally.add_foreign();
+            return;
+        }
+        if of_unit || frame.address() == 0 || !self.others.may_be() {
+            self.instead.add(frame.as_bytes());
+        }
+        self.tally.add_foreign();
+        if of_unit {
+            self.tally.add_misfit();
         }
     }
 
