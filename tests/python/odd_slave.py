@@ -1,4 +1,7 @@
-"""A slave that says exactly what a case tells it to: behind a pseudo-terminal, a TCP port that passes RTU through, or Modbus TCP."""
+"""A slave that says exactly what a case tells it to.
+
+It is behind a pseudo-terminal, a TCP port that passes RTU through, or Modbus TCP.
+"""
 
 from __future__ import annotations
 
@@ -85,8 +88,10 @@ def on_a_terminal(plan: Plan) -> Iterator[str]:
 def on_a_socket(
     plan: Plan, *, mbap: bool = False, greeting: bytes = b"", number: Callable[[int], int] = int, close: bool = False
 ) -> Iterator[str]:
-    """Yields its URL. *mbap*: it speaks Modbus TCP, and gives the transaction *number* back; *close*: it hangs up after each
-    answer."""
+    """Yields its URL.
+
+    *mbap*: it speaks Modbus TCP, and gives the transaction *number* back; *close*: it hangs up after each answer.
+    """
     listener = socket.create_server(("127.0.0.1", 0))
     over = threading.Event()
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from drivebus import places, rtu
 from drivebus.errors import DrivebusError
 from drivebus.line import huanyang
+from drivebus.line.inside import wrong_inside
 from drivebus.line.units import Units
 from drivebus.line.write_guard import code_text
 from drivebus.profile import Profile
@@ -115,6 +116,9 @@ def meaning(frame: bytes, sent: bool, asked: bytes | None = None, profile: Profi
     whom = f"unit {fields.unit}" if fields.unit else "all units"
     if fields.kind == "other" and huanyang.is_sure(frame):
         return huanyang.words(frame, sent)
+    inside = wrong_inside(frame, None if sent else asked) if fields.kind == "other" else None
+    if inside is not None:
+        return f"{whom} {inside}" if inside.startswith("answers") else f"{whom}: {inside}"
     if sent:
         return f"{whom}: {_request(fields, profile)}"
     if frame == asked and fields.kind == "read":

@@ -10,6 +10,7 @@ from drivebus._native import SerialFormat, Sniffer, exception_means
 from drivebus.capture import Captured, answers, is_frame
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
+from drivebus.line.inside import wrong_inside
 from drivebus.profile import Profile
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.families import Families
@@ -133,7 +134,10 @@ class Pairing:
             text = f"{who} may have answered, or was asked once more: what was heard does not tell"
             return self._ended(asked, None, BadAnswer(text, raw=self._doubt, **facts))
         if self._noise:
+            wrong = wrong_inside(self._noise, request) if self._noise[0] == request[0] else None
             text = f"{who} was answered by {counted(len(self._noise), 'byte')} and no frame"
+            if wrong is not None:
+                text = f"{who} {wrong}" if wrong.startswith("answers") else f"{who} was answered by a {wrong}"
             return self._ended(asked, None, BadAnswer(text, raw=self._noise, **facts))
         until = " before the end" if is_last else ""
         return self._ended(asked, None, NoAnswer(f"{who} did not answer{until}", **facts))
@@ -152,6 +156,10 @@ class Pairing:
     def _beside(self, piece: _Piece) -> Exchange:
         """What belongs to no request that is open."""
         role, data, began, ended, gap, _, _, why = piece
+        inside = wrong_inside(data) if role == "noise" else None
+        if inside is not None:
+            wrong = BadAnswer(f"unit {data[0]}: {inside}", unit=data[0], raw=data)
+            return Exchange(None, None, None, began + self._ahead, gap, None, wrong, lump=self._lump)
         if role == "noise":
             error = CrcError if len(data) >= 4 else BadAnswer
             text = f"{counted(len(data), 'byte')} {'is' if len(data) == 1 else 'are'} not a frame: {why}"
