@@ -41,8 +41,10 @@ impl Plan {
         let fits = answers.len() == reads.len()
             && answers.iter().zip(reads).all(|(words, read)| words.len() == usize::from(read.count));
         if !fits {
-            let came: Vec<_> = answers.iter().map(Vec::len).collect();
-            return Err(not_allowed(format!("words {came:?} for the reads {:?}", self.reads())));
+            let numbers = |counts: Vec<usize>| counts.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+            let came = numbers(answers.iter().map(Vec::len).collect());
+            let asked = numbers(reads.iter().map(|read| usize::from(read.count)).collect());
+            return Err(not_allowed(format!("answers of {came} words, for reads of {asked} words")));
         }
         let words = answers.concat();
         let values = self.core.values(&words).filter_map(|(quantity, value)| Some(number(py, quantity, value?)));

@@ -4,6 +4,9 @@
 //! out at its last byte; silence decides only what no length can: where an unknown function ends, and when a broken
 //! start will not be completed. Noise before and after a frame is skipped and handed out, never swallowed.
 //!
+//! An answer whose length nobody knows ends with the longest run of bytes whose CRC is right, when nothing came for longer than
+//! this line ever pauses inside an answer: a receiver hands over eight bytes at a time, an adapter what it collected.
+//!
 //! How bytes are cut by the operating system changes nothing: the same bytes at the same moments give the same
 //! frames.
 
@@ -53,6 +56,8 @@ pub struct Framer {
     patience: Option<(Duration, Instant)>,
     /// The request whose answer is looked for: an adapter may send it back to us.
     own: Adu,
+    /// No more of the answer is waited for: what is there of one that only silence ends is all of it.
+    is_late: bool,
     /// Bytes were given up for want of room, so that the front is no longer the start of a frame.
     overrun: bool,
 }
@@ -86,6 +91,7 @@ impl Framer {
             expect: None,
             patience: None,
             own: Adu::new(),
+            is_late: false,
             overrun: false,
         }
     }
@@ -98,6 +104,7 @@ impl Framer {
         self.clear();
         self.expect = Some(Awaited { unit: unit.get(), function: expected.function(), len: expected.adu_len() });
         self.patience = None;
+        self.is_late = false;
         self.own.clear();
     }
 
@@ -107,6 +114,11 @@ impl Framer {
     /// A pause shorter than the silence counts as that silence.
     pub fn wait_for_the_rest(&mut self, pause: Duration, least: Instant) {
         self.patience = Some((pause.max(self.silence), least));
+    }
+
+    /// After [`expect`](Self::expect): the time for the answer is over.
+    pub(crate) const fn is_late(&mut self) {
+        self.is_late = true;
     }
 
     /// After [`expect`](Self::expect): `own`, the request, may come back before its answer.
@@ -155,6 +167,10 @@ impl Framer {
     pub fn deadline(&self) -> Option<Instant> {
         match self.last {
             Some(_) if self.len == self.taken => None,
+            Some(last) if self.awaits_its_end() => match self.run(self.pending(), 0) {
+                Some(_) => Some(last + self.pause()),
+                None => self.gives_up(),
+            },
             Some(last) if self.lacks() == 0 => Some(last + self.silence),
             Some(_) => self.gives_up(),
             None => None,
@@ -210,6 +226,7 @@ impl Framer {
             return None;
         }
         let quiet = self.is_quiet(now);
+        let rests = self.is_late || self.last.is_none_or(|last| now >= last + self.pause());
         let is_over = quiet && self.gives_up().is_some_and(|moment| now >= moment);
         let mut error = None;
         let mut expected = false;
@@ -218,7 +235,7 @@ impl Framer {
             if start == self.len {
                 break None;
             }
-            match self.look(start, quiet, is_over) {
+            match self.look(start, quiet, (rests, is_over)) {
                 Look::Frame(len) => break Some(start..start + len),
                 Look::Wait => break None,
                 Look::Nothing(why) => {
@@ -260,6 +277,11 @@ impl Framer {
 
     fn is_quiet(&self, now: Instant) -> bool {
         self.last.is_none_or(|last| now >= last + self.silence)
+    }
+
+    /// For how long nothing comes after the end of an answer that only silence ends.
+    fn pause(&self) -> Duration {
+        self.patience.map_or(self.silence, |(pause, _)| pause)
     }
 
     fn take(&mut self, count: usize) {

@@ -33,6 +33,9 @@ use torn::Torn;
 /// Source: *Modbus over Serial Line* V1.02, §2.4.1 (100 ms to 200 ms).
 pub const TURNAROUND: Duration = Duration::from_millis(100);
 
+/// So many characters a receiver may collect before it hands them over: 8 and 14 are usual of the 16 that it has room for.
+const COLLECTED: u32 = 16;
+
 /// How long is listened on for an answer of which something has come, and not the right thing.
 ///
 /// Who has the clock learns both from answers that became whole.
@@ -233,6 +236,11 @@ impl Master {
         self.state = match job.destination {
             Destination::Unit(unit) => {
                 if let Some(Patience { pause, usual }) = self.patience {
+                    let collected = match job.expected.adu_len() {
+                        None if self.char_time < Duration::MAX => self.char_time.saturating_mul(COLLECTED),
+                        _ => Duration::ZERO,
+                    };
+                    let pause = pause.max(collected);
                     self.framer.wait_for_the_rest(pause, end + usual);
                 }
                 State::Waiting { unit, expected: job.expected, timeout: job.timeout, until }
@@ -274,6 +282,12 @@ impl Master {
     #[must_use]
     pub fn lacks(&self) -> usize {
         if matches!(self.state, State::Waiting { .. }) { self.framer.lacks() } else { 0 }
+    }
+
+    /// Whether an answer has begun that only silence ends.
+    #[must_use]
+    pub fn awaits_its_end(&self) -> bool {
+        matches!(self.state, State::Waiting { .. }) && self.framer.awaits_its_end()
     }
 
     /// What has happened by `now`; `None` when there is nothing to say.

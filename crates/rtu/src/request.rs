@@ -314,7 +314,7 @@ impl fmt::Display for RequestError {
             }
             Self::Coil { value } => write!(f, "a coil is written with FF00H or 0000H, not {value:04X}H"),
             Self::PduLength { len } => write!(f, "a PDU of {len} bytes does not fit its function (1 to {MAX_PDU})"),
-            Self::Function { function } => write!(f, "function {function:02X}H cannot be asked for (01H..=7FH)"),
+            Self::Function { function } => write!(f, "function {function:02X}H cannot be asked for (01H to 7FH can)"),
             Self::AnswerLength { len } => write!(f, "an answer's PDU of {len} bytes cannot be (1 to {MAX_PDU})"),
         }
     }

@@ -37,7 +37,7 @@ pub enum SimError {
         unit: u8,
     },
     /// No unit has this address here.
-    #[error("no unit {unit} is simulated; there are {present:?}")]
+    #[error("no unit {unit} is simulated; there are {}", listed(present))]
     NoUnit {
         /// The address asked for.
         unit: u8,
@@ -116,4 +116,9 @@ impl From<std::io::Error> for SimError {
     fn from(error: std::io::Error) -> Self {
         Self::Io(error)
     }
+}
+
+/// Numbers in words.
+fn listed(numbers: &[u8]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }

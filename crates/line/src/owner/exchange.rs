@@ -245,7 +245,7 @@ impl Owner {
         if let Some(carried) = carried {
             if count > 0 {
                 let (master, slept) = (self.known.master(), carried.slept);
-                carried.arrivals.came(*now, count, || !slept && master.lacks() > 0);
+                carried.arrivals.came(*now, count, || !slept && (master.lacks() > 0 || master.awaits_its_end()));
             }
             (carried.slept, carried.came) = (false, count);
         }

@@ -94,6 +94,13 @@ pub(crate) struct Taken {
     pub(crate) after_ms: u32,
 }
 
+impl Taken {
+    fn in_words(self) -> String {
+        let level = if self.rts_on_send { "high" } else { "low" };
+        format!("RTS {level} while sending, {} ms before and {} ms after", self.before_ms, self.after_ms)
+    }
+}
+
 /// What a port offers for this; a test has one of its own.
 pub(crate) trait Transceiver {
     /// Asks the driver to switch as told, or (`None`) not to.
@@ -171,7 +178,8 @@ impl Rs485 {
             Some(taken) if taken.rts_on_send == wanted.rts_on_send => taken,
             other => {
                 let _ = port.ask(None);
-                return Err(format!("asked for {wanted:?}, it took {other:?}"));
+                let took = other.map_or_else(|| "nothing".to_owned(), |other| other.in_words());
+                return Err(format!("asked for {}, it took {took}", wanted.in_words()));
             }
         };
         let note = (taken != wanted).then(|| {

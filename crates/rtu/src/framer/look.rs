@@ -19,6 +19,10 @@ const SHORT_ADU: usize = 8;
 /// fits.
 const TOLD: usize = 3;
 
+/// So many bytes behind an answer of unknown length may be noise, as a driver makes that lets go of the line. Of more, each
+/// would be one more place at which a damaged answer could seem to end.
+const BEHIND: usize = 8;
+
 /// What may stand at one place of the stream.
 pub(super) enum Look {
     Frame(usize),
@@ -27,8 +31,9 @@ pub(super) enum Look {
 }
 
 impl Framer {
-    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `is_over`: not then either.
-    pub(super) fn look(&self, start: usize, quiet: bool, is_over: bool) -> Look {
+    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `rests`: not then either,
+    /// if it is whole; `is_over`: if it is not, either.
+    pub(super) fn look(&self, start: usize, quiet: bool, (rests, is_over): (bool, bool)) -> Look {
         let expected = self.is_expected(start);
         // An expected answer may come in lumps; anything else ends where the line fell silent.
         let cut = start < self.ended && !expected;
@@ -58,6 +63,13 @@ impl Framer {
                 Some(Err(why)) => error = error.or(Some(why)),
                 None => incomplete = true,
             }
+        }
+        if expected && self.patience.is_some() && self.is_open_ended(here) {
+            return match self.run(here, start) {
+                Some(len) if rests => Look::Frame(len),
+                _ if !is_over => Look::Wait,
+                _ => Look::Nothing(error.or(Frame::parse(here).err()).filter(|_| here.len() >= TOLD)),
+            };
         }
         let by_silence = if expected { self.answer_len().is_none() } else { fresh };
         if closed && by_silence && (MIN_ADU..=MAX_ADU).contains(&here.len()) {
@@ -149,6 +161,26 @@ impl Framer {
             [_, function, ..] if function > EXCEPTION_BIT => [Some(EXCEPTION_ADU), None],
             _ => [None, None],
         }
+    }
+
+    /// Whether `here`, which begins as the answer looked for, is one that only silence ends.
+    fn is_open_ended(&self, here: &[u8]) -> bool {
+        let is_refusal = matches!(*here, [_, function, ..] if function & EXCEPTION_BIT != 0);
+        self.answer_len().is_none() && !is_refusal
+    }
+
+    /// Whether an answer that only silence ends has begun, and nothing stands before it.
+    pub(crate) fn awaits_its_end(&self) -> bool {
+        self.patience.is_some() && self.is_expected(self.taken) && self.is_open_ended(self.pending())
+    }
+
+    /// How long the longest run of `here`, which stands at `start`, is whose CRC is right: all of it, or up to where the line had
+    /// fallen silent, or but for a few bytes.
+    pub(super) fn run(&self, here: &[u8], start: usize) -> Option<usize> {
+        let all = here.len().min(MAX_ADU);
+        let silent = self.ended.saturating_sub(self.taken + start);
+        let ends = (all.saturating_sub(BEHIND)..=all).rev().chain([silent]);
+        ends.filter(|len| (MIN_ADU..=all).contains(len)).find(|&len| Frame::parse(&here[..len]).is_ok())
     }
 
     /// How long the answer looked for is; `None` where only silence tells, or none is looked for.

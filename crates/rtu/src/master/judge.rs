@@ -24,6 +24,9 @@ impl Master {
         timeout: Duration,
         until: Instant,
     ) -> Option<Event<'_>> {
+        if now >= until {
+            self.framer.is_late();
+        }
         while let Some(step) = self.framer.step(now) {
             match step {
                 Step::Skipped { range, error, expected: is_damaged } => {
