@@ -44,8 +44,8 @@ impl Stats {
         if total.right() == 0 {
             hints.extend(self.of_no_answer());
         } else {
-            hints.extend(self.of_noise());
-            hints.extend(self.of_damage());
+            hints.extend(self.of_noise().filter(|_| !self.meets_late_answers(total.noise_events)));
+            hints.extend(self.of_damage().filter(|_| !self.meets_late_answers(total.crc_errors)));
             hints.extend(self.of_other_answers());
             hints.extend(self.of_silence());
         }
@@ -128,9 +128,21 @@ impl Stats {
         Some(Hint::Damaged { unit, damaged: figures.crc_errors, answers: figures.came() })
     }
 
+    /// Whether `events` that spoilt bytes are no more than the answers that came late. A late one meets the next request on the
+    /// wire, and what both leave is neither interference nor a line that floats.
+    fn meets_late_answers(&self, events: u64) -> bool {
+        let late = self.late();
+        late >= LATE && events <= late && !self.slow_units(late).is_empty()
+    }
+
+    /// Answers that came after their time-out.
+    fn late(&self) -> u64 {
+        self.total.late.min(self.total.left_open())
+    }
+
     /// Units whose answers come too late, and units whose answers do not come while those of others do.
     fn of_silence(&self) -> Vec<Hint> {
-        let late = self.total.late.min(self.total.left_open());
+        let late = self.late();
         let slow = if late >= LATE { self.slow_units(late) } else { Vec::new() };
         let is_silent = |figures: &Counters| {
             let silent = figures.timeouts.saturating_sub(figures.other_answers);
@@ -336,6 +348,23 @@ mod tests {
         let next = Counters { late: 3, ..sound(100) };
         assert_eq!(bus([(1, before.clone()), (2, next)]).hints(), slow(unit(1)));
         assert_eq!(bus([(1, before), (2, sound(100))]).hints(), [], "silent now and then, and never late");
+    }
+
+    #[test]
+    fn what_late_answers_spoil_is_no_fault_of_the_line() {
+        let slow = |crc_errors, noise_events| Counters {
+            answers: 80,
+            timeouts: 20 - crc_errors,
+            crc_errors,
+            late: 18,
+            noise_bytes: 90,
+            noise_idle: 70,
+            noise_events,
+            ..sound(100)
+        };
+        let names = |figures| bus([(1, figures)]).hints().iter().map(Hint::name).collect::<Vec<_>>();
+        assert_eq!(names(slow(6, 12)), ["timeout_too_short"]);
+        assert_eq!(names(slow(0, 40)), ["no_bias", "timeout_too_short"], "more than they can have met");
     }
 
     #[test]
