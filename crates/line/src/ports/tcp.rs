@@ -85,12 +85,18 @@ impl Line for RtuOverTcp {
     }
 }
 
+/// What is said of a connection that ends where an answer was the last thing on it.
+const BEHIND_ITS_ANSWER: &str = "the other side closed it behind its answer (a server that does so after each answer has to be set \
+                                 to keep the connection open: a master makes sure of a unit by more than one request)";
+
 /// What both kinds of TCP line share: bytes through a socket, with deadlines on our clock.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: Kept<TcpStream>,
     /// As the user would write it: `scheme://host:port`.
     pub(crate) name: String,
+    /// Whether something came since the latest request.
+    answered: bool,
 }
 
 impl Connection {
@@ -110,7 +116,7 @@ impl Connection {
         let mut failure = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
         for address in addresses {
             match TcpStream::connect_timeout(&address, timeout).and_then(prepared) {
-                Ok(stream) => return Ok(Self { stream: Kept::new(stream), name }),
+                Ok(stream) => return Ok(Self { stream: Kept::new(stream), name, answered: false }),
                 Err(error) => failure = error,
             }
         }
@@ -119,7 +125,9 @@ impl Connection {
 
     /// Hands over all of `bytes`.
     pub(crate) fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let answered = std::mem::take(&mut self.answered);
         self.stream.write_all(bytes).map_err(|error| match error.kind() {
+            io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset if answered => self.lost(BEHIND_ITS_ANSWER),
             io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => self.lost("it takes no more bytes"),
             _ => self.lost(error),
         })
@@ -136,8 +144,12 @@ impl Connection {
                 return Ok(0);
             }
             match self.stream.read(buffer) {
+                Ok(0) if self.answered => return Err(self.lost(BEHIND_ITS_ANSWER)),
                 Ok(0) => return Err(self.lost("the other side closed it")),
-                Ok(count) => return Ok(count),
+                Ok(count) => {
+                    self.answered = true;
+                    return Ok(count);
+                }
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(self.lost(error)),
             }
@@ -215,6 +227,29 @@ mod tests {
     use std::net::TcpListener;
 
     use super::*;
+
+    #[test]
+    fn a_server_that_hangs_up_after_an_answer_is_told_from_one_that_says_nothing() {
+        for (answer, said) in [(&b"\x01"[..], true), (b"", false)] {
+            let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+            let port = listener.local_addr().unwrap().port();
+            let mut connection = Connection::open("socket", "127.0.0.1", port, Duration::from_secs(20)).unwrap();
+            let (mut server, _) = listener.accept().unwrap();
+            connection.send(b"?").unwrap();
+            server.read_exact(&mut [0]).unwrap();
+            server.write_all(answer).unwrap();
+            drop(server);
+            let far = monotonic() + Duration::from_secs(20);
+            let mut came = 0;
+            let error = loop {
+                match connection.receive(&mut [0; 8], far) {
+                    Ok(count) => came += count,
+                    Err(error) => break error,
+                }
+            };
+            assert_eq!((came, error.message.contains("behind its answer")), (answer.len(), said), "{error}");
+        }
+    }
 
     #[test]
     fn what_nobody_confirms_is_not_kept_for_long() {
