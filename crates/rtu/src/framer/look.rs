@@ -67,7 +67,7 @@ impl Framer {
         if expected && self.patience.is_some() && self.is_open_ended(here) {
             return match self.run(here, start) {
                 Some(len) if rests => Look::Frame(len),
-                _ if !is_over => Look::Wait,
+                _ if !is_over && !self.is_late => Look::Wait,
                 _ => Look::Nothing(error.or(Frame::parse(here).err()).filter(|_| here.len() >= TOLD)),
             };
         }

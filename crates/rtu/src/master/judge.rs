@@ -12,6 +12,7 @@ use crate::event::Event;
 use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::framer::Step;
+use crate::pdu::function::DIAGNOSTICS;
 use crate::{Instant, UnitAddress};
 
 impl Master {
@@ -273,7 +274,9 @@ impl Master {
         let frame = self.framer.frame(range.clone());
         let is_met = self.doubts.first_contact_ends(now, unit).is_some();
         let of_unit = frame.address() == unit.get();
-        if of_unit && doubted && (is_met || self.doubts.owes(now, unit, &frame)) {
+        // Nobody but a master of ours asks for an echo: one that comes unasked is a probe's.
+        let is_echo = frame.pdu().first() == Some(&DIAGNOSTICS);
+        if of_unit && doubted && (is_met || is_echo || self.doubts.owes(now, unit, &frame)) {
             self.tally.add_late();
             return;
         }
