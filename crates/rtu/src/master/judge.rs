@@ -264,8 +264,7 @@ impl Master {
 
     /// Whether the frame is the request in flight, sent back by the adapter and not by the unit.
     fn is_own_echo(&self, range: &Range<usize>, expected: Expected) -> bool {
-        let is_adapters =
-            self.echo_due || !expected.may_repeat_request() && !(self.never_echoes && expected.is_write());
+        let is_adapters = self.echo_due || !(expected.may_repeat_request() || self.never_echoes && expected.is_write());
         is_adapters && self.framer.held(range.clone()) == self.request.as_bytes()
     }
 
