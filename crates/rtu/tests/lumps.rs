@@ -31,11 +31,11 @@ fn framer(pdu: &[u8]) -> Framer {
 
 /// Hands `wire` over in lumps of `lump` bytes, `apart` microseconds apart, looking whenever the framer asks for it.
 fn in_lumps(framer: &mut Framer, wire: &[u8], lump: usize, apart: u64) -> (Vec<Vec<u8>>, Vec<u8>) {
-    let (mut frames, mut noise) = (Vec::new(), Vec::new());
+    let (mut heard, mut noise) = (Vec::new(), Vec::new());
     let mut take = |framer: &mut Framer, now| {
         while let Some(found) = framer.poll(now) {
             match found {
-                Ok(frame) => frames.push(frame.as_bytes().to_vec()),
+                Ok(frame) => heard.push(frame.as_bytes().to_vec()),
                 Err(skipped) => noise.extend_from_slice(skipped.bytes),
             }
         }
@@ -54,7 +54,7 @@ fn in_lumps(framer: &mut Framer, wire: &[u8], lump: usize, apart: u64) -> (Vec<V
         take(framer, moment);
         assert!(framer.deadline().is_none_or(|next| next > moment), "it asks for the same moment again");
     }
-    (frames, noise)
+    (heard, noise)
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn what_comes_around_it_is_skipped() {
         let wire = [before, &answer, behind].concat();
         for lump in [1, 8, wire.len()] {
             let (frames, noise) = in_lumps(&mut framer(&[0x2B, 0x0E, 1, 0]), &wire, lump, 8_334);
-            assert_eq!(frames, [answer.clone()]);
+            assert_eq!(frames, std::slice::from_ref(&answer));
             assert_eq!(noise, [before, behind].concat());
         }
     }

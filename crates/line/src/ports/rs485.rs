@@ -178,7 +178,7 @@ impl Rs485 {
             Some(taken) if taken.rts_on_send == wanted.rts_on_send => taken,
             other => {
                 let _ = port.ask(None);
-                let took = other.map_or_else(|| "nothing".to_owned(), |other| other.in_words());
+                let took = other.map_or_else(|| "nothing".to_owned(), Taken::in_words);
                 return Err(format!("asked for {}, it took {took}", wanted.in_words()));
             }
         };
