@@ -44,6 +44,7 @@ __all__ = [
     "open_bus",
     "port_facts",
     "port_url",
+    "read_sheet",
     "run_time_folder",
 ]
 

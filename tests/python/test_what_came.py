@@ -40,7 +40,7 @@ def odd(answer: bytes) -> Plan:
 @contextmanager
 def opened(kind: str, plan: Plan) -> Iterator[drivebus.Bus]:
     """A bus to the slave of *plan*, over *kind* of port."""
-    options: dict[str, Any] = {"parity": "N", "timeout": 0.2}
+    options: dict[str, Any] = {"parity": "N", "timeout": 0.5}
     if kind == "socket":
         with on_a_socket(plan) as url, drivebus.Bus(url, **options) as bus:
             yield bus

@@ -9,6 +9,7 @@ use crate::errors::refuse;
 type Table = (Vec<String>, Vec<(u64, Vec<String>)>);
 
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "what Python hands over")]
 #[pyo3(signature = (data, texts, /))]
 pub(crate) fn read_sheet(py: Python<'_>, data: &[u8], texts: Vec<String>) -> PyResult<Table> {
     py.detach(|| Sheet::read(&decode(whole_lines(data))?, |title| !texts.iter().any(|text| text == title)))

@@ -69,9 +69,9 @@ async def prepare_control(
         if item.actual is not None and row["by_hand"]:
             raise NotAllowed(
                 f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
-                f"({item.label}). prepare_control() does not set it: {item.note} Nothing was written. If that is "
-                f'meant, write("{item.code}", {int(item.wanted)}, store=True) (`drivebus write {item.code} '
-                f"{int(item.wanted)} --store`) comes first",
+                f"({item.label}). prepare_control() (`drivebus prepare`) does not set it: {item.note} "
+                f"Nothing was written. If {int(item.wanted)} is meant, write() {item.code} first, "
+                "with store=True (`--store`)",
                 unit=unit.address,
             )
         if item.actual is None or not (item.verified or unit.unverified):

@@ -114,6 +114,7 @@ mod tests {
     }
 
     #[derive(Debug)]
+    #[expect(dead_code, reason = "only what is printed of them counts")]
     struct Fields {
         busy: Option<Instant>,
         until: Instant,

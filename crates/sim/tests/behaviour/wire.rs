@@ -244,6 +244,6 @@ fn impossible_simulations_are_refused_in_words() {
     assert_eq!(refused(&[(1, "gd350"), (1, "gd350")]), "unit 1 is there twice; give each unit an address of its own");
     assert!(refused(&[(1, "gd35O")]).contains("gd350"), "the closest name is given");
     let simulator = Simulator::new([(1, "gd350"), (7, "gd350")], Options::default()).unwrap();
-    assert_eq!(simulator.drive(2).unwrap_err().to_string(), "no unit 2 is simulated; there are [1, 7]");
+    assert_eq!(simulator.drive(2).unwrap_err().to_string(), "no unit 2 is simulated; there are 1, 7");
     assert_eq!(simulator.name(), "sim:1=gd350,7=gd350");
 }
