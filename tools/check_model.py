@@ -387,14 +387,14 @@ BREAKS = [
     Break(
         "the adapter confirms nothing",
         JUDGE,
-        "(self.echo_due || !expected.may_repeat_request())",
+        "self.echo_due || !(expected.may_repeat_request() || self.never_echoes && expected.is_write())",
         "!expected.may_repeat_request()",
         "adapter-echoes",
     ),
     Break(
         "the adapter's echo of a read is known",
         JUDGE,
-        "(self.echo_due || !expected.may_repeat_request())",
+        "self.echo_due || !(expected.may_repeat_request() || self.never_echoes && expected.is_write())",
         "self.echo_due",
         "adapter-echoes",
     ),
