@@ -162,6 +162,13 @@ impl Watched {
         }
     }
 
+    /// `frame` came by other means than bytes of the line.
+    fn came_beside(&mut self, frame: &[u8]) {
+        let now = self.line.now();
+        self.trace.tell_ears(now, Direction::Heard, frame);
+        self.show(now, now, Direction::Heard, frame);
+    }
+
     fn is_quiet(&self, now: Instant) -> bool {
         now.saturating_duration_since(self.latest) >= QUIET.max(self.line.latency())
     }
@@ -218,19 +225,11 @@ impl Line for Watched {
     }
 
     fn take_late(&mut self) -> Option<Vec<u8>> {
-        let late = self.line.take_late()?;
-        let now = self.line.now();
-        self.trace.tell_ears(now, Direction::Heard, &late);
-        self.show(now, now, Direction::Heard, &late);
-        Some(late)
+        self.line.take_late().inspect(|late| self.came_beside(late))
     }
 
     fn take_strange(&mut self) -> Option<Vec<u8>> {
-        let strange = self.line.take_strange()?;
-        let now = self.line.now();
-        self.trace.tell_ears(now, Direction::Heard, &strange);
-        self.show(now, now, Direction::Heard, &strange);
-        Some(strange)
+        self.line.take_strange().inspect(|strange| self.came_beside(strange))
     }
 
     fn is_virtual(&self) -> bool {

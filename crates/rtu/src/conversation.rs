@@ -41,13 +41,14 @@ mod write_back;
 
 use core::time::Duration;
 
+use crate::bytes::Bytes;
 use crate::{Instant, UnitAddress};
 
 use attempt::Attempt;
 use course::Course;
 use exchange::{Flight, Purpose};
 use known::Ask;
-use outcome::{Bytes, Kept, Slip};
+use outcome::{Kept, Slip};
 use write_back::Write;
 
 pub use echo::OwnEcho;

@@ -6,6 +6,7 @@ mod address;
 mod agreement;
 mod answer;
 mod assumption;
+mod bytes;
 mod conversation;
 pub mod crc;
 mod doubt;

@@ -7,7 +7,6 @@
 //! How a quarantine ends, and under which assumption, stands in `doubt.rs`.
 
 mod beside;
-mod instead;
 mod judge;
 mod overheard;
 mod remnant;
@@ -15,6 +14,7 @@ mod torn;
 
 use core::time::Duration;
 
+use crate::bytes::Bytes;
 use crate::doubt::{Attribution, Doubts};
 use crate::event::{BeginError, Event, Tally};
 use crate::expected::Expected;
@@ -25,7 +25,6 @@ use crate::request::Request;
 use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 use beside::Beside;
-use instead::Instead;
 use torn::Torn;
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
@@ -80,7 +79,8 @@ pub struct Master {
     echo_due: bool,
     /// What came beside the answer that is waited for.
     beside: Beside,
-    instead: Instead,
+    /// What came in its place, to be told.
+    instead: Bytes,
     torn: Torn,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
@@ -141,7 +141,7 @@ impl Master {
             never_echoes: false,
             echo_due: false,
             beside: Beside::NOTHING,
-            instead: Instead::NOTHING,
+            instead: Bytes::NONE,
             torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,

@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use crate::pdu::MAX_PDU;
 use crate::{
-    Answer, AnswerError, BeginError, Destination, ExceptionCode, Expected, FrameError, Instant, MAX_ADU, Meaning,
-    Meanings, Request, Tally, Words,
+    Answer, AnswerError, BeginError, Destination, ExceptionCode, Expected, FrameError, Instant, Meaning, Meanings,
+    Request, Tally, Words,
 };
 
 /// When a request went out and its answer was there, on the caller's clock.
@@ -226,39 +226,6 @@ pub enum Outcome<'a> {
         /// Whether the port failed twice in a row, and this is how it did the first time: that tells more.
         before: bool,
     },
-}
-
-/// Bytes that came, kept.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Bytes {
-    bytes: [u8; Self::CAPACITY],
-    len: usize,
-}
-
-impl Bytes {
-    /// As many as a receiver keeps.
-    const CAPACITY: usize = 2 * MAX_ADU;
-
-    pub(super) const NONE: Self = Self { bytes: [0; Self::CAPACITY], len: 0 };
-
-    pub(super) fn set(&mut self, bytes: &[u8]) {
-        self.len = bytes.len().min(Self::CAPACITY);
-        self.bytes[..self.len].copy_from_slice(&bytes[..self.len]);
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    pub(super) fn as_slice(&self) -> &[u8] {
-        &self.bytes[..self.len]
-    }
-}
-
-impl core::fmt::Debug for Bytes {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "Bytes({:02X?})", self.as_slice())
-    }
 }
 
 /// An answer, kept without its address and CRC, and what it answers.

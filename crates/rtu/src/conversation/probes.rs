@@ -1,6 +1,7 @@
 //! The way back after a request was left open: which word to echo, and what to try with units that do not echo.
 
-use super::outcome::{Bytes, Slip};
+use super::outcome::Slip;
+use crate::bytes::Bytes;
 use crate::{Instant, Master, Request, Table, UnitAddress};
 
 /// How often one attempt echoes a unit that is known to return echoes.

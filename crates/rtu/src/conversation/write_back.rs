@@ -10,8 +10,9 @@
 //! | any other refusal | the caller is told |
 
 use super::known::Known;
-use super::outcome::{Bytes, Slip, Times, Unanswered};
+use super::outcome::{Slip, Times, Unanswered};
 use super::{Conversation, Question, State};
+use crate::bytes::Bytes;
 use crate::{AnswerError, ExceptionCode, Instant, Meaning, Request, Table};
 
 /// How often a unit that is at work is looked at within the time that a call may take.
