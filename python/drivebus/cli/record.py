@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
 
 import click
 from rich.live import Live
@@ -18,6 +16,7 @@ from drivebus.cli import names
 from drivebus.cli.lines import opened_lines
 from drivebus.cli.output import counted, printable, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.signals import ENDS, heeded
 from drivebus.cli.types import Place, Seconds, Size, Whole
 from drivebus.record.files import format_of
 
@@ -28,8 +27,6 @@ _SHOWN = 3
 
 _EACH = 0.25
 """Seconds between two looks at how far it has come."""
-
-_ENDS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 @click.command()
@@ -93,7 +90,7 @@ def record(
         if not out.as_json and not out.live:
             remark(f"Recording {counted(len(drives), 'drive')} into {target}. Ctrl-C ends it.")
         try:
-            with _ended_by_signals(), ExitStack() as live:
+            with heeded(ENDS, _end), ExitStack() as live:
                 if out.live:
                     live.enter_context(Live(shown, console=out.console, refresh_per_second=1 / _EACH, transient=True))
                 while not recorder.wait(_EACH):
@@ -149,19 +146,9 @@ class _Shown:
         self._problem = problem
 
 
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
+def _end(_number: int, _frame: object) -> None:
     """A signal that ends programs ends the recording as Ctrl-C does, so that the file gets its end."""
-
-    def end(_number: int, _frame: Any) -> None:
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, end) for number in _ENDS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    raise KeyboardInterrupt
 
 
 def _named(drive: drivebus.Drive, wanted: tuple[str, ...]) -> list[str] | None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import replace
-from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -20,6 +18,7 @@ from drivebus.cli.kept import Kept
 from drivebus.cli.names import parse_families
 from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.signals import ENDS, heeded
 from drivebus.cli.sniff_table import SniffTable
 from drivebus.cli.types import Place, Seconds, Whole
 from drivebus.sniffer import Exchange, Families, Figures
@@ -28,8 +27,6 @@ __all__ = ["COMMANDS"]
 
 _EACH = 0.2
 """Seconds between two looks of the live table."""
-
-_ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 @click.command()
@@ -125,23 +122,16 @@ def sniff(
     _told(replace(session, port=port), figures, target, kept)
 
 
-@contextmanager
-def _ended_by_signals(stop: threading.Event) -> Iterator[None]:
+def _ended_by_signals(stop: threading.Event) -> AbstractContextManager[None]:
     """What ends programs sets *stop*, so that all that was heard is shown and kept; the second time it ends at once."""
 
-    def end(number: int, _frame: Any) -> None:
+    def end(number: int, _frame: object) -> None:
         signal.signal(number, signal.default_int_handler)
         stop.set()
 
     # What is ignored, as under nohup, stays so.
-    before = {number: was for number in _ENDS if (was := signal.getsignal(number)) not in (signal.SIG_IGN, None)}
-    try:
-        for number in before:
-            signal.signal(number, end)
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    heard = [each for each in (signal.SIGINT, *ENDS) if signal.getsignal(each) not in (signal.SIG_IGN, None)]
+    return heeded(heard, end)
 
 
 def _units(context: click.Context, session: Session) -> frozenset[int]:

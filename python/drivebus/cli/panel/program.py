@@ -22,13 +22,12 @@ from drivebus.cli.panel.fleet import Member, opened
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.motors import stop_all, wait_for_all
 from drivebus.cli.session import Session
+from drivebus.cli.signals import ENDS, heeded
 
 __all__ = ["Ended", "run"]
 
 _PATIENCE = 1.0
 """Seconds that the screen is given to end after a signal, once the motors stand."""
-
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 @dataclass
@@ -124,10 +123,8 @@ def _heeding_signals(app: Panel, ended: Ended) -> Iterator[None]:
             # Not `threading`: its locks may be held by what this signal interrupted.
             _thread.start_new_thread(end, ())
 
-    before = {number: signal.signal(number, on_signal) for number in _SIGNALS}
-    try:
-        yield
-    finally:
-        over.set()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with heeded((signal.SIGINT, *ENDS), on_signal):
+        try:
+            yield
+        finally:
+            over.set()
