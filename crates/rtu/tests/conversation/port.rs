@@ -156,17 +156,8 @@ fn a_failure_that_is_given_up_when_it_is_told_ends_the_call() {
     let mut rig = Rig::settled().does([Nothing, Right]);
     let fresh = FreshWords::beginning_at(1);
     let mut call = Conversation::new(ask(7, 1).retries(3), &fresh);
-    loop {
-        match call.next(rig.now, &mut rig.known) {
-            Step::Send(_) => drop(call.sent(&mut rig.known, rig.now).unwrap()),
-            Step::Listen(until) => {
-                rig.now = rig.now.max(until);
-                call.heard(rig.now, &mut rig.known, &[]).unwrap();
-            }
-            Step::Heard(_) => break call.cut_short(rig.now, &mut rig.known, Cut::GivenUp),
-            _ => {}
-        }
-    }
+    rig.meets_silence(&mut call);
+    call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
     let told = rig.carry_out(&mut call);
     assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::GivenUp)), 0));
     assert!(told.last_sent.is_some());
