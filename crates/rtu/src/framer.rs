@@ -226,7 +226,6 @@ impl Framer {
             return None;
         }
         let quiet = self.is_quiet(now);
-        let rests = self.is_late || self.last.is_none_or(|last| now >= last + self.pause());
         let is_over = quiet && self.gives_up().is_some_and(|moment| now >= moment);
         let mut error = None;
         let mut expected = false;
@@ -235,7 +234,7 @@ impl Framer {
             if start == self.len {
                 break None;
             }
-            match self.look(start, quiet, (rests, is_over)) {
+            match self.look(start, now, (quiet, is_over)) {
                 Look::Frame(len) => break Some(start..start + len),
                 Look::Wait => break None,
                 Look::Nothing(why) => {
@@ -277,6 +276,11 @@ impl Framer {
 
     fn is_quiet(&self, now: Instant) -> bool {
         self.last.is_none_or(|last| now >= last + self.silence)
+    }
+
+    /// Whether nothing more will come of an answer that only silence ends, if it is whole.
+    fn rests(&self, now: Instant) -> bool {
+        self.is_late || self.last.is_none_or(|last| now >= last + self.pause())
     }
 
     /// For how long nothing comes after the end of an answer that only silence ends.

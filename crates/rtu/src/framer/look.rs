@@ -2,13 +2,13 @@
 //! waiting for its end.
 
 use super::Framer;
-use crate::UnitAddress;
 use crate::crc::{crc16, update};
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::pdu::function::{
     DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_DISCRETE, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE,
     WRITE_SINGLE,
 };
+use crate::{Instant, UnitAddress};
 
 const HIGHEST_UNIT: u8 = UnitAddress::MAX.get();
 /// Address, function code, exception code or byte count, CRC.
@@ -31,9 +31,9 @@ pub(super) enum Look {
 }
 
 impl Framer {
-    /// What stands at `start`. `quiet`: no more bytes will come, unless an answer comes in lumps; `rests`: not then either,
-    /// if it is whole; `is_over`: if it is not, either.
-    pub(super) fn look(&self, start: usize, quiet: bool, (rests, is_over): (bool, bool)) -> Look {
+    /// What stands at `start` at `now`. `quiet`: no more bytes will come, unless an answer comes in lumps; `is_over`: not then
+    /// either.
+    pub(super) fn look(&self, start: usize, now: Instant, (quiet, is_over): (bool, bool)) -> Look {
         let expected = self.is_expected(start);
         // An expected answer may come in lumps; anything else ends where the line fell silent.
         let cut = start < self.ended && !expected;
@@ -66,7 +66,7 @@ impl Framer {
         }
         if expected && self.patience.is_some() && self.is_open_ended(here) {
             return match self.run(here, start) {
-                Some(len) if rests => Look::Frame(len),
+                Some(len) if self.rests(now) => Look::Frame(len),
                 _ if !is_over && !self.is_late => Look::Wait,
                 _ => Look::Nothing(error.or(Frame::parse(here).err()).filter(|_| here.len() >= TOLD)),
             };
