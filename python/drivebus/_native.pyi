@@ -41,6 +41,9 @@ __all__ = [
     "exception_means",
     "fault_kinds",
     "frame_len",
+    "frames_in",
+    "judge",
+    "misses",
     "open_bus",
     "port_facts",
     "port_url",
@@ -92,6 +95,27 @@ def frame_len(data: Buffer, /) -> int | None:
     """How many bytes at the front of *data* are a whole frame of a function that tells its length.
 
     As a request or as an answer, with the CRC right; None where none is.
+    """
+
+def judge(frame: Buffer) -> tuple[bool, bool, str | None]:
+    """Whether a master, and whether a unit, may have sent *frame*, and what is wrong inside.
+
+    Of a frame that is wrong inside, they say of which of the two it has the form, if of any; its CRC is right. Raises
+    CrcError, BadAnswer.
+    """
+
+def misses(request: Buffer, frame: Buffer) -> str | None:
+    """How *frame*, of the unit and function of *request*, misses what that asks for, in words.
+
+    None where it answers that, or something else.
+
+    Raises CrcError, BadAnswer.
+    """
+
+def frames_in(data: Buffer, /) -> list[tuple[int, int]]:
+    """Where the whole frames in *data* stand, start and end, whatever stands between them.
+
+    Those with a length that their function gives, a good CRC, and nothing wrong inside.
     """
 
 def port_facts(

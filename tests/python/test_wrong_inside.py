@@ -13,12 +13,12 @@ from .odd_slave import framed
 
 WRONG = {
     "0A 10 00 01 00 03 06 0A 0B 0C": "write of 3 words with 3 bytes of data where 6 are announced; the CRC is right",
-    "0A 10 00 01 00 03 04 0A 0B 0C 0D": "write of 3 words with 4 bytes of data where 6 belong; the CRC is right",
-    "0A 10 00 01 00 00 00": "write of 0 words; the CRC is right",
+    "0A 10 00 01 00 03 04 0A 0B 0C 0D": "write of 3 words with 4 bytes of data where 6 are needed; the CRC is right",
+    "0A 10 00 01 00 00 00": "write of 0 words, which can be 1 to 123; the CRC is right",
     "01 04 00": "answers with 0 words; the CRC is right",
     "01 03 04 00 01": "answers with 2 bytes of data where 4 are announced; the CRC is right",
     "01 03 03 00 01 02": "answers with 3 bytes of data, which are no whole words; the CRC is right",
-    "01 06 20 00 01": "write with 3 bytes where 4 belong; the CRC is right",
+    "01 06 20 00 01": "write with 3 bytes where 4 are needed; the CRC is right",
 }
 
 

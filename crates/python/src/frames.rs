@@ -166,3 +166,32 @@ pub(crate) fn decode<'py>(py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResul
 fn set_table(fields: &Bound<'_, PyDict>, table: Table) -> PyResult<()> {
     if table == Table::Holding { Ok(()) } else { fields.set_item("table", table.name()) }
 }
+
+/// Whether a master and whether a unit may have sent a frame, and what is wrong inside.
+#[pyfunction]
+pub(crate) fn judge(frame: &Bound<'_, PyAny>) -> PyResult<(bool, bool, Option<String>)> {
+    let bytes = bytes_of(frame)?;
+    let bytes = bytes.as_bytes();
+    let frame = Frame::parse(bytes).map_err(|error| frame_error(error, bytes))?;
+    let Some(wrong) = frame.wrong_inside() else { return Ok((frame.may_ask(), frame.may_answer(), None)) };
+    let is_request = wrong.is_request();
+    Ok((is_request == Some(true), is_request == Some(false), Some(wrong.to_string())))
+}
+
+/// Why a frame does not answer a request of the same unit and function, in words.
+#[pyfunction]
+pub(crate) fn misses(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+    let (asked, came) = (bytes_of(request)?, bytes_of(frame)?);
+    let (asked, came) = (asked.as_bytes(), came.as_bytes());
+    let asked = Frame::parse(asked).map_err(|error| frame_error(error, asked))?;
+    let came = Frame::parse(came).map_err(|error| frame_error(error, came))?;
+    Ok(came.misses(&asked).map(|why| why.to_string()))
+}
+
+/// Where the whole frames in a row of bytes stand.
+#[pyfunction]
+#[pyo3(signature = (data, /))]
+pub(crate) fn frames_in(data: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usize)>> {
+    let bytes = bytes_of(data)?;
+    Ok(drivebus_rtu::frames_in(bytes.as_bytes()).map(|range| (range.start, range.end)).collect())
+}

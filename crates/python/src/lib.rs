@@ -42,7 +42,9 @@ mod _native {
     #[pymodule_export]
     use crate::format::SerialFormat;
     #[pymodule_export]
-    use crate::frames::{crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len};
+    use crate::frames::{
+        crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, judge, misses,
+    };
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]

@@ -18,6 +18,7 @@ use core::time::Duration;
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
 use crate::{Instant, SerialFormat, UnitAddress};
 
+pub(crate) use asked::{can_ask, may_be_answer};
 use lengths::Length;
 pub use lengths::frame_len;
 pub use role::Role;
@@ -100,6 +101,16 @@ impl<'a> Heard<'a> {
             _ => Some(Frame::found(self.bytes)),
         }
     }
+}
+
+/// How long the request is with which `here` begins, where its bytes tell.
+pub(crate) fn of_request(here: &[u8]) -> Option<usize> {
+    lengths::of_request(here).bytes()
+}
+
+/// How long the answer is with which `here` begins, where its bytes tell.
+pub(crate) fn of_answer(here: &[u8]) -> Option<usize> {
+    lengths::of_answer(here).bytes()
 }
 
 /// What stands at one place.

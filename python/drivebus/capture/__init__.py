@@ -1,14 +1,18 @@
-"""Captures: the frames of a line in a file that Wireshark opens, or as hex text.
+"""Captures: the frames of a line in a file that Wireshark opens, or in the text of any tool.
 
-`frame` says what is in one. `opened` tells formats apart: `pcapng` and `pcap` give `packets`, `text` says what hex of
-any tool means. `contents` sorts packets: `links` says what is in one of a `serial_line`, `network` finds TCP
-connections in those of a network and `modbus_tcp` what of these is Modbus, `streams` finds frames in bytes. `reading`
-reads any of them, `writer` makes one.
+`frame` says what is in one, and whether bytes are a frame. `opened` tells formats apart: `pcapng` and `pcap` give
+`packets`, all else is a text. `contents` sorts packets: `links` says what is in one of a `serial_line`, `network` finds
+TCP connections in those of a network and `modbus_tcp` what of these is Modbus, `streams` finds frames in bytes.
+
+Of a text, `encoding` makes letters of its bytes and `tokens` numbers of the letters. `layout` says what stands beside
+the bytes, `finding` finds the frames, `speakers` says who sent each, and `text` is all of that.
+
+`reading` reads any of them, `writer` makes one.
 """
 
-from drivebus.capture.frame import Captured
+from drivebus.capture.frame import Captured, is_frame
 from drivebus.capture.reading import line_of, read
-from drivebus.capture.streams import answers, is_frame
+from drivebus.capture.streams import answers
 from drivebus.capture.writer import Writer
 
 __all__ = ["Captured", "Writer", "answers", "is_frame", "line_of", "read"]

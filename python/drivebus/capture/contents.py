@@ -8,11 +8,10 @@ from dataclasses import replace
 from itertools import chain
 
 from drivebus.capture import links, network
-from drivebus.capture.frame import Captured
+from drivebus.capture.frame import Captured, is_frame
 from drivebus.capture.modbus_tcp import Found, found_in
 from drivebus.capture.packets import Interface, Packet
 from drivebus.capture.serial_line import SerialLine
-from drivebus.capture.streams import is_frame
 from drivebus.checks import counted
 from drivebus.errors import NotAllowed
 

@@ -1,10 +1,15 @@
-"""One frame of a capture."""
+"""One frame of a capture, and whether bytes are one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Captured"]
+from drivebus._native import crc16
+
+__all__ = ["LONGEST", "SHORTEST", "Captured", "is_frame"]
+
+SHORTEST, LONGEST = 4, 256
+"""Bytes of a frame, its address and its CRC included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,3 +32,13 @@ class Captured:
     line: str = ""
     connection: int = 0
     at_once: bool = False
+
+    @property
+    def is_frame(self) -> bool:
+        """Whether it is one: its CRC is right."""
+        return is_frame(self.data)
+
+
+def is_frame(data: bytes) -> bool:
+    """Whether *data* is as long as a frame can be, and ends with its own CRC."""
+    return SHORTEST <= len(data) <= LONGEST and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 from drivebus._native import crc16, frame_len
-from drivebus.capture.frame import Captured
+from drivebus.capture.frame import Captured, is_frame
 from drivebus.capture.network import Connection, Side
-from drivebus.capture.streams import Piece, Record, is_frame, pieces
+from drivebus.capture.streams import Piece, Record, pieces
 
 __all__ = ["Found", "found_in"]
 

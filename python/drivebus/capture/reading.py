@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from drivebus._native import SerialFormat
-from drivebus.capture import pcapng, text
+from drivebus.capture import pcapng
 from drivebus.capture.contents import Contents
 from drivebus.capture.frame import Captured
 from drivebus.capture.opened import opened, packets_of
@@ -26,7 +26,7 @@ def read(path: str | os.PathLike[str], say: Callable[[str], object] | None = Non
     """The frames of the capture at *path*, in its order, line by line where it is of several.
 
     Args:
-        path: A pcapng or pcap file, or hex text; also packed by gzip.
+        path: A pcapng or pcap file, or the text of any tool; also packed by gzip.
         say: Is given what is to be known of the file, a line each: what was left out, and what it is where it is not of
             a serial line.
 
@@ -37,7 +37,7 @@ def read(path: str | os.PathLike[str], say: Callable[[str], object] | None = Non
     with opened(Path(path), name) as (magic, stream):
         packets = packets_of(magic)
         if packets is None:
-            yield from _text(stream.read(_MOST_TEXT + 1), name)
+            yield from _text(stream.read(_MOST_TEXT + 1), name, say or _silently)
             return
         contents, broken = Contents(name), None
         try:
@@ -73,16 +73,21 @@ def line_of(path: str | os.PathLike[str]) -> SerialFormat | None:
         return None
 
 
-def _text(data: bytes, name: str) -> Iterator[Captured]:
+def _text(data: bytes, name: str, say: Callable[[str], object]) -> Iterator[Captured]:
     if len(data) > _MOST_TEXT:
         raise NotAllowed(f"{name} is not a pcapng file, and too long to be hex text: {_MOST_TEXT >> 20} MiB at most")
-    try:
-        written = data.decode()
-    except UnicodeDecodeError:
-        raise NotAllowed(f"{name} is neither a pcapng file nor hex text") from None
-    found = False
-    for frame in text.frames(written):
-        found = True
-        yield frame
-    if not found:
-        raise NotAllowed(f"{name} holds no frame: it is neither a pcapng file nor hex text with a frame on a line")
+    # What reads text takes a while to load, and who listens to a line needs none of it.
+    from drivebus.capture import text
+    from drivebus.capture.encoding import decoded
+
+    found, said = text.heard(decoded(data))
+    has_frame = any(frame.is_frame for frame in found)
+    for remark in said if has_frame else ():
+        say(remark)
+    yield from found
+    if not has_frame:
+        why = "".join(f"; {remark}" for remark in said)
+        raise NotAllowed(
+            f"{name} holds no frame: it is neither a pcapng file nor hex text with a frame in it; "
+            f"{text.LOOKED_FOR}{why}"
+        )

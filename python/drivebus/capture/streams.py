@@ -12,13 +12,11 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from drivebus._native import crc16, decode, decode_answer, frame_len
+from drivebus._native import decode, decode_answer, frame_len
+from drivebus.capture.frame import LONGEST, SHORTEST, is_frame
 from drivebus.errors import DrivebusError, Refused
 
-__all__ = ["Piece", "Record", "answers", "asks", "is_frame", "is_mixed", "pieces"]
-
-_SHORTEST, _LONGEST = 4, 256
-"""Bytes of a frame, its address and its CRC included."""
+__all__ = ["Piece", "Record", "answers", "asks", "is_mixed", "pieces"]
 
 _MOST_RECORDS = 64
 """A frame of a length that it does not tell lies in so many records at most."""
@@ -86,11 +84,6 @@ def pieces(records: Sequence[Record]) -> Iterator[Piece]:
         yield _piece(records, ends, data, noise, at)
 
 
-def is_frame(data: bytes) -> bool:
-    """Whether *data* is as long as a frame can be, and matches its CRC."""
-    return _SHORTEST <= len(data) <= _LONGEST and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
-
-
 def asks(frames: Sequence[bytes]) -> bool | None:
     """Whether *frames*, all of one direction, are a master's; None where they do not tell, or are of both."""
     requests, answers = _kinds(frames)
@@ -128,17 +121,17 @@ def _length(data: bytes, at: int, ends: Sequence[int], here: int, may_begin: boo
     """How long the frame at *at* is, in record *here* which ends with one of *ends*; 0 where none is."""
     if may_begin and is_frame(data[at : ends[here]]):
         return ends[here] - at
-    length = frame_len(data[at : at + _LONGEST])
+    length = frame_len(data[at : at + LONGEST])
     if length is not None:
         return length
     if not may_begin:
         return 0
     for end in ends[here + 1 : here + _MOST_RECORDS]:
-        if end - at > _LONGEST:
+        if end - at > LONGEST:
             break
         if is_frame(data[at:end]):
             return end - at
-    for length in range(_SHORTEST, min(_LONGEST, ends[here] - at)):
+    for length in range(SHORTEST, min(LONGEST, ends[here] - at)):
         if is_frame(data[at : at + length]):
             rest = data[at + length : ends[here]]
             if is_frame(rest) or frame_len(rest) is not None:

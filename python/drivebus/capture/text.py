@@ -1,41 +1,60 @@
-"""Hex text of any tool as frames: a line each, with whatever else stands on it.
-
-Understood are bytes as `01 03 21 00`, `01-03-21-00`, `0x01,0x03`, `[01][03]` (libmodbus) or `010321008E36`. What stands
-before them is skipped: a time, an offset, `TX:`, `->`, `request`. A mark that tells the direction is taken.
-"""
+"""The text of any tool as frames in their order, each with who sent it as far as that can be told."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
+from drivebus.capture.finding import pieces
 from drivebus.capture.frame import Captured
+from drivebus.capture.speakers import Speakers, without_repeats
 
-__all__ = ["frames"]
+__all__ = ["LOOKED_FOR", "frames", "heard"]
 
-_BYTES = re.compile(
-    r"(?:(?<![\w.:])(?:0x)?[0-9a-f]{2}(?:(?:[\s,;:-]+|\]\s*\[|><)(?:0x)?[0-9a-f]{2}(?![\w.]))+)|"
-    r"(?<![\w.:])(?:[0-9a-f]{2}){4,}(?!\w)",
-    re.IGNORECASE,
+LOOKED_FOR = (
+    "looked for: bytes as hexadecimal, decimal, octal or binary numbers, or as text with escapes, on one line or over "
+    "several, with a CRC of Modbus RTU or a head of Modbus TCP"
 )
-"""Two bytes or more with something between them, or four and more without."""
 
-_MOMENT = re.compile(r"\b\d{4}-\d\d-\d\d\b|\b\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?\b")
-
-_BYTE = re.compile(r"[0-9a-f]{2}(?![0-9a-f]x)", re.IGNORECASE)
-_PREFIX = re.compile(r"0x", re.IGNORECASE)
-_ASKS = re.compile(r"->|>>|\b(?:tx|send|sent|sending|request|query|master|write)\b", re.IGNORECASE)
-_ANSWERS = re.compile(r"<-|<<|\b(?:rx|recv|received|receiving|response|answer|reply|slave|read)\b", re.IGNORECASE)
+_ASCII = re.compile(r":((?:[0-9A-Fa-f]{2}){3,})(?![0-9A-Za-z])")
 
 
 def frames(text: str) -> Iterator[Captured]:
-    """The frames in *text*, one for each line that has one."""
-    for written in text.splitlines():
-        line = _MOMENT.sub(lambda moment: "_" * len(moment[0]), written)
-        found = max(_BYTES.finditer(line), key=lambda match: len(match[0]), default=None)
-        if found is None:
-            continue
-        data = bytes(int(byte, 16) for byte in _BYTE.findall(_PREFIX.sub("", found[0])))
-        before = line[: found.start()]
-        asks, answers = _ASKS.search(before), _ANSWERS.search(before)
-        yield Captured(None, data, None if bool(asks) == bool(answers) else asks is not None)
+    """The frames in *text*, and the bytes that look as if they were meant and are in none."""
+    yield from heard(text)[0]
+
+
+def heard(text: str) -> tuple[list[Captured], list[str]]:
+    """As `frames`, and what is to be said of them."""
+    found, repeats = without_repeats(pieces(text))
+    speakers = Speakers(found)
+    told = [
+        Captured(
+            None,
+            piece.data,
+            speakers.asks(piece) if piece.is_frame else None,
+            at_once=piece.transaction is not None,
+        )
+        for piece in found
+    ]
+    return told, list(_remarks(text, repeats, sum(piece.transaction is not None for piece in found)))
+
+
+def _remarks(text: str, repeats: int, by_tcp: int) -> Iterator[str]:
+    if by_tcp:
+        added = "its is" if by_tcp == 1 else "theirs are"
+        yield f"{_counted(by_tcp)} of Modbus TCP, which has no CRC: {added} added here"
+    if repeats:
+        yield f"{_counted(repeats)} told twice by the tool: shown once"
+    lines = [number for number, line in enumerate(text.splitlines(), 1) if any(map(_is_ascii, _ASCII.findall(line)))]
+    if lines:
+        yield f"line {lines[0]} is Modbus ASCII, its LRC is right; here only RTU and TCP are taken apart"
+
+
+def _counted(count: int) -> str:
+    return f"{count} frame{'' if count == 1 else 's'}"
+
+
+def _is_ascii(digits: str) -> bool:
+    """Whether *digits* are a frame of Modbus ASCII: all its bytes add up to zero."""
+    return sum(bytes.fromhex(digits)) & 0xFF == 0

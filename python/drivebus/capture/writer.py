@@ -7,7 +7,6 @@ from typing import BinaryIO
 from drivebus import _native, checks
 from drivebus.capture import links, pcapng
 from drivebus.capture.frame import Captured
-from drivebus.capture.streams import is_frame
 
 __all__ = ["Writer"]
 
@@ -34,8 +33,7 @@ class Writer:
         Raises:
             OSError: The disk is full, or who read the pipe has gone.
         """
-        packed = links.packed(frame, self._link, is_frame(frame.data))
-        self._put(pcapng.packet(frame.time or 0.0, packed, frame.asks))
+        self._put(pcapng.packet(frame.time or 0.0, links.packed(frame, self._link, frame.is_frame), frame.asks))
 
     def _put(self, block: bytes) -> None:
         self._stream.write(block)

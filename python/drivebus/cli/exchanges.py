@@ -80,7 +80,7 @@ class Lines:
         if exchange.request is None:
             return str(error)
         if exchange.protocol != "modbus":
-            return _foreign(exchange)
+            return self._foreign(exchange)
         profile = None if exchange.unit is None else self._families.of(exchange.unit, exchange.request)
         asked = meaning(exchange.request, True, None, profile)
         if profile is not None and exchange.unit is not None and self._guessed(exchange.unit):
@@ -88,7 +88,7 @@ class Lines:
         again = f" (again, {exchange.repeated})" if exchange.repeated else ""
         if isinstance(error, drivebus.Refused):
             name = f" {error.name}" if error.name else ""
-            return f"{asked}{again} -> refused: exception {error.code:02X}H{name}{_after(exchange)}"
+            return f"{asked}{again} -> refused: exception {error.code:02X}H{name}{self._after(exchange)}"
         if error is not None:
             told = str(error).removeprefix(f"unit {exchange.unit} ")
             raw = f" [{error.raw.hex(' ').upper()}]" if error.raw else ""
@@ -96,7 +96,7 @@ class Lines:
         if exchange.answer is None:
             return f"{asked}{again}"
         told = meaning(exchange.answer, False, exchange.request, profile).removeprefix(f"unit {exchange.unit} ")
-        return f"{asked}{again} -> {told.removeprefix('answers ')}{_after(exchange)}"
+        return f"{asked}{again} -> {told.removeprefix('answers ')}{self._after(exchange)}"
 
     def _record(self, exchange: Exchange) -> dict[str, Any]:
         error = exchange.error
@@ -116,29 +116,28 @@ class Lines:
             },
         }
         if not self._has_times:
-            del told["time"]
+            for name in ("time", "gap", "turnaround"):
+                del told[name]
         if self._line:
             told["line"] = self._line
         if error is not None:
             told |= {"error": str(error), "raw": error.raw, "exit_code": exit_code(error)}
         return told
 
+    def _after(self, exchange: Exchange) -> str:
+        turnaround = exchange.turnaround if self._has_times else None
+        return "" if not turnaround else f", after {turnaround * 1e3:.2f} ms"
+
+    def _foreign(self, exchange: Exchange) -> str:
+        """An exchange in Huanyang's own protocol."""
+        asked = huanyang.words(exchange.request or b"", True)
+        if exchange.answer is None:
+            return asked if exchange.error is None else f"{asked} -> did not answer"
+        told = huanyang.words(exchange.answer, False).removeprefix(f"unit {exchange.unit} ")
+        return f"{asked} -> {told.removesuffix(huanyang.REMARK)}{self._after(exchange)}"
+
     def _guessed(self, unit: int) -> bool:
         return self._families.is_guess(unit)
-
-
-def _foreign(exchange: Exchange) -> str:
-    """An exchange in Huanyang's own protocol."""
-    asked = huanyang.words(exchange.request or b"", True)
-    if exchange.answer is None:
-        return asked if exchange.error is None else f"{asked} -> did not answer"
-    told = huanyang.words(exchange.answer, False).removeprefix(f"unit {exchange.unit} ")
-    return f"{asked} -> {told.removesuffix(huanyang.REMARK)}{_after(exchange)}"
-
-
-def _after(exchange: Exchange) -> str:
-    turnaround = exchange.turnaround
-    return "" if not turnaround else f", after {turnaround * 1e3:.2f} ms"
 
 
 def taken_back(families: Families) -> Iterator[str]:

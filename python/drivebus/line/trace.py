@@ -118,7 +118,7 @@ def meaning(frame: bytes, sent: bool, asked: bytes | None = None, profile: Profi
         return huanyang.words(frame, sent)
     inside = wrong_inside(frame, None if sent else asked) if fields.kind == "other" else None
     if inside is not None:
-        return f"{whom} {inside}" if inside.startswith("answers") else f"{whom}: {inside}"
+        return inside
     if sent:
         return f"{whom}: {_request(fields, profile)}"
     if frame == asked and fields.kind == "read":

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from typing import TypedDict
 
-from drivebus._native import SerialFormat, Sniffer, exception_means
-from drivebus.capture import Captured, answers, is_frame
+from drivebus._native import SerialFormat, Sniffer, crc16, exception_means, judge, misses
+from drivebus.capture import Captured, answers
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.inside import wrong_inside
@@ -19,6 +20,8 @@ from drivebus.sniffer.foreign import Foreign
 __all__ = ["Pairing", "exchanges_in"]
 
 _Piece = tuple[str, bytes, float, float, "float | None", float, "float | None", "str | None"]
+
+_LAST_UNIT = 247
 
 _GIVEN_UP = 5.0
 """Seconds after which a request is told as unanswered, although nothing was asked since."""
@@ -46,7 +49,7 @@ class Pairing:
         self._families = families
         self._ahead = ahead
         self._open: _Piece | None = None
-        self._noise = b""
+        self._noise: list[_Piece] = []
         self._doubt = b""
         self._unanswered: bytes = b""
         self._repeated = 0
@@ -87,16 +90,19 @@ class Pairing:
                     yield from self._foreign.hear(before, self._lump)
                 yield from self._foreign.hear(piece, self._lump)
                 continue
-            if role == "request":
+            if role in ("request", "asked"):
                 if self._open is not None:
                     yield self._unheard(self._open)
                 self._open = piece
-                if data[0] == 0:
+                if data[0] == 0 and role == "request":
                     yield self._ended(piece, None, None)
             elif role == "answer" and self._open is not None:
+                yield from map(self._beside, self._noise)
                 yield self._ended(self._open, piece, self._refusal(self._open[1], data))
+            elif (wrong := self._wrong_inside(piece)) is not None:
+                yield from self._miscounted(piece, wrong)
             elif role == "noise" and self._open is not None:
-                self._noise += data
+                self._noise.append(piece)
             elif role == "doubtful" and self._open is not None:
                 self._doubt += data
             else:
@@ -109,7 +115,7 @@ class Pairing:
         profile = self._families.of(request[0], request)
         repeated = self._repeated if request == self._unanswered else 0
         self._unanswered, self._repeated = (b"", 0) if error is None or came is not None else (request, repeated + 1)
-        self._open, self._noise, self._doubt = None, b"", b""
+        self._open, self._noise, self._doubt = None, [], b""
         return Exchange(
             unit=request[0],
             request=request,
@@ -129,18 +135,36 @@ class Pairing:
         """The exchange of a request that nobody has surely answered; *is_last* if nothing at all came behind it."""
         request = asked[1]
         who = f"unit {request[0]}"
-        facts = _Facts(unit=request[0], request=request, started=asked[2] + self._ahead)
+        facts = self._facts(asked)
         if self._doubt:
             text = f"{who} may have answered, or was asked once more: what was heard does not tell"
             return self._ended(asked, None, BadAnswer(text, raw=self._doubt, **facts))
         if self._noise:
-            wrong = wrong_inside(self._noise, request) if self._noise[0] == request[0] else None
-            text = f"{who} was answered by {counted(len(self._noise), 'byte')} and no frame"
-            if wrong is not None:
-                text = f"{who} {wrong}" if wrong.startswith("answers") else f"{who} was answered by a {wrong}"
-            return self._ended(asked, None, BadAnswer(text, raw=self._noise, **facts))
+            noise = b"".join(piece[1] for piece in self._noise)
+            text = f"{who} was answered by {counted(len(noise), 'byte')} and no frame"
+            return self._ended(asked, None, BadAnswer(text, raw=noise, **facts))
         until = " before the end" if is_last else ""
         return self._ended(asked, None, NoAnswer(f"{who} did not answer{until}", **facts))
+
+    def _miscounted(self, piece: _Piece, wrong: str) -> Iterator[Exchange]:
+        """The exchanges that end with *piece*, a frame whose CRC is right and whose inside is *wrong*."""
+        data, asked = piece[1], self._open
+        if asked is not None and misses(asked[1], data) is not None:
+            yield self._ended(asked, None, BadAnswer(wrong, raw=data, **self._facts(asked)))
+            return
+        if asked is not None and judge(data)[0]:
+            yield self._unheard(asked)
+        yield self._beside(piece, wrong)
+
+    def _wrong_inside(self, piece: _Piece) -> str | None:
+        """What is wrong inside of *piece*, where it is one that was told to be no answer for that."""
+        role, data, *_ = piece
+        if role not in ("missed", "noise"):
+            return None
+        return wrong_inside(data, None if self._open is None else self._open[1])
+
+    def _facts(self, asked: _Piece) -> _Facts:
+        return _Facts(unit=asked[1][0], request=asked[1], started=asked[2] + self._ahead)
 
     def _refusal(self, request: bytes, answer: bytes) -> Refused | None:
         if answer[1] & 0x80 == 0:
@@ -153,17 +177,17 @@ class Pairing:
         text = f"unit {unit} refused function {request[1]:02X}H with exception {code:02X}H{known}"
         return Refused(text, code=code, name=name, meaning=meaning, means=means, unit=unit, request=request, raw=answer)
 
-    def _beside(self, piece: _Piece) -> Exchange:
-        """What belongs to no request that is open."""
+    def _beside(self, piece: _Piece, inside: str = "") -> Exchange:
+        """What belongs to no request that is open; *inside* says what is wrong inside of it."""
         role, data, began, ended, gap, _, _, why = piece
-        inside = wrong_inside(data) if role == "noise" else None
-        if inside is not None:
-            wrong = BadAnswer(f"unit {data[0]}: {inside}", unit=data[0], raw=data)
-            return Exchange(None, None, None, began + self._ahead, gap, None, wrong, lump=self._lump)
+        if inside:
+            miscounted = BadAnswer(inside, unit=data[0], raw=data)
+            return Exchange(data[0], None, None, began + self._ahead, gap, None, miscounted, lump=self._lump)
         if role == "noise":
-            error = CrcError if len(data) >= 4 else BadAnswer
-            text = f"{counted(len(data), 'byte')} {'is' if len(data) == 1 else 'are'} not a frame: {why}"
-            return Exchange(None, None, None, began + self._ahead, gap, None, error(text, raw=data), lump=self._lump)
+            kind = CrcError if len(data) >= 4 else BadAnswer
+            because = (why or "").rpartition(" are not a frame: ")[2]
+            text = f"{counted(len(data), 'byte')} {'is' if len(data) == 1 else 'are'} not a frame: {because}"
+            return Exchange(None, None, None, began + self._ahead, gap, None, kind(text, raw=data), lump=self._lump)
         texts = {
             "late": f"unit {data[0]} answered late, when something else had been asked",
             "doubtful": f"unit {data[0]} answered late, or was asked once more: what was heard does not tell",
@@ -195,7 +219,7 @@ def exchanges_in(
 def _exchanges_of(known: list[Captured], line: SerialFormat, families: Families) -> Iterator[Exchange]:
     """The exchanges of one line."""
     pairing = Pairing(line, families)
-    if known and all(frame.asks is not None or not is_frame(frame.data) for frame in known):
+    if known and all(frame.asks is not None or not frame.is_frame for frame in known):
         yield from pairing.take(_pieces(known, line))
         return
     # Moments near to zero: a float has no room for nanoseconds since 1970.
@@ -217,22 +241,53 @@ def _later(exchange: Exchange, by: float) -> Exchange:
     return replace(exchange, time=exchange.time + by, answered=answered)
 
 
-def _pieces(frames: Iterable[Captured], line: SerialFormat) -> Iterator[_Piece]:
+def _pieces(frames: Sequence[Captured], line: SerialFormat) -> Iterator[_Piece]:
     """What the core would have told of *frames*, of which it is known who sent them."""
     open_, asked = b"", 0.0
     last: float | None = None
-    for frame in frames:
+    for frame, following in zip_longest(frames, frames[1:]):
         ended = (last or 0.0) if frame.time is None else frame.time
         began = ended if frame.at_once else ended - len(frame.data) * line.char_time
         gap = None if last is None else max(began - last, 0.0)
         last = ended
-        if not is_frame(frame.data):
-            yield "noise", frame.data, began, ended, gap, 0.0, None, "its CRC does not match"
+        if not frame.is_frame:
+            yield "noise", frame.data, began, ended, gap, 0.0, None, _why_not(frame.data)
+        elif wrong_inside(frame.data) is not None:
+            yield "noise", frame.data, began, ended, gap, 0.0, None, None
         elif frame.asks:
             open_, asked = frame.data, ended
-            yield "request", frame.data, began, ended, gap, 0.0, None, None
-        elif open_ and answers(open_, frame.data):
+            # Unit 0 is everybody on a serial line, and answers behind a gateway of Modbus TCP.
+            is_answered = frame.data[0] == 0 and following is not None and _answers(open_, following)
+            yield "asked" if is_answered else "request", frame.data, began, ended, gap, 0.0, None, None
+        elif open_ and _answers(open_, frame):
             open_ = b""
             yield "answer", frame.data, began, ended, gap, 0.0, max(began - asked, 0.0), None
+        elif open_ and misses(open_, frame.data) is not None:
+            open_ = b""
+            yield "missed", frame.data, began, ended, gap, 0.0, None, None
         else:
             yield "stray", frame.data, began, ended, gap, 0.0, None, None
+
+
+def _answers(request: bytes, answer: Captured) -> bool:
+    if answer.asks:
+        return False
+    # A gateway of Modbus TCP has units that a serial line has not, which answer as any.
+    return answers(*map(_of_a_line, (request, answer.data))) if answer.at_once else answers(request, answer.data)
+
+
+def _of_a_line(frame: bytes) -> bytes:
+    """*frame* as if it were of a unit that a serial line can have."""
+    if 1 <= frame[0] <= _LAST_UNIT:
+        return frame
+    body = bytes([1]) + frame[1:-2]
+    return body + crc16(body).to_bytes(2, "little")
+
+
+def _why_not(data: bytes) -> str | None:
+    """Why *data* is not a frame; None of one."""
+    try:
+        judge(data)
+    except DrivebusError as error:
+        return str(error)
+    return None

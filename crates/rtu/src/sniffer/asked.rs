@@ -104,7 +104,7 @@ pub(super) fn is_pair(request: &[u8], answer: &[u8]) -> bool {
 }
 
 /// Whether a master may have sent `frame`.
-pub(super) fn can_ask(frame: &[u8]) -> bool {
+pub(crate) fn can_ask(frame: &[u8]) -> bool {
     match lengths::of_request(frame) {
         Length::Is(len) => len == frame.len() && Request::parse(pdu(frame)).is_ok(),
         Length::Unknown => true,
@@ -113,7 +113,7 @@ pub(super) fn can_ask(frame: &[u8]) -> bool {
 }
 
 /// Whether a unit may have sent `frame`.
-pub(super) fn may_be_answer(frame: &[u8]) -> bool {
+pub(crate) fn may_be_answer(frame: &[u8]) -> bool {
     match lengths::of_answer(frame) {
         Length::Is(len) => len == frame.len(),
         Length::Unknown => true,

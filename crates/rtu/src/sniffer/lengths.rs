@@ -33,6 +33,16 @@ pub(super) enum Length {
     Unknown,
 }
 
+impl Length {
+    /// So many bytes, where that is told.
+    pub(super) const fn bytes(self) -> Option<usize> {
+        match self {
+            Self::Is(bytes) => Some(bytes),
+            Self::Later | Self::Never | Self::Unknown => None,
+        }
+    }
+}
+
 /// The length of the request that begins with `here`, address first.
 pub(super) fn of_request(here: &[u8]) -> Length {
     let [_, function, ..] = *here else { return Length::Later };
