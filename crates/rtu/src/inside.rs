@@ -45,6 +45,16 @@ pub enum WrongInside {
         /// How many.
         count: u16,
     },
+    /// Such a read of words, or an answer with three bytes, which are no whole words: both look the same.
+    #[non_exhaustive]
+    ReadOrAnswer {
+        /// What is read.
+        table: Table,
+        /// The first, if it is a read.
+        address: u16,
+        /// How many, if it is a read.
+        count: u16,
+    },
     /// The answer to a read, whose count does not agree with its data.
     #[non_exhaustive]
     Answer {
@@ -78,7 +88,7 @@ impl WrongInside {
         match self {
             Self::Write { .. } | Self::Read { .. } => Some(true),
             Self::Answer { .. } => Some(false),
-            Self::Coil { .. } | Self::Length { .. } => None,
+            Self::ReadOrAnswer { .. } | Self::Coil { .. } | Self::Length { .. } => None,
         }
     }
 }
@@ -108,6 +118,11 @@ impl fmt::Display for WrongInside {
                 } else {
                     f.write_str(" that ends beyond FFFFH")
                 }
+            }
+            Self::ReadOrAnswer { table, address, count } => {
+                Self::Read { table, address, count }.fmt(f)?;
+                f.write_str(", or ")?;
+                Self::Answer { table, announced: 3, data: 3 }.fmt(f)
             }
             Self::Answer { table, announced, data } => {
                 f.write_str("answers with ")?;
@@ -192,8 +207,12 @@ impl Frame<'_> {
                 WrongInside::Write { bits: function == WRITE_COILS, count, announced, data: data.len() }
             }
             (Some(table), &[a1, a0, c1, c0]) => {
-                let count = u16::from_be_bytes([c1, c0]);
-                WrongInside::Read { table, address: u16::from_be_bytes([a1, a0]), count }
+                let (address, count) = (u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]));
+                if a1 == 3 {
+                    WrongInside::ReadOrAnswer { table, address, count }
+                } else {
+                    WrongInside::Read { table, address, count }
+                }
             }
             (Some(table), &[announced, ref data @ ..]) => WrongInside::Answer { table, announced, data: data.len() },
             (None, &[_, _, v1, v0]) if function == WRITE_COIL && coil_of(u16::from_be_bytes([v1, v0])).is_none() => {
@@ -331,6 +350,10 @@ mod tests {
             (&[10, 3, 0, 1, 0, 0], "read of 0 words at 0001H, which can be 1 to 125"),
             (&[10, 1, 0, 1, 0x10, 0], "read of 4096 bits at 0001H, which can be 1 to 2000"),
             (&[10, 3, 0xFF, 0xFF, 0, 2], "read of 2 words at FFFFH that ends beyond FFFFH"),
+            (
+                &[10, 3, 3, 0, 1, 2],
+                "read of 258 words at 0300H, which can be 1 to 125, or answers with 3 bytes of data, which are no whole words",
+            ),
             (&[10, 4, 0], "answers with 0 words"),
             (&[10, 4, 3, 1, 2, 3, 4, 5], "answers with 5 bytes of data where 3 are announced"),
             (&[10, 4, 5, 1, 2, 3, 4, 5], "answers with 5 bytes of data, which are no whole words"),
