@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivebus._native import judge
@@ -120,6 +120,19 @@ ENDS = ["", "   ", " (8 bytes)", " ; ok", "\r"]
     number=st.sampled_from(NUMBERS),
     end=st.sampled_from(ENDS),
     first=st.integers(1, 300),
+)
+@example(
+    # Read as hexadecimal, the third line has the head of a Modbus TCP frame: length 2, unit 60, function 11.
+    talk=[
+        [whole(b"\1\3\0\0\0\1"), whole(b"\1\3\2\0\0")],
+        [whole(b"\1\3\0\0\0\2"), whole(b"\1\3\4\0\0\0\0")],
+    ],
+    radix="decimal with a sign",
+    stamp="",
+    labels=("TX: ", "RX: "),
+    number="",
+    end="",
+    first=1,
 )
 def test_a_log_of_any_form_gives_its_frames(
     talk: list[list[bytes]],

@@ -8,7 +8,7 @@ each. Modbus TCP is known by its head, whose length must be that of what follows
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -83,10 +83,11 @@ def pieces(text: str) -> list[Piece]:
     for line in lines:
         line.masked = without_times(line.text)
     counts = dict.fromkeys(READINGS, 0)
+    # What one reading knows by function, length and CRC goes before what another takes by a head or a CRC alone.
     for name, reading in READINGS.items():
-        for line in lines:
-            if not line.found and MAY[name].search(line.masked):
-                _look(line, name, reading)
+        _look_at_each(lines, name, reading, _with_known)
+    for name, reading in READINGS.items():
+        _look_at_each(lines, name, reading, _frames)
         _join(lines, name, reading)
         counts[name] = sum(line.by == name for line in lines)
     _without_counters(lines)
@@ -95,11 +96,25 @@ def pieces(text: str) -> list[Piece]:
     return [piece for line in lines for piece in line.pieces()]
 
 
-def _look(line: _Line, name: str, reading: Reading) -> None:
+_Finds = Callable[[Run], list[tuple[int, int]]]
+
+
+def _look_at_each(lines: Sequence[_Line], name: str, reading: Reading, finds: _Finds) -> None:
+    """Looks at those of *lines* on which nothing was found yet."""
+    for line in lines:
+        if not line.found and MAY[name].search(line.masked):
+            _look(line, name, reading, finds)
+
+
+def _look(line: _Line, name: str, reading: Reading, finds: _Finds) -> None:
     """Takes the frames that stand on *line* as a whole."""
+    runs = reading(line.text)
+    found = [finds(run) for run in runs]
+    if finds is _with_known and any(found):
+        # Beside a frame that is known, the others on the line are read as it is.
+        found = [_frames(run) for run in runs]
     after = 0
-    for run in reading(line.text):
-        spans = _frames(run)
+    for run, spans in zip(runs, found, strict=True):
         for index, (start, end) in enumerate(spans):
             before = _leftover(line, run, 0, start, spans) if index == 0 else []
             until = before[0].column if before else run.spans[start][0]
@@ -129,6 +144,12 @@ def _label(text: str) -> str:
 
 def _with_crc(data: bytes) -> bytes:
     return data + crc16(data).to_bytes(2, "little")
+
+
+def _with_known(run: Run) -> list[tuple[int, int]]:
+    """Where the frames in *run* stand, if one of them has a function that is known."""
+    data = bytes(run.data)
+    return _frames(run) if len(data) >= _SHORTEST and frames_in(data) else []
 
 
 def _frames(run: Run) -> list[tuple[int, int]]:
