@@ -46,9 +46,13 @@ class Aim:
 
     Args:
         unit: The unit, as it was named.
+
+    Attributes:
+        heard: The line's clock when the unit last answered what it was asked, or may have.
     """
 
     def __init__(self, unit: Unit) -> None:
+        self.heard = unit.bus.now()
         self._unit = unit
         self._apart = Apart(unit.profile, trusted=unit.identity.trusted)
         self._doubted = False
@@ -81,9 +85,11 @@ class Aim:
                 answer = await answer_once(read, unit.address, verdict.ask)
             except (NoAnswer, BadAnswer) as error:
                 if may_be_of(unit.address, error.raw):
+                    self.heard = unit.bus.now()
                     return None
                 # Silence is no evidence. Where it spoke before, the line lost this one.
                 return None if self._apart.is_asked or self._doubted else Target(unit, command)
+            self.heard = unit.bus.now()
             if not self._apart.heard(answer):
                 return None
         raise _undecided(unit, command, ())

@@ -138,7 +138,8 @@ class Halt:
         """Whether it was halted once more, as another family: it does not show the halt, and shows that family now.
 
         A port that stayed open may have another drive behind it, whatever the line knew of the one before. Where no
-        answer comes it is asked again, for a second: an answer that was lost is no reason to let it run.
+        answer comes it is asked again, until none has come for a second: an answer that was lost is no reason to let it
+        run.
 
         Raises:
             Unconfirmed: What it is now cannot be told, but that it is not what was halted: the motor may still turn.
@@ -146,10 +147,12 @@ class Halt:
         """
         if not self._aim.doubt():
             return False
-        bus = self.unit.bus
-        until = bus.now() + _ASKED_FOR
+        bus, aim = self.unit.bus, self._aim
+        began = bus.now()
         try:
-            while (target := await self._aim.take(self.command)) is None and bus.now() < until:
+            while (target := await aim.take(self.command)) is None:
+                if bus.now() >= min(max(began, aim.heard) + _ASKED_FOR, began + self._within):
+                    break
                 await bus.sleep(_PAUSE)
         except PortError:
             return False
