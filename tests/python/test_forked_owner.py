@@ -120,7 +120,7 @@ def test_a_guest_stops_its_motor_whoever_has_the_descriptors(motor: OwnMotor, ho
             if not forked_first:
                 owner.goes_on()
                 child = int(owner.says())
-            assert motor.turns
+            motor.until(lambda event: event.get("turns") == 1)
             owner.process.kill()
             owner.process.wait()
             killed = len(motor.events)
@@ -139,7 +139,7 @@ def test_the_command_stops_the_motor_of_a_program_that_was_killed(motor: OwnMoto
         assert owner.says() == "open"
         owner.goes_on()
         child = int(owner.says())
-        assert motor.turns
+        motor.until(lambda event: event.get("turns") == 1)
         owner.process.kill()
         owner.process.wait()
         killed = len(motor.events)
