@@ -326,8 +326,20 @@ class Bus:
         """06H or 10H to every unit; returns after the turnaround delay."""
     def echo(self, unit: int, word: int | None = None, /, *, timeout: float | None = None) -> float:
         """08H/0000; the round trip in seconds on the line's clock."""
-    def transact(self, unit: int, pdu: Buffer, reply_length: int | None = None, /) -> bytes:
-        """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known."""
+    def transact(
+        self,
+        unit: int,
+        pdu: Buffer,
+        reply_length: int | None = None,
+        /,
+        *,
+        timeout: float | None = None,
+        in_doubt: bool = False,
+    ) -> bytes:
+        """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known.
+
+        *in_doubt*: also to a unit that may still owe another answer. What comes may be that.
+        """
     def stats(self) -> dict[str, Any]:
         """`{"requests": …, …, "hints": ["…"], "hint_names": ["no_bias"], "units": {1: {…}}}`.
 
@@ -403,7 +415,16 @@ class Requests:
     ) -> Asked[None]: ...
     def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked[None]: ...
     def echo(self, unit: int, word: int | None = None, /) -> Asked[float]: ...
-    def transact(self, unit: int, pdu: bytes, reply_length: int | None = None, /) -> Asked[bytes]: ...
+    def transact(
+        self,
+        unit: int,
+        pdu: bytes,
+        reply_length: int | None = None,
+        /,
+        *,
+        timeout: float | None = None,
+        in_doubt: bool = False,
+    ) -> Asked[bytes]: ...
     def link(self, unit: int, /) -> Asked[tuple[int, int]]: ...
     def sleep(self, seconds: float, /) -> Asked[None]: ...
     def listen(self, seconds: float, /) -> Asked[list[tuple[float, bytes]]]: ...

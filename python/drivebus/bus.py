@@ -21,6 +21,7 @@ from drivebus.identify.results import Found, Identification
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads, Sample
+from drivebus.line.scan_order import asked
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.units import belongs
 from drivebus.operations.face import views
@@ -130,27 +131,41 @@ class Bus(BusFace, Requests):
     ) -> None:
         self.close()
 
-    def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> Iterator[Found]:
+    def scan(
+        self, units: Iterable[int] = range(1, 248), timeout: float | None = None, *, protocol: str = "auto"
+    ) -> Iterator[Found]:
         """Asks each of *units* for its family, with the line's own settings, and yields those that answer at once.
 
         One read of the identification register each, not repeated, and a few more of those that answer and give no code
         that is known (see `identify`). A unit that refuses has answered too, and so has one whose answer is damaged:
         its `problem` says how (often two units with one address, or a wrong parity).
 
+        Where nobody answered, the first 16 of *units* are asked once more, for a status in the protocol that older
+        drives of Huanyang speak instead of Modbus: `Found.protocol`. A unit that speaks Modbus refuses that question.
+
         Args:
             units: Addresses, 1..247.
             timeout: Seconds each is given; None is 0.1 s, or the bus's own time-out if that is shorter.
+            protocol: `"auto"`, as above; `"modbus"`: in that one alone; `"huanyang"`: each of *units* is asked in that
+                one alone, and who speaks Modbus is not told.
         """
-        return self._scan(scan.units(units), scan.time_for(timeout, self._opening.timeout))
+        limit = scan.time_for(timeout, self._opening.timeout)
+        return self._scan(scan.units(units), limit, scan.protocol_of(protocol))
 
-    def _scan(self, units: Sequence[int], timeout: float) -> Iterator[Found]:
+    def _scan(self, units: Sequence[int], timeout: float, protocol: str) -> Iterator[Found]:
         async def read(unit: int, address: int, table: str = "holding") -> list[int]:
             return self._native.read(unit, address, 1, timeout=timeout, retries=0, table=table)
 
-        for unit in units:
-            found = at_once(scan.look_for(read, self.now, unit))
-            if found is not None:
-                yield found
+        async def ask(unit: int, pdu: bytes, reply_length: int) -> bytes:
+            return self._native.transact(unit, pdu, reply_length, timeout=timeout, in_doubt=True)
+
+        found: list[Found] = []
+        for unit, foreign in asked(units, protocol, found):
+            looking = scan.look_for_huanyang(ask, self.now, unit) if foreign else scan.look_for(read, self.now, unit)
+            one = at_once(looking)
+            if one is not None:
+                found.append(one)
+                yield one
 
     def identify(self, unit: int) -> Identification:
         """Identifies the unit, and says how sure that is. Only reads.

@@ -212,19 +212,22 @@ impl Bus {
         Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
     }
 
-    #[pyo3(signature = (unit, pdu, reply_length = None, /))]
+    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false))]
     fn transact<'py>(
         &self,
         py: Python<'py>,
         unit: &Bound<'py, PyAny>,
         pdu: &Bound<'py, PyAny>,
         reply_length: Option<u8>,
+        timeout: Option<f64>,
+        in_doubt: bool,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
+        let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
         let pdu = pdu.as_bytes();
         let request = Request::raw(pdu, reply_length).map_err(refuse)?;
         let mut reply = Vec::new();
-        self.call(py, unit.into(), &request, CallOptions::new().retries(0), &mut |answer| {
+        self.call(py, unit.into(), &request, options, &mut |answer| {
             let frame = Adu::answer(unit, &answer);
             if let Ok(frame) = Frame::parse(frame.as_bytes()) {
                 reply = frame.pdu().to_vec();

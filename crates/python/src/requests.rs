@@ -192,10 +192,17 @@ impl Requests {
         })
     }
 
-    #[pyo3(signature = (unit, pdu, reply_length = None, /))]
-    fn transact(&self, unit: &Bound<'_, PyAny>, pdu: &Bound<'_, PyBytes>, reply_length: Option<u8>) -> PyResult<Asked> {
+    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false))]
+    fn transact(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        pdu: &Bound<'_, PyBytes>,
+        reply_length: Option<u8>,
+        timeout: Option<f64>,
+        in_doubt: bool,
+    ) -> PyResult<Asked> {
         let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
-        let options = CallOptions::new().retries(0);
+        let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
         Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| {
             Ok(PyBytes::new(py, &reply.pdu).into_any())
         }))

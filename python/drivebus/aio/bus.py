@@ -25,6 +25,7 @@ from drivebus.line.blocking import BlockingBus
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads
+from drivebus.line.scan_order import asked
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
 from drivebus.line.units import belongs
@@ -216,15 +217,25 @@ class Bus(BusFace):
         """See `Requests.link`."""
         return await self._asked().link(unit)
 
-    def scan(self, units: Iterable[int] = range(1, 248), timeout: float | None = None) -> AsyncIterator[Found]:
+    def scan(
+        self, units: Iterable[int] = range(1, 248), timeout: float | None = None, *, protocol: str = "auto"
+    ) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
-        return self._scan(self._asked(), scan.units(units), scan.time_for(timeout, self.timeout))
+        limit = scan.time_for(timeout, self.timeout)
+        return self._scan(self._asked(), scan.units(units), limit, scan.protocol_of(protocol))
 
-    async def _scan(self, line: AwaitedRequests, units: Iterable[int], timeout: float) -> AsyncIterator[Found]:
-        for unit in units:
-            found = await scan.look_for(functools.partial(line.look, timeout=timeout), self.now, unit)
-            if found is not None:
-                yield found
+    async def _scan(
+        self, line: AwaitedRequests, units: Sequence[int], timeout: float, protocol: str
+    ) -> AsyncIterator[Found]:
+        read = functools.partial(line.look, timeout=timeout)
+        ask = functools.partial(line.ask, timeout=timeout)
+        found: list[Found] = []
+        for unit, foreign in asked(units, protocol, found):
+            looking = scan.look_for_huanyang(ask, self.now, unit) if foreign else scan.look_for(read, self.now, unit)
+            one = await looking
+            if one is not None:
+                found.append(one)
+                yield one
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""

@@ -64,6 +64,10 @@ class AwaitedRequests:
         """Reads one word, within *timeout* seconds, and not again."""
         return await self._line.read(unit, address, 1, timeout=timeout, retries=0, table=table)
 
+    async def ask(self, unit: int, pdu: bytes, reply_length: int, timeout: float) -> bytes:
+        """Sends *pdu* within *timeout* seconds, once, also to a unit that may still owe another answer."""
+        return await self._line.transact(unit, pdu, reply_length, timeout=timeout, in_doubt=True)
+
     async def sleep(self, seconds: float, /) -> None:
         """See `Requests`."""
         return await self._line.sleep(seconds_of(seconds))

@@ -14,6 +14,7 @@ from drivebus.cli.crew import each_drive
 from drivebus.cli.output import Output, counted, remark
 from drivebus.cli.session import Session, exit_code, pass_session, tell
 from drivebus.cli.types import Seconds
+from drivebus.line.scan_order import PROTOCOLS, asked
 
 __all__ = ["COMMANDS"]
 
@@ -40,9 +41,24 @@ def ports(session: Session) -> None:
     help="Also find out the baud rate and the format, the likeliest first. Takes about a minute.",
 )
 @click.option("--full", is_flag=True, help="With --search: try every address at every setting. Takes 20 minutes.")
+@click.option(
+    "--protocol",
+    type=click.Choice(PROTOCOLS),
+    default="auto",
+    show_default=True,
+    help="Ask in Modbus, in Huanyang's own protocol, or in both where nobody answers.",
+)
 @pass_session
 @click.pass_context
-def scan(context: click.Context, session: Session, units: str, timeout: float | None, search: bool, full: bool) -> None:
+def scan(
+    context: click.Context,
+    session: Session,
+    units: str,
+    timeout: float | None,
+    search: bool,
+    full: bool,
+    protocol: str,
+) -> None:
     """Find the drives on the line. Each address is asked once.
 
     With --search, nothing needs to be known of the line: baud rate, format and address are found. Only reads are sent.
@@ -51,25 +67,30 @@ def scan(context: click.Context, session: Session, units: str, timeout: float | 
     if search:
         if context.get_parameter_source("units") is not ParameterSource.DEFAULT:
             raise click.UsageError("--search decides itself which addresses it asks: leave --units out, or --search")
+        if context.get_parameter_source("protocol") is not ParameterSource.DEFAULT:
+            raise click.UsageError("--search decides itself how it asks: leave --protocol out, or --search")
         searching.search(session, timeout, full)
         return
     if full:
         raise click.UsageError("--full is for --search: give that too")
     wanted = names.parse_units(units)
-    count = 0
     # On the console that the lines go to, so that they stand above the bar.
     bar = Progress(console=session.out.console, transient=True, disable=not session.out.live)
     with session.bus() as bus, bar as progress:
         began = bus.now()
         task = progress.add_task("asking", total=len(wanted))
-        for unit in wanted:
-            for found in bus.scan([unit], timeout):
-                count += 1
+        answered: list[drivebus.Found] = []
+        for unit, foreign in asked(wanted, protocol, answered):
+            if foreign:
+                progress.update(task, description="asking in Huanyang's own protocol")
+            for found in bus.scan([unit], timeout, protocol="huanyang" if foreign else "modbus"):
+                answered.append(found)
                 session.keep_found(found)
                 _show_found(session, found)
             progress.advance(task)
         took = bus.now() - began
-    if count:
+    if answered:
+        count = len(answered)
         units_found = counted(count, "unit")
         session.out.say(f"{units_found}, {len(wanted) - count} silent, {took:.0f} s")
     else:
@@ -84,6 +105,10 @@ def _show_found(session: Session, found: drivebus.Found) -> None:
     if session.out.as_json:
         code = None if found.identification is None else f"{found.identification:#06x}"
         session.out.record({**vars(found), "identification": code})
+        return
+    if found.protocol != "modbus" and found.problem is not None:
+        said = found.problem.removeprefix("it ")
+        session.out.say(f"unit {found.unit}: {said}, {found.round_trip * 1000:.1f} ms")
         return
     family = found.profile or " or ".join(found.candidates) or "unknown family"
     if found.certainty == "shared" and found.profile is not None:

@@ -35,7 +35,7 @@ def look(bus: Bus, units: Sequence[int], tell: Callable[[str], None], times: int
         tell(f"asking unit {unit} at {Settings.of(bus)}")
         answer: Found | None = None
         for _ in range(times):
-            answer = next(bus.scan([unit], _PATIENCE), None) or answer
+            answer = next(bus.scan([unit], _PATIENCE, protocol="modbus"), None) or answer
             if answer is None and len(units) > 1:
                 break
             if answer is not None and answer.problem is None:

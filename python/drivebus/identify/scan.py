@@ -1,21 +1,27 @@
 """A scan of a line: which units are asked, how long each is given, and what is told of one that answers.
 
 It asks with the settings that the line has. Other speeds and formats are tried by `searching`.
+
+A drive of Huanyang that speaks the maker's own protocol hears each request of Modbus, too, and nobody documents how it
+ends a frame. Its command is `03 01` and a code, so a read of holding registers 0100H to 01FFH begins as one, and its
+write of a parameter is `02 03`, its number and a word: byte for byte a read of discrete inputs 0300H to 03FFH. Nothing
+that is sent to a unit of which nothing is known may look so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed
+from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
 from drivebus.identify.choose import usable
 from drivebus.identify.identify import Read, identify
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
 from drivebus.line.frames import frames_in, may_be_of
+from drivebus.line.scan_order import PROTOCOLS
 
-__all__ = ["look_for", "time_for", "units"]
+__all__ = ["look_for", "look_for_huanyang", "protocol_of", "time_for", "units"]
 
 _TIMEOUT = 0.1
 """Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
@@ -34,6 +40,32 @@ def time_for(timeout: float | None, of_bus: float) -> float:
     return checks.number("timeout", limit, 0.0, 3600.0, above=True)
 
 
+def protocol_of(given: str) -> str:
+    """The protocol of a scan."""
+    return checks.one_of("protocol", given, PROTOCOLS)
+
+
+async def look_for_huanyang(
+    ask: Callable[[int, bytes, int], Awaitable[bytes]], now: Callable[[], float], unit: int
+) -> Found | None:
+    """The drive at *unit* that answers in Huanyang's own protocol, if one does.
+
+    *ask* sends what it is given, once, although the unit may owe an answer of Modbus, which does not look like this
+    one, and is told how many bytes the answer has.
+    """
+    started = now()
+    try:
+        told = await ask(unit, huanyang.STATUS_READ, len(huanyang.STATUS_READ))
+    except (NoAnswer, BadAnswer, Refused):
+        return None  # silence, noise, or somebody who speaks Modbus
+    return _foreign(unit, now() - started) if huanyang.tells_status(told) else None
+
+
+def _foreign(unit: int, took: float) -> Found:
+    said = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
+    return Found(unit, None, None, took, said, protocol="huanyang")
+
+
 async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | None:
     """Who answers at *unit*, if somebody does. *read* asks for one word, once; *now* tells the time in seconds."""
     started = now()
@@ -49,8 +81,7 @@ async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | N
         found = await identify(timed, unit)
     except (NoAnswer, BadAnswer) as error:
         if any(frame[0] == unit and huanyang.is_sure(frame) for frame in frames_in(error.raw)):
-            said = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
-            return Found(unit, None, None, took[0], said, protocol="huanyang")
+            return _foreign(unit, took[0])
         if isinstance(error, NoAnswer) or not may_be_of(unit, error.raw):
             return None  # silence, noise, or somebody else's
         return Found(unit, None, None, took[0], str(error))

@@ -11,7 +11,8 @@ alike. After LinuxCNC, src/hal/user_comps/huanyang-vfd/hy_modbus.c (functions, l
 | 05 | 2 | the frequency, in 0.01 Hz |
 | 06 | 1 to 3 | reserved |
 
-Nothing here sends. The drives that speak it are the older HY series; later ones of the maker speak Modbus.
+Nothing here sends; `drivebus.identify.scan` asks for a status. The drives that speak it are the older HY series; later
+ones of the maker speak Modbus.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from collections.abc import Iterator
 
 from drivebus._native import crc16
 
-__all__ = ["NAME", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "words"]
+__all__ = ["NAME", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "tells_status", "words"]
 
 NAME = "Huanyang's own protocol"
 REMARK = f" ({NAME}, no Modbus)"
@@ -73,6 +74,11 @@ def is_sure(data: bytes) -> bool:
 def belong(request: bytes, answer: bytes) -> bool:
     """Whether *answer* may be the one to *request*, which both have the form."""
     return request[:2] == answer[:2] and (request[1] in (3, 5, 6) or request[3] == answer[3])
+
+
+def tells_status(pdu: bytes) -> bool:
+    """Whether *pdu* answers `STATUS_READ`: no words of Modbus have three bytes."""
+    return len(pdu) == len(STATUS_READ) and pdu.startswith(STATUS_READ[:3])
 
 
 def frames_in(data: bytes) -> list[bytes] | None:

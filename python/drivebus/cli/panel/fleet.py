@@ -120,7 +120,11 @@ class Member:
         drive = None
         try:
             # Who is silent costs the others as little as can be.
-            if again and self.session.profile is None and not list(bus.scan([self.session.unit], _GLANCE)):
+            if (
+                again
+                and self.session.profile is None
+                and not list(bus.scan([self.session.unit], _GLANCE, protocol="modbus"))
+            ):
                 return False
             drive = self.session.drive_on(bus)
             watched = watching.watched(self.session, drive)
