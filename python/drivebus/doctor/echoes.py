@@ -8,9 +8,12 @@ from statistics import median
 from typing import Any
 
 from drivebus.bus import Bus
+from drivebus.doctor.characters import of_unit
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.frames import frames_in, is_frame, may_be_of
+from drivebus.line.seven_bits import agreed, seen_in
+from drivebus.searching.settings import Settings
 
 __all__ = ["Echoes"]
 
@@ -38,9 +41,12 @@ class Echoes:
         refused: How the unit refused one; it is asked for no more then.
         last: What the last bad one was, in words.
         turnarounds: Seconds from the end of each request to the first bit of its answer, where it came back whole.
+        came: What came instead of the others.
+        settings: At which it was asked.
     """
 
     unit: int
+    settings: Settings
     asked: int = 0
     silent: int = 0
     damaged: int = 0
@@ -49,11 +55,12 @@ class Echoes:
     refused: Refused | None = None
     last: str = ""
     turnarounds: list[float] = field(default_factory=list)
+    came: list[bytes] = field(default_factory=list)
 
     @classmethod
     def of(cls, bus: Bus, unit: int, count: int, tell: Callable[[str], None]) -> Echoes:
         """Asks *unit* for *count* echoes, and tells which one it is at."""
-        echoes = cls(unit)
+        echoes = cls(unit, Settings.of(bus))
         while echoes.asked < count and echoes.refused is None:
             tell(f"echo {echoes.asked + 1} of {count} from unit {unit}")
             echoes._ask(bus)
@@ -74,9 +81,11 @@ class Echoes:
                 self.refused = error
         except NoAnswer:
             self.silent += 1
-        except CrcError:
+        except CrcError as error:
             self.damaged += 1
+            self.came.append(error.raw)
         except BadAnswer as error:
+            self.came.append(error.raw)
             # What holds no whole frame was one before something happened to it.
             if frames_in(error.raw) or is_frame(error.raw):
                 self.bad += 1
@@ -97,6 +106,8 @@ class Echoes:
             yield self._no_echo(self.refused)
         elif not (self.damaged or self.bad or self.silent):
             yield self._all_whole(family)
+        elif not self.answered and (sent := agreed(seen_in(self.unit, came) for came in self.came)) is not None:
+            yield of_unit(self.unit, sent, self.settings)
         else:
             if self.damaged:
                 yield self._damaged() if self.answered else self._two_units()

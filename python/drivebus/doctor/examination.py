@@ -8,11 +8,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from drivebus import checks
 from drivebus.bus import Bus
 from drivebus.doctor.adapter import adapter_findings, port_finding
+from drivebus.doctor.characters import asked_of, of_settings
 from drivebus.doctor.findings import Finding
 from drivebus.doctor.hints import hint_findings
 from drivebus.doctor.presence import found_elsewhere, look, nobody, units_to_ask, whole
@@ -156,8 +157,12 @@ class Examination:
             if bus is None:
                 return
             self._ask(bus)
-        if not whole(self.found):
-            yield from self._ask_elsewhere()
+            cause = None if whole(self.found) else self._sent_otherwise(bus)
+        if cause is None and not whole(self.found):
+            cause = yield from self._ask_elsewhere()
+        if cause is not None:
+            yield cause
+            return
         if not self.found:
             yield nobody(self.given, self.unit, units_to_ask(self.unit, self.full), self.tried, self.noise)
             return
@@ -174,6 +179,13 @@ class Examination:
             yield port_finding(error)
             return None
         yield from adapter_findings(bus, self.port)
+        if bus.format.bytesize != 8:
+            yield of_settings(Settings.of(bus))
+            if not can_be_changed(self.port):
+                return None
+            held.close()
+            self.settings = self.given = replace(self.given, bytesize=8)
+            bus = held.enter_context(self._opened(self.given))
         self.tell(f"listening for {self.listen:g} s")
         traffic = heard(bus, self.listen)
         yield traffic
@@ -207,28 +219,39 @@ class Examination:
             self.found = [each for unit in likely for each in look(bus, [unit], self.tell, _TIMES)]
         self._count_noise(bus)
 
-    def _ask_elsewhere(self) -> Iterator[Finding]:
-        """Finds who answers at other settings, where there are any, up to the first at which somebody does."""
+    def _sent_otherwise(self, bus: Bus) -> Finding | None:
+        """The finding that somebody, of whom no answer was whole, answers in another way than Modbus RTU on *bus*."""
+        return asked_of(bus, units_to_ask(self.unit, self.full), self.tell)
+
+    def _ask_elsewhere(self) -> Generator[Finding, None, Finding | None]:
+        """Finds who answers at other settings, where there are any, up to the first at which somebody does.
+
+        Returns the finding that somebody answers there in another way than Modbus RTU.
+        """
         for settings in candidates(self.given, self.full) if can_be_changed(self.port) else ():
-            better = self._whole_at(settings)
+            better, cause = self._whole_at(settings)
+            if cause is not None:
+                return cause
             if better:
                 if not self._answers_after_all(better[0].unit):
                     self.settings = settings
                     yield found_elsewhere(self.given, settings, better)
                 self.found = better
-                return
+                break
+        return None
 
-    def _whole_at(self, settings: Settings) -> list[Found]:
-        """Who gives a whole answer at *settings*."""
+    def _whole_at(self, settings: Settings) -> tuple[list[Found], Finding | None]:
+        """Who gives a whole answer at *settings*, and else the finding that somebody answers in another way."""
         try:
             bus = self._opened(settings)
         except PortError:  # its driver does not make this speed, or not this format
-            return []
+            return [], None
         self.tried += 1
         with bus:
             found = look(bus, units_to_ask(self.unit, self.full, elsewhere=True), self.tell, _TIMES_ELSEWHERE)
             self._count_noise(bus)
-        return whole(found)
+            answered = whole(found)
+            return answered, None if answered else self._sent_otherwise(bus)
 
     def _answers_after_all(self, unit: int) -> bool:
         """Whether *unit*, which answers elsewhere, does so at the settings given too: then the line is bad."""

@@ -101,7 +101,7 @@ def nobody(given: Settings, unit: int | None, asked: Sequence[int], tried: int, 
         Severity.FAULT,
         f"{who} did not answer {where}",
         "check the unit's power, that + goes to + and - to -, the common wire, its address (INVT: P14.00), its baud "
-        "rate and format (P14.01, P14.02)"
+        "rate and format (P14.01, P14.02), and that it is set to Modbus RTU: one set to ASCII is silent"
         + ("" if unit is None else "; leave --unit out to look for others")
         + "; a port on a board, wired to a bare transceiver, needs --rs485",
         unit=unit,

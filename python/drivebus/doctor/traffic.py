@@ -7,6 +7,7 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer
 from drivebus.line import huanyang
 from drivebus.line.frames import frames_in, in_words
+from drivebus.line.seven_bits import SevenBits, ascii_in
 from drivebus.searching.settings import Settings
 
 __all__ = ["OTHER_MASTER", "UNKNOWN", "heard", "overheard"]
@@ -36,6 +37,9 @@ def heard(bus: Bus, seconds: float) -> Finding:
         return _quiet(seconds)
     if frames:
         return _other_master(frames, seconds, bus)
+    sent = ascii_in(came[:_LONGEST])
+    if sent is not None:
+        return _ascii_master(sent, seconds, bus)
     if 2 * idle >= len(came):
         return _no_bias(came, idle, seconds)
     return _unknown(came, seconds)
@@ -43,8 +47,12 @@ def heard(bus: Bus, seconds: float) -> Finding:
 
 def overheard(bus: Bus, seconds: float) -> Finding | None:
     """Another master, if one is heard within *seconds* at the settings of *bus*."""
-    frames = frames_in(_listened(bus, seconds)[:_LONGEST])
-    return _other_master(frames, seconds, bus) if frames else None
+    came = _listened(bus, seconds)[:_LONGEST]
+    frames = frames_in(came)
+    if frames:
+        return _other_master(frames, seconds, bus)
+    sent = ascii_in(came)
+    return None if sent is None else _ascii_master(sent, seconds, bus)
 
 
 def _listened(bus: Bus, seconds: float) -> bytes:
@@ -92,6 +100,28 @@ def _other_master(frames: list[bytes], seconds: float, bus: Bus) -> Finding:
         "another master uses the line, and a line has one: nothing was asked, so as not to spoil its frames. Stop "
         "it, and call the doctor again",
         values={"seconds": seconds, "settings": settings, "frames": [wire for wire, _ in shown]},
+        error=BadAnswer,
+    )
+
+
+def _ascii_master(sent: SevenBits, seconds: float, bus: Bus) -> Finding:
+    settings = Settings.of(bus)
+    text = bytes(byte & 0x7F for byte in sent.wire).decode("ascii").strip()
+    return Finding(
+        "line",
+        OTHER_MASTER,
+        Severity.FAULT,
+        f"{sent} came in {seconds:g} s at {settings.baudrate} bit/s while nothing was asked, such as {text}, of unit "
+        f"{sent.unit}",
+        "another program speaks Modbus ASCII there, which drivebus does not: nothing was asked, so as not to spoil it. "
+        "Units for Modbus RTU need a line of their own; or stop that program, and set its units to RTU with 8N1 or 8E1",
+        values={
+            "seconds": seconds,
+            "settings": str(settings),
+            "frames": [sent.wire.hex(" ").upper()],
+            "protocol": "modbus-ascii",
+            "format": sent.format,
+        },
         error=BadAnswer,
     )
 

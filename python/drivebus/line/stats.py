@@ -11,7 +11,7 @@ from typing import Any
 
 from drivebus.named import Named
 
-__all__ = ["Link", "Stats"]
+__all__ = ["Link", "Stats", "noisy"]
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,16 @@ class Link:
 
     def __str__(self) -> str:
         return f"{self.good} of the last {self.asked} exchanges brought an answer"
+
+
+def noisy(stats: Mapping[str, Any]) -> list[int]:
+    """The units of whom bytes came, by the figures in *stats*, and all of them were no answer."""
+
+    def is_noise(figures: Mapping[str, int]) -> bool:
+        came = figures["noise_bytes"] + figures["crc_errors"] + figures["bad_answers"]
+        return bool(came) and not figures["answers"] and not figures["refusals"]
+
+    return [unit for unit, figures in stats["units"].items() if is_noise(figures)]
 
 
 class Stats(Named[Any]):

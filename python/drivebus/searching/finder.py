@@ -16,6 +16,7 @@ from drivebus.bus import Bus
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
 from drivebus.line import ports
 from drivebus.line.frames import frames_in, may_be_of
+from drivebus.line.stats import noisy
 from drivebus.searching.located import Located, Progress
 from drivebus.searching.order import longest_delay
 from drivebus.searching.plan import Plan
@@ -201,8 +202,7 @@ class Search(Iterator[Located]):
         while True:
             while (unit := self._plan.unit()) is not None:
                 yield unit
-            noisy = [unit for unit, of_unit in bus.stats()["units"].items() if _is_noise(of_unit)]
-            again = [unit for unit in noisy if unit not in asked_again]
+            again = [unit for unit in noisy(bus.stats()) if unit not in asked_again]
             if not again:
                 return
             self._plan.damaged()
@@ -281,9 +281,3 @@ class Search(Iterator[Located]):
     def _tell(self, settings: Settings, unit: int | None) -> None:
         if self._progress is not None:
             self._progress(Progress(settings, unit, self._plan.left()))
-
-
-def _is_noise(of_unit: Mapping[str, int]) -> bool:
-    """Whether all that came from a unit, by its figures, were bytes that are no answer."""
-    came = of_unit["noise_bytes"] + of_unit["crc_errors"] + of_unit["bad_answers"]
-    return bool(came) and not of_unit["answers"] and not of_unit["refusals"]
