@@ -10,16 +10,21 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
 from drivebus import Bus, Found, NotAllowed, Profile, Simulator, aio, places, profiles
 from drivebus.cli import cli
+from drivebus.doctor import Finding, examine
 from drivebus.identify import codes, signatures
 from drivebus.line import huanyang
 from drivebus.line.scan_order import PROTOCOLS
+from drivebus.searching.order import candidates
+from drivebus.searching.settings import Settings
 
 from .odd_slave import framed, good, on_a_terminal
 from .serial_server import crc
@@ -216,3 +221,53 @@ class TestTraps:
                 for count in (1, 2):
                     drive.answer(bytes([unit, function]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
                 assert drive.commands == [], f"{places.shown(place)} of unit {unit}"
+
+
+@needs_terminals
+class TestTheDoctor:
+    @staticmethod
+    def findings(answer: Callable[[bytes], bytes], unit: int | None) -> list[Finding]:
+        with on_a_terminal(answer) as path:
+            return list(examine(path, unit, listen=0.01))
+
+    def test_names_it(self) -> None:
+        drive = Drive(7)
+        [found] = [each for each in self.findings(drive.answer, 7) if each.wrong]
+        assert (found.name, found.unit, found.values["protocol"]) == ("other_protocol", 7, "huanyang")
+        assert "unit 7 answers at 19200 8E1 in Huanyang's own protocol, and not in Modbus" in found.text
+        assert drive.commands == []
+
+    def test_names_one_that_answers_modbus_so(self) -> None:
+        """With its own frames, whatever it is asked."""
+        answer = lambda request: framed(f"{request[0]:02X} 03 01 09")  # noqa: E731
+        [found] = [each for each in self.findings(answer, 1) if each.wrong]
+        assert (found.name, found.unit) == ("other_protocol", 1)
+
+    def test_the_command_ends_as_with_a_silent_unit(self) -> None:
+        with on_a_terminal(Drive().answer) as path:
+            told = CliRunner().invoke(cli, ["doctor", path, "--unit", "1", "--listen", "0.01"])
+        assert told.exit_code == 3
+        assert "Huanyang's own protocol" in told.stdout
+
+
+@pytest.mark.parametrize("unit", [None, 1, 9])
+def test_a_doctor_asks_little_more_of_a_silent_line(unit: int | None) -> None:
+    asked: list[str] = []
+
+    def opened(_: object, **options: Any) -> Bus:
+        bus = Bus(Simulator({200: "gd350"}, transport="process", clock="virtual"), **options)
+        scan = bus.scan
+
+        def scanned(units: Any, *rest: Any, protocol: str = "auto") -> Any:
+            asked.append(protocol)
+            return scan(units, *rest, protocol=protocol)
+
+        bus.scan = scanned  # type: ignore[method-assign, assignment]
+        return bus
+
+    [found] = [each for each in examine("/dev/line", unit, open=opened) if each.wrong]
+    assert found.name == "nobody_answers"
+    foreign = asked.count("huanyang")
+    settings = len(list(candidates(Settings(19200), full=False)))
+    assert foreign == settings + (3 if unit is None else 1)
+    assert set(asked) == {"modbus", "huanyang"}

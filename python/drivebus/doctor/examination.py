@@ -6,7 +6,7 @@ What a step looks for, and the words it says it in, stand in the files that it i
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 
@@ -15,6 +15,7 @@ from drivebus.bus import Bus
 from drivebus.doctor.adapter import adapter_findings, port_finding
 from drivebus.doctor.characters import asked_of, of_settings
 from drivebus.doctor.findings import Finding
+from drivebus.doctor.foreign import is_foreign, of_drive, speaker
 from drivebus.doctor.hints import hint_findings
 from drivebus.doctor.presence import found_elsewhere, look, nobody, units_to_ask, whole
 from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard, overheard
@@ -157,7 +158,8 @@ class Examination:
             if bus is None:
                 return
             self._ask(bus)
-            cause = None if whole(self.found) else self._sent_otherwise(bus)
+            likely = units_to_ask(self.unit, False, elsewhere=True)
+            cause = None if whole(self.found) else self._sent_otherwise(bus, self.found, likely)
         if cause is None and not whole(self.found):
             cause = yield from self._ask_elsewhere()
         if cause is not None:
@@ -219,9 +221,14 @@ class Examination:
             self.found = [each for unit in likely for each in look(bus, [unit], self.tell, _TIMES)]
         self._count_noise(bus)
 
-    def _sent_otherwise(self, bus: Bus) -> Finding | None:
-        """The finding that somebody, of whom no answer was whole, answers in another way than Modbus RTU on *bus*."""
-        return asked_of(bus, units_to_ask(self.unit, self.full), self.tell)
+    def _sent_otherwise(self, bus: Bus, found: list[Found], likely: Sequence[int]) -> Finding | None:
+        """The finding that somebody answers in another way than Modbus RTU on *bus*, where no answer is whole.
+
+        *found* is who answered at all; those that are *likely* there are asked in another protocol.
+        """
+        for each in filter(is_foreign, found):
+            return of_drive(each, Settings.of(bus))
+        return asked_of(bus, units_to_ask(self.unit, self.full), self.tell) or speaker(bus, likely, self.tell)
 
     def _ask_elsewhere(self) -> Generator[Finding, None, Finding | None]:
         """Finds who answers at other settings, where there are any, up to the first at which somebody does.
@@ -251,7 +258,9 @@ class Examination:
             found = look(bus, units_to_ask(self.unit, self.full, elsewhere=True), self.tell, _TIMES_ELSEWHERE)
             self._count_noise(bus)
             answered = whole(found)
-            return answered, None if answered else self._sent_otherwise(bus)
+            # Each costs a time-out at each setting, and such a drive has the address 1 from the factory.
+            likely = units_to_ask(self.unit, False, elsewhere=True)[:1]
+            return answered, None if answered else self._sent_otherwise(bus, found, likely)
 
     def _answers_after_all(self, unit: int) -> bool:
         """Whether *unit*, which answers elsewhere, does so at the settings given too: then the line is bad."""
@@ -261,6 +270,9 @@ class Examination:
     def _units(self, bus: Bus) -> Iterator[Finding]:
         """Looks at those that were found, one by one."""
         for each in self.found if self.full else self.found[:_MOST_UNITS]:
+            if is_foreign(each):
+                yield of_drive(each, self.settings)
+                continue
             unit = UnitExamination(bus, each, self.echoes, self.tell, self.named, self.unverified)
             yield from unit.findings()
 
