@@ -26,7 +26,7 @@ from drivebus.line.scan_order import PROTOCOLS
 from drivebus.searching.order import candidates
 from drivebus.searching.settings import Settings
 
-from .odd_slave import framed, good, on_a_terminal
+from .odd_slave import framed, good, on_a_socket, on_a_terminal
 from .serial_server import crc
 
 COMMANDS = (2, 3, 5)
@@ -90,6 +90,21 @@ def test_a_scan_for_event_loops_finds_it() -> None:
 
     with on_a_terminal(Drive().answer) as path:
         assert [found.protocol for found in asyncio.run(scanned(path))] == ["huanyang"]
+
+
+@needs_terminals
+def test_a_program_that_shares_the_port_finds_it() -> None:
+    drive = Drive()
+    with on_a_terminal(drive.answer) as path, opened(path) as owner, opened(path) as guest:
+        assert [found.protocol for bus in (guest, owner) for found in bus.scan([1], 0.1)] == ["huanyang"] * 2
+    assert drive.commands == []
+
+
+def test_it_is_found_behind_a_serial_server() -> None:
+    drive = Drive()
+    with on_a_socket(drive.answer) as url, Bus(url, timeout=0.1) as bus:
+        assert [found.protocol for found in bus.scan([1, 2], 0.1)] == ["huanyang"]
+    assert drive.commands == []
 
 
 @needs_terminals

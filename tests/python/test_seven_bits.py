@@ -16,10 +16,11 @@ from click.testing import CliRunner
 from drivebus import Bus, Simulator
 from drivebus.cli import cli
 from drivebus.doctor import Finding, Severity, examine
+from drivebus.doctor.echoes import Echoes
 from drivebus.doctor.traffic import heard
 from drivebus.line.seven_bits import SevenBits, agreed, ascii_in, seen_in
 
-from .odd_slave import framed, good, on_a_terminal
+from .odd_slave import framed, good, on_a_socket, on_a_terminal
 from .test_doctor import Wire, named, wrong
 from .uart import Format, received, sent
 
@@ -165,11 +166,28 @@ class TestTheDoctor:
         refuse = lambda request: cut(framed(f"{request[0]:02X} {request[1] | 0x80:02X} 02"), setting)  # noqa: E731
         assert named(self.findings(refuse), "seven_bits").values["format"] == setting
 
+    def test_one_behind_a_serial_server_is_told(self) -> None:
+        with on_a_socket(lambda request: cut(good(request), "7E1")) as url:
+            assert named(list(examine(url, 1, listen=0.01)), "seven_bits").values["format"] == "7E1"
+
+    def test_one_whose_highest_bits_are_gone_is_told(self) -> None:
+        """A serial server that is set to seven bits hands them over so."""
+        gone = lambda request: bytes(byte & 0x7F for byte in good(request))  # noqa: E731
+        found = named(self.findings(gone), "seven_bits")
+        assert found.values["format"] is None
+        assert "the answers of unit 1 come without the highest bit of each byte" in found.text
+
     def test_one_that_answers_in_ascii_is_told(self) -> None:
         said = cut(in_ascii("01 03 02 13 88"))
         found = named(self.findings(lambda _: said), "seven_bits")
         assert (found.values["ascii"], found.values["format"]) == (True, "7E1")
         assert "unit 1 answers in Modbus ASCII with 7 data bits and even parity (7E1) at 19200 bit/s" in found.text
+
+    def test_beside_units_that_answer_it_is_told_by_its_echoes(self) -> None:
+        with on_a_terminal(lambda request: cut(good(request), "7E1")) as path, Bus(path, timeout=0.1) as bus:
+            for unit in (1, 3):
+                [found] = Echoes.of(bus, unit, 4, lambda _: None).findings(None)
+                assert (found.name, found.unit, found.values["format"]) == ("seven_bits", unit, "7E1")
 
     def test_the_command_says_so(self) -> None:
         with on_a_terminal(lambda request: cut(good(request), "7E1")) as path:
