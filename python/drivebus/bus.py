@@ -160,9 +160,13 @@ class Bus(BusFace, Requests):
             return self._native.transact(unit, pdu, reply_length, timeout=timeout, in_doubt=True)
 
         found: list[Found] = []
+        is_first = protocol == "huanyang" and not self.stats()["requests"]
         for unit, foreign in asked(units, protocol, found):
-            looking = scan.look_for_huanyang(ask, self.now, unit) if foreign else scan.look_for(read, self.now, unit)
-            one = at_once(looking)
+            if foreign:
+                one = at_once(scan.look_for_huanyang(ask, self.now, unit, is_first))
+            else:
+                one = at_once(scan.look_for(read, self.now, unit))
+            is_first = False
             if one is not None:
                 found.append(one)
                 yield one

@@ -230,9 +230,13 @@ class Bus(BusFace):
         read = functools.partial(line.look, timeout=timeout)
         ask = functools.partial(line.ask, timeout=timeout)
         found: list[Found] = []
+        is_first = protocol == "huanyang" and not self.stats()["requests"]
         for unit, foreign in asked(units, protocol, found):
-            looking = scan.look_for_huanyang(ask, self.now, unit) if foreign else scan.look_for(read, self.now, unit)
-            one = await looking
+            if foreign:
+                one = await scan.look_for_huanyang(ask, self.now, unit, is_first)
+            else:
+                one = await scan.look_for(read, self.now, unit)
+            is_first = False
             if one is not None:
                 found.append(one)
                 yield one

@@ -46,19 +46,24 @@ def protocol_of(given: str) -> str:
 
 
 async def look_for_huanyang(
-    ask: Callable[[int, bytes, int], Awaitable[bytes]], now: Callable[[], float], unit: int
+    ask: Callable[[int, bytes, int], Awaitable[bytes]], now: Callable[[], float], unit: int, is_first: bool
 ) -> Found | None:
     """The drive at *unit* that answers in Huanyang's own protocol, if one does.
 
     *ask* sends what it is given, once, although the unit may owe an answer of Modbus, which does not look like this
-    one, and is told how many bytes the answer has.
+    one, and is told how many bytes the answer has. Where it *is_first* on its line, it is asked twice: an adapter that
+    echoes is known by the first echo, and what comes behind that may be lost.
     """
-    started = now()
-    try:
-        told = await ask(unit, huanyang.STATUS_READ, len(huanyang.STATUS_READ))
-    except (NoAnswer, BadAnswer, Refused):
-        return None  # silence, noise, or somebody who speaks Modbus
-    return _foreign(unit, now() - started) if huanyang.tells_status(told) else None
+    for _ in range(2 if is_first else 1):
+        started = now()
+        try:
+            told = await ask(unit, huanyang.STATUS_READ, len(huanyang.STATUS_READ))
+        except NoAnswer:
+            continue
+        except (BadAnswer, Refused):
+            return None  # noise, or somebody who speaks Modbus
+        return _foreign(unit, now() - started) if huanyang.tells_status(told) else None
+    return None
 
 
 def _foreign(unit: int, took: float) -> Found:
