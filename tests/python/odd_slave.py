@@ -42,13 +42,14 @@ def good(request: bytes) -> bytes:
 
 
 def _requests(buffer: bytearray) -> Iterator[bytes]:
-    """The requests in *buffer*, which is left with what begins one; each without its CRC."""
+    """The requests in *buffer*, which is left with what begins one; without their CRC, and what lies before."""
     while True:
-        ends = (end for end in range(4, len(buffer) + 1) if crc(bytes(buffer[: end - 2])) == buffer[end - 2 : end])
-        end = next(ends, None)
-        if end is None:
+        places = ((start, end) for start in range(len(buffer)) for end in range(start + 4, len(buffer) + 1))
+        found = ((start, end) for start, end in places if crc(bytes(buffer[start : end - 2])) == buffer[end - 2 : end])
+        start, end = next(found, (0, 0))
+        if not end:
             return
-        yield bytes(buffer[: end - 2])
+        yield bytes(buffer[start : end - 2])
         del buffer[:end]
 
 

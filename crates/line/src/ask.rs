@@ -57,6 +57,6 @@ impl Ask<'_> {
     ) -> Box<CallError> {
         let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
         let ended = ended.into();
-        Box::new(CallError { failure, destination, request, raw, sent, ended })
+        Box::new(CallError { failure, destination, request, raw, sent, ended, set_again: None })
     }
 }

@@ -32,6 +32,9 @@ pub struct CallError {
     pub sent: Option<Instant>,
     /// When the call ended, on the line's clock; `None` where only a line knows that is gone, or another process's.
     pub ended: Option<Instant>,
+    /// What another program had changed at the port, in words, where that was found behind one of its requests: it is set
+    /// again by now.
+    pub set_again: Option<String>,
 }
 
 impl fmt::Display for CallError {
@@ -77,7 +80,8 @@ impl fmt::Display for CallError {
                 f.write_str(" to an echo, with which it must show that it owes no other answer; the write was not sent")
             }
             _ => Ok(()),
-        }
+        }?;
+        self.set_again.as_ref().map_or(Ok(()), |told| write!(f, "; {told}"))
     }
 }
 

@@ -106,6 +106,7 @@ pub use ports::adapters::facts::PortFacts;
 #[cfg(feature = "serial")]
 pub use ports::adapters::identity::Places;
 pub use ports::key::PortKey;
+pub use ports::set_again::SetAgain;
 pub use ports::url;
 pub use ports::words::WordError;
 #[cfg(feature = "tcp")]

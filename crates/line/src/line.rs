@@ -111,6 +111,13 @@ pub trait Line: Send + fmt::Debug {
         None
     }
 
+    /// Looks whether what the port was set to when it was opened still holds, and sets again what another program changed;
+    /// in words what that was. `None` where nobody changed anything, or nobody can tell. Asked where a request brought no
+    /// right answer.
+    fn set_again(&mut self) -> Option<String> {
+        None
+    }
+
     /// What the user should know about this line, such as a setting that did not reach the wire.
     fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -9,6 +9,7 @@ mod listening;
 pub mod mbap;
 #[cfg(feature = "serial")]
 pub mod rs485;
+pub(crate) mod set_again;
 #[cfg(feature = "tcp")]
 pub mod tcp;
 #[cfg(feature = "serial")]

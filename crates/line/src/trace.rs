@@ -260,6 +260,10 @@ impl Line for Watched {
         self.line.connected_to()
     }
 
+    fn set_again(&mut self) -> Option<String> {
+        self.line.set_again()
+    }
+
     fn notes(&self) -> Vec<String> {
         self.line.notes()
     }

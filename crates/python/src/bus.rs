@@ -288,6 +288,7 @@ impl Bus {
         let (stats, notes, wills) = py.detach(|| (self.core.stats(), self.core.notes(), self.core.wills()));
         let all = counters(py, &stats.total)?;
         all.set_item("reconnects", stats.reconnects)?;
+        all.set_item("settings_changed", stats.settings_changed)?;
         all.set_item("notes", notes)?;
         all.set_item("wills", wills)?;
         all.set_item("hints", stats.hints().iter().map(ToString::to_string).collect::<Vec<_>>())?;

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use drivebus_line::clock::{monotonic, sleep_until};
-use drivebus_line::{Line, PortError, PortErrorKind};
+use drivebus_line::{Line, PortError, PortErrorKind, SetAgain};
 use drivebus_rtu::{DataBits, Duration, Instant, Parity, SerialFormat, StopBits};
 use pyo3::exceptions::PyValueError;
 use pyo3::intern;
@@ -36,6 +36,7 @@ pub(crate) struct PySerialLine {
     wire_free: Instant,
     owned: bool,
     notes: Vec<String>,
+    set_again: SetAgain,
 }
 
 /// The object, and how to wait for it.
@@ -43,6 +44,38 @@ pub(crate) struct PySerialLine {
 struct Object {
     port: Py<PyAny>,
     wait: Wait,
+    settings: Option<Settings>,
+}
+
+/// What a terminal behind the object was set to when it was taken, and what the object said of that.
+#[derive(Debug)]
+struct Settings {
+    found: Py<PyAny>,
+    own: Py<PyAny>,
+}
+
+impl Settings {
+    /// Those of `port`; `None` where it is no terminal, or nobody tells.
+    fn of(port: &Bound<'_, PyAny>) -> Option<Self> {
+        let terminal = terminal(port.py()).ok()?;
+        let found = terminal.call_method1(intern!(port.py(), "settings"), (port,)).ok()?;
+        let own = terminal.call_method1(intern!(port.py(), "own"), (port,)).ok()?;
+        (!found.is_none()).then(|| Self { found: found.unbind(), own: own.unbind() })
+    }
+
+    /// What was otherwise at `port`, and what is still so; nothing where its owner set it otherwise, who may.
+    fn set_again(&self, port: &Bound<'_, PyAny>) -> PyResult<(Vec<String>, Vec<String>)> {
+        let py = port.py();
+        let terminal = terminal(py)?;
+        if !terminal.call_method1(intern!(py, "own"), (port,))?.eq(self.own.bind(py))? {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        terminal.call_method1(intern!(py, "set_again"), (port, &self.found))?.extract()
+    }
+}
+
+fn terminal(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {
+    py.import(intern!(py, "drivebus.line.terminal"))
 }
 
 /// How to wait for bytes without asking the object for more than it has.
@@ -86,7 +119,7 @@ impl PySerialLine {
             PortError::new(PortErrorKind::Other, "a Python object", message)
         })?;
         let (object, asked) = (port.clone().unbind(), *asked);
-        let (name, wait, format) =
+        let (name, wait, format, settings) =
             detached(port.py(), || attendant.run(PATIENCE, move |py| look_at(object.bind(py), &asked)))
                 .unwrap_or_else(|why| Err(unattended("a Python object", why)))?;
         let notes = if format == asked {
@@ -94,8 +127,17 @@ impl PySerialLine {
         } else {
             vec![format!("timed as {format}, as {name} was opened, not as {asked}")]
         };
-        let object = Arc::new(Object { port: port.clone().unbind(), wait });
-        Ok(Self { object, attendant, name, format, wire_free: Instant::ZERO, owned, notes })
+        let object = Arc::new(Object { port: port.clone().unbind(), wait, settings });
+        Ok(Self {
+            object,
+            attendant,
+            name,
+            format,
+            wire_free: Instant::ZERO,
+            owned,
+            notes,
+            set_again: SetAgain::default(),
+        })
     }
 
     /// How the characters of this line look: the object's own settings, where it tells.
@@ -158,8 +200,20 @@ impl Line for PySerialLine {
         true
     }
 
+    fn set_again(&mut self) -> Option<String> {
+        self.object.settings.as_ref()?;
+        let object = Arc::clone(&self.object);
+        let look = move |py: Python<'_>| object.settings.as_ref()?.set_again(object.port.bind(py)).ok();
+        let (changed, left) = self.attendant.run(PATIENCE, look).ok()??;
+        if changed.is_empty() {
+            self.set_again.all_is_well();
+            return None;
+        }
+        self.set_again.tried(&changed, &left)
+    }
+
     fn notes(&self) -> Vec<String> {
-        self.notes.clone()
+        self.notes.iter().cloned().chain(self.set_again.note()).collect()
     }
 }
 
@@ -185,8 +239,11 @@ impl Drop for PySerialLine {
     }
 }
 
-/// What has to be known of a port object before it is used: what people call it, how to wait for it, and its format.
-fn look_at(port: &Bound<'_, PyAny>, asked: &SerialFormat) -> Result<(String, Wait, SerialFormat), PortError> {
+type LookedAt = (String, Wait, SerialFormat, Option<Settings>);
+
+/// What has to be known of a port object before it is used: what people call it, how to wait for it, its format, and what a
+/// terminal behind it is set to.
+fn look_at(port: &Bound<'_, PyAny>, asked: &SerialFormat) -> Result<LookedAt, PortError> {
     let name = name_of(port);
     for attribute in ["read", "write", "in_waiting", "timeout"] {
         // `in_waiting` of a closed port exists and raises, which is not what is looked for here.
@@ -203,7 +260,8 @@ fn look_at(port: &Bound<'_, PyAny>, asked: &SerialFormat) -> Result<(String, Wai
     }
     let wait = Wait::of(port).map_err(|error| lost(&name, &error.to_string()))?;
     let format = own_format(port, asked).unwrap_or(*asked);
-    Ok((name, wait, format))
+    let settings = Settings::of(port);
+    Ok((name, wait, format, settings))
 }
 
 /// Writes all of `bytes`. `write` returns how many it took, or nothing where it always takes all.

@@ -16,6 +16,7 @@ _HINTS: Mapping[str, tuple[Severity, type[BadAnswer | NoAnswer] | None]] = {
     "other_master": (Severity.FAULT, BadAnswer),
     "other_answers": (Severity.WARNING, BadAnswer),
     "timeout_too_short": (Severity.WARNING, NoAnswer),
+    "settings_changed": (Severity.WARNING, NoAnswer),
     "adapter_echo": (Severity.NOTE, None),
 }
 """Hints of `Bus.stats` that say more than what was found otherwise. Silence and damage are counted by unit."""

@@ -237,7 +237,9 @@ impl Rig {
         }
         // What was taken before a call failed counts for nothing.
         let came = if result.is_ok() { came } else { String::new() };
-        writeln!(text, "{result:?} {came}").unwrap();
+        // The settings of a port, which this line has not, are no policy.
+        let result = format!("{result:?}").replace(", set_again: None", "");
+        writeln!(text, "{result} {came}").unwrap();
         let stats = self.bus.stats().total;
         writeln!(
             text,

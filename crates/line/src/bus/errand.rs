@@ -103,7 +103,15 @@ impl Errand {
 
     fn failed(&mut self, failure: Failure, ended: Option<Instant>) {
         let (destination, request) = (self.destination, std::mem::take(&mut self.frame));
-        self.tell(Err(Box::new(CallError { failure, destination, request, raw: Vec::new(), sent: None, ended })));
+        self.tell(Err(Box::new(CallError {
+            failure,
+            destination,
+            request,
+            raw: Vec::new(),
+            sent: None,
+            ended,
+            set_again: None,
+        })));
     }
 
     pub(super) fn tell(&mut self, result: Result<Reply, Box<CallError>>) {

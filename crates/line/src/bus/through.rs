@@ -179,14 +179,15 @@ impl Shared {
             // The program that has the port ends.
             Told::Failed { failure: Said::Closed, sent: None, .. } => Err(Lost::Unsent),
             Told::Failed { failure: Said::Closed, .. } => Err(Lost::Unknown),
-            Told::Failed { failure, raw, sent, ended, reconnects } => {
+            Told::Failed { failure, raw, sent, ended, reconnects, set_again } => {
                 guest.saw(reconnects);
                 let failure = match Failure::from(failure) {
                     Failure::Interrupted => self.port.given_up(),
                     failure => failure,
                 };
                 let (sent, ended) = (sent.map(Instant::from_nanos), ended.map(Instant::from_nanos));
-                Ok(Err(ask.failed(failure, sent, ended, &raw)))
+                let error = ask.failed(failure, sent, ended, &raw);
+                Ok(Err(Box::new(CallError { set_again, ..*error })))
             }
             _ => Err(Lost::Unknown),
         }

@@ -31,6 +31,11 @@ impl Failure {
         self.kind_of(false)
     }
 
+    /// Whether settings of the port that are not the units' bring it about.
+    pub(crate) fn may_be_the_ports(&self) -> bool {
+        matches!(self, Self::NoAnswer { .. } | Self::Corrupt(_) | Self::Wrong(_))
+    }
+
     fn kind_of(&self, came: bool) -> ErrorKind {
         match self {
             Self::Port(_) | Self::Reopened | Self::Forked | Self::Closed => ErrorKind::Port,

@@ -74,6 +74,11 @@ pub enum Hint {
         /// By what.
         by: By,
     },
+    /// Another program changed the settings of the open port.
+    SettingsChanged {
+        /// How often.
+        times: u64,
+    },
     /// A unit is silent while others answer.
     SilentUnit {
         /// Which.
@@ -110,6 +115,7 @@ impl Hint {
             Self::OtherMaster { .. } => "other_master",
             Self::TimeoutTooShort { .. } => "timeout_too_short",
             Self::OtherAnswers { .. } => "other_answers",
+            Self::SettingsChanged { .. } => "settings_changed",
             Self::SilentUnit { .. } => "silent_unit",
         }
     }
@@ -126,6 +132,7 @@ impl Hint {
             | Self::WrongFormat { .. }
             | Self::NobodyAnswers { .. }
             | Self::AdapterEcho { .. }
+            | Self::SettingsChanged { .. }
             | Self::OtherMaster { .. } => None,
         }
     }
@@ -211,6 +218,12 @@ impl fmt::Display for Hint {
             Self::OtherAnswers { others, requests, by, .. } => {
                 write!(f, "{others} of {requests} requests were answered, but {}", by.in_words())
             }
+            Self::SettingsChanged { times } => write!(
+                f,
+                "another program changed the settings of the open port {}, and they were set again. See who else has it \
+                 open (`sudo fuser -v` and the port; a container that was given the device), and keep that off this line",
+                if *times == 1 { "once".to_owned() } else { format!("{times} times") }
+            ),
             Self::SilentUnit { timeouts, requests, .. } => write!(
                 f,
                 "silent on {timeouts} of {requests} requests, while others answer. Check its address (INVT: P14.00), its \
@@ -248,6 +261,7 @@ mod tests {
             (other(By::Functions), "unit 4: 2 of 9 requests", "another function"),
             (other(By::Transactions), "unit 4: 2 of 9 requests", "transaction number"),
             (other(By::Bytes), "unit 4: 2 of 9 requests", "no frame"),
+            (Hint::SettingsChanged { times: 2 }, "line: another program changed", "2 times"),
             (Hint::SilentUnit { unit: unit(4), timeouts: 3, requests: 3 }, "unit 4: silent", "P14.00"),
         ];
         for (hint, beginning, advice) in hints {

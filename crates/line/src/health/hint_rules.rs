@@ -38,6 +38,10 @@ impl Stats {
     pub fn hints(&self) -> Vec<Hint> {
         let total = &self.total;
         let mut hints = Vec::new();
+        if self.settings_changed > 0 {
+            // No guess: it was seen.
+            hints.push(Hint::SettingsChanged { times: self.settings_changed });
+        }
         if total.requests < ENOUGH_REQUESTS {
             return hints;
         }
@@ -301,6 +305,14 @@ mod tests {
         assert_eq!(none(damaged), [Hint::WrongFormat { requests: 3, noise: 0, damaged: 3 }]);
         let floating = Counters { noise_bytes: 3, noise_idle: 3, noise_events: 3, ..silent(3) };
         assert_eq!(none(floating), [Hint::NobodyAnswers { requests: 3 }, Hint::NoBias { noise: 3, idle: 3 }]);
+    }
+
+    #[test]
+    fn settings_that_another_program_changed_are_told_at_once() {
+        let stats = Stats { settings_changed: 1, ..bus([(1, silent(1))]) };
+        assert_eq!(stats.hints(), [Hint::SettingsChanged { times: 1 }]);
+        let stats = Stats { settings_changed: 2, ..bus([(1, sound(900))]) };
+        assert_eq!(stats.hints(), [Hint::SettingsChanged { times: 2 }]);
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub struct Stats {
     pub units: BTreeMap<UnitAddress, Counters>,
     /// How often the port was opened again after it was lost.
     pub reconnects: u64,
+    /// How often another program had changed the settings of the open port, which were set again.
+    pub settings_changed: u64,
     /// The programs that use the port through the one that has it, since that opened it.
     pub programs: Vec<Program>,
 }

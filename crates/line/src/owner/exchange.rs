@@ -41,11 +41,13 @@ pub(crate) struct Talk<'a, 'r> {
     cuts: [Option<Failure>; 2],
     /// What came during its latest request and is known to answer nothing that was asked.
     pub(crate) strange: Vec<u8>,
+    /// What another program had changed at the port, and was set again behind one of its requests.
+    set_again: Option<String>,
 }
 
 impl<'a, 'r> Talk<'a, 'r> {
     pub(crate) fn new(call: Conversation<'r>, ask: &'a Ask<'r>, is_wanted: &'a dyn Fn() -> bool) -> Self {
-        Self { call, ask, is_wanted, cuts: [None, None], strange: Vec::new() }
+        Self { call, ask, is_wanted, cuts: [None, None], strange: Vec::new(), set_again: None }
     }
 
     /// It is cut short at `now` by `failure`. A port that failed is opened again by who asks next.
@@ -66,6 +68,7 @@ impl<'a, 'r> Talk<'a, 'r> {
     fn result(
         cuts: &mut [Option<Failure>; 2],
         strange: &[u8],
+        set_again: &mut Option<String>,
         ask: &Ask<'_>,
         outcome: Outcome<'_>,
         take: &mut dyn FnMut(Answer<'_>),
@@ -85,7 +88,8 @@ impl<'a, 'r> Talk<'a, 'r> {
                     Failure::NoAnswer { .. } if raw.is_empty() => strange,
                     _ => raw,
                 };
-                Err(ask.failed(failure, sent, ended, raw))
+                let error = ask.failed(failure, sent, ended, raw);
+                Err(Box::new(CallError { set_again: set_again.take(), ..*error }))
             }
             // An outcome that this line does not know.
             _ => Err(ask.failed(Failure::Interrupted, None, None, &[])),
@@ -167,7 +171,8 @@ impl Owner {
                 Step::LetPass => return Then::LetPass,
                 Step::StandBy(until) => return Then::StandBy(until),
                 Step::Done(outcome) => {
-                    return Then::Done(Talk::result(&mut talk.cuts, &talk.strange, talk.ask, outcome, take));
+                    let (cuts, set_again) = (&mut talk.cuts, &mut talk.set_again);
+                    return Then::Done(Talk::result(cuts, &talk.strange, set_again, talk.ask, outcome, take));
                 }
                 Step::Send(frame) => {
                     let sent = match self.line.as_deref_mut() {
@@ -262,6 +267,9 @@ impl Owner {
     ) {
         self.take_late(&mut talk.strange);
         let failure = exchange.failure.map(|why| Failure::of(why, Vec::new(), talk.cuts[0].clone()));
+        if failure.as_ref().is_some_and(Failure::may_be_the_ports) {
+            self.set_port_again(talk);
+        }
         // Time-outs may be shorter than the time between two looks, and retries many.
         if failure.as_ref().is_some_and(may_be_given_up) && give_up() {
             self.keep(talk, exchange, Some(&Failure::Interrupted));
@@ -271,6 +279,17 @@ impl Owner {
         }
         talk.call.is_wanted((talk.is_wanted)());
         self.prepare_next(talk);
+    }
+}
+
+impl Owner {
+    /// Nothing came, or nothing right: another program may have changed the settings of the port.
+    #[cold]
+    fn set_port_again(&mut self, talk: &mut Talk<'_, '_>) {
+        if let Some(told) = self.line.as_deref_mut().and_then(Line::set_again) {
+            self.stats().settings_changed += 1;
+            talk.set_again = Some(told);
+        }
     }
 }
 

@@ -11,6 +11,8 @@ mod low_latency;
 mod plain;
 #[cfg(unix)]
 mod posix;
+#[cfg(unix)]
+mod settings;
 mod speed;
 mod transceiver;
 
@@ -96,6 +98,10 @@ pub struct Tty {
     exclusive: bool,
     opened_by: Process,
     notes: Vec<String>,
+    /// As the driver has them; `None` where it does not tell.
+    settings: Option<system::Settings>,
+    /// What was set again and nobody has asked for yet.
+    set_again: Option<String>,
 }
 
 impl Tty {
@@ -140,6 +146,8 @@ impl Tty {
             exclusive: options.exclusive,
             opened_by: Process::current(),
             notes: Vec::new(),
+            settings: None,
+            set_again: None,
         };
         let (mut parity, mut data_bits) = (format.parity(), format.data_bits());
         if pseudo_terminal {
@@ -168,6 +176,7 @@ impl Tty {
             tty.notes.extend(tty.latency.note().map(str::to_owned));
         }
         tty.port.discard_buffers().map_err(|error| open_error(path, &error))?;
+        tty.settings = system::Settings::of(&tty.port);
         Ok(tty)
     }
 
@@ -181,9 +190,19 @@ impl Tty {
         system::is_pseudo_terminal(&self.port, &self.name)
     }
 
-    fn lost(&self, error: &io::Error) -> PortError {
+    /// Whether another program had changed the settings, which are set again.
+    fn was_changed(&mut self) -> bool {
+        let told = self.settings.as_mut().and_then(|settings| settings.set_again(&self.port));
+        let is_news = told.is_some();
+        self.set_again = told.or_else(|| self.set_again.take());
+        is_news
+    }
+
+    fn lost(&mut self, error: &io::Error) -> PortError {
+        self.was_changed();
+        let changed = self.set_again.take().map_or_else(String::new, |told| format!("; {told}"));
         let message = format!(
-            "the port is gone ({error}); plug the adapter in again; a bus opens the port again at its next call"
+            "the port is gone ({error}); plug the adapter in again; a bus opens the port again at its next call{changed}"
         );
         PortError::new(PortErrorKind::Lost, &self.name, message)
     }
@@ -210,7 +229,13 @@ impl Line for Tty {
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
-        system::receive(&mut self.port, buffer, until).map_err(|error| self.lost(&error))
+        loop {
+            match system::receive(&mut self.port, buffer, until) {
+                // A port of which somebody said that a read shall not wait (VMIN 0) seems to have ended, too.
+                Err(error) if error.kind() == io::ErrorKind::UnexpectedEof && self.was_changed() => {}
+                received => return received.map_err(|error| self.lost(&error)),
+            }
+        }
     }
 
     fn sleep(&mut self, until: Instant) {
@@ -235,8 +260,14 @@ impl Line for Tty {
         self.latency.latency()
     }
 
+    fn set_again(&mut self) -> Option<String> {
+        self.was_changed();
+        self.set_again.take()
+    }
+
     fn notes(&self) -> Vec<String> {
-        self.notes.clone()
+        let changed = self.settings.as_ref().and_then(system::Settings::note);
+        self.notes.iter().cloned().chain(changed).collect()
     }
 }
 

@@ -22,7 +22,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 5;
+pub(crate) const VERSION: u8 = 6;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -110,6 +110,7 @@ pub(crate) enum Told {
         sent: Option<u64>,
         ended: Option<u64>,
         reconnects: u64,
+        set_again: Option<String>,
     },
     Heard {
         at: u64,
@@ -142,12 +143,13 @@ pub(crate) struct Figures {
     total: Counters,
     units: Vec<(u8, Counters)>,
     programs: Vec<Program>,
+    settings_changed: u64,
 }
 
 impl From<Stats> for Figures {
     fn from(stats: Stats) -> Self {
         let units = stats.units.into_iter().map(|(unit, counters)| (unit.get(), counters)).collect();
-        Self { total: stats.total, units, programs: stats.programs }
+        Self { total: stats.total, units, programs: stats.programs, settings_changed: stats.settings_changed }
     }
 }
 
@@ -156,7 +158,8 @@ impl Figures {
     pub(crate) fn into_stats(self, reconnects: u64) -> Stats {
         let unit = |(unit, counters)| Some((UnitAddress::new(unit).ok()?, counters));
         let units = self.units.into_iter().filter_map(unit).collect();
-        Stats { total: self.total, units, reconnects, programs: self.programs }
+        let Self { total, programs, settings_changed, .. } = self;
+        Stats { total, units, reconnects, settings_changed, programs }
     }
 }
 
@@ -306,6 +309,7 @@ impl Told {
             sent: error.sent.map(Instant::as_nanos),
             ended: error.ended.map(Instant::as_nanos),
             reconnects,
+            set_again: error.set_again.clone(),
         }
     }
 }

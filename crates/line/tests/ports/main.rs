@@ -12,6 +12,8 @@ mod machine;
 mod pty;
 #[cfg(target_os = "linux")]
 mod replug;
+#[cfg(target_os = "linux")]
+mod settings;
 mod tcp;
 
 use drivebus_line::{Line, PortErrorKind};

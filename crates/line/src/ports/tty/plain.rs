@@ -11,6 +11,26 @@ use crate::line::PortErrorKind;
 use crate::ports::adapters::identity::DeviceNumber;
 use crate::system::clock::{monotonic, sleep_until};
 
+/// Nothing: the system gives a port to one program only, so no other changes its settings.
+#[derive(Debug)]
+pub(super) struct Settings;
+
+impl Settings {
+    pub(super) fn of(_port: &SerialPort) -> Option<Self> {
+        None
+    }
+
+    #[expect(clippy::unused_self, reason = "the same signature as on other systems")]
+    pub(super) fn set_again(&mut self, _port: &SerialPort) -> Option<String> {
+        None
+    }
+
+    #[expect(clippy::unused_self, reason = "the same signature as on other systems")]
+    pub(super) fn note(&self) -> Option<String> {
+        None
+    }
+}
+
 /// Opens `path` as it is. The system gives a port to one program only.
 pub(super) fn open(path: &str) -> io::Result<SerialPort> {
     SerialPort::open(path, serial2::KeepSettings)

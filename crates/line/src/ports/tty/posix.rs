@@ -17,6 +17,8 @@ use crate::line::PortErrorKind;
 use crate::ports::adapters::identity::DeviceNumber;
 use crate::system::clock::{monotonic, sleep_until, wait_for};
 
+pub(super) use super::settings::Settings;
+
 /// Opens `path` without changing anything about it: it may be another program's.
 pub(super) fn open(path: &str) -> io::Result<SerialPort> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
