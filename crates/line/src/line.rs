@@ -23,6 +23,16 @@ pub trait Line: Send + fmt::Debug {
     /// Now, on this line's clock: real time, or the simulation's.
     fn now(&self) -> Instant;
 
+    /// Makes ready for a request, before each: a connection that the other side closed behind its answer, as some servers do
+    /// behind each, is made anew. Nothing is sent.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`]: what was open is of no use any more, and has to be opened again.
+    fn make_ready(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
+
     /// Hands all of `bytes` to the wire in one piece.
     ///
     /// Returns when the last character will have left the wire, computed from the character time because drivers

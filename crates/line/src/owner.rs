@@ -133,13 +133,17 @@ impl Owner {
         }
     }
 
-    /// Makes ready for a request: opens the line again if it was lost, unless `give_up` says so first.
+    /// Makes ready for a request: opens the line again if it was lost, or ended while nobody asked, unless `give_up` says so
+    /// first.
     #[expect(
         clippy::inline_always,
         reason = "it has several callers, and the lone one on the hot path pays for no call"
     )]
     #[inline(always)]
     pub(crate) fn prepare(&mut self, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
+        if self.line.as_deref_mut().is_some_and(|line| line.make_ready().is_err()) {
+            self.close();
+        }
         if self.line.is_none() {
             let line = self.opener.open(give_up)?;
             self.take_line(line);

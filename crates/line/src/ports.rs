@@ -2,6 +2,10 @@
 
 #[cfg(feature = "serial")]
 pub(crate) mod adapters;
+#[cfg(feature = "tcp")]
+pub(crate) mod closing;
+#[cfg(feature = "tcp")]
+pub(crate) mod connection;
 pub(crate) mod key;
 #[cfg(all(unix, feature = "share"))]
 mod listening;

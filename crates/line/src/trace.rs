@@ -187,6 +187,10 @@ impl Line for Watched {
         self.line.now()
     }
 
+    fn make_ready(&mut self) -> Result<(), PortError> {
+        self.line.make_ready()
+    }
+
     fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
         self.show_gathered();
         let at = self.line.now();

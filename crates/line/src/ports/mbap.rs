@@ -19,7 +19,8 @@ use drivebus_rtu::{Duration, Instant, crc16};
 
 use crate::error::Hex;
 use crate::line::{Line, PortError, PortErrorKind};
-use crate::ports::tcp::Connection;
+use crate::ports::closing::Closing;
+use crate::ports::connection::Connection;
 use crate::system::clock::{monotonic, sleep_until};
 
 /// The port that the specification reserves for Modbus TCP.
@@ -67,8 +68,13 @@ impl ModbusTcp {
     ///
     /// [`PortErrorKind::NotFound`]: no such host, nobody listens, or nobody answers in time.
     pub fn connect(host: &str, port: u16, timeout: Duration) -> Result<Self, PortError> {
+        Self::connect_to(host, port, timeout, &Closing::default())
+    }
+
+    /// As [`connect`](Self::connect), to a server of which it is known when it closes.
+    pub(crate) fn connect_to(host: &str, port: u16, timeout: Duration, closing: &Closing) -> Result<Self, PortError> {
         Ok(Self {
-            connection: Connection::open("tcp", host, port, timeout)?,
+            connection: Connection::open("tcp", host, port, timeout, closing)?,
             transaction: 0,
             waiting: false,
             incoming: Vec::with_capacity(2 * (PREFIX + MAX_BODY)),
@@ -127,6 +133,17 @@ impl Line for ModbusTcp {
         monotonic()
     }
 
+    /// On a new connection nothing of an old one comes.
+    fn make_ready(&mut self) -> Result<(), PortError> {
+        if self.connection.make_ready()? {
+            self.incoming.clear();
+            self.frame.clear();
+            self.waiting = false;
+            self.open.clear();
+        }
+        Ok(())
+    }
+
     /// Sends `bytes`, a whole RTU frame, as a new transaction. What is left of an earlier answer is dropped.
     fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
         let body = bytes.len().checked_sub(CRC).filter(|length| (MIN_BODY..=MAX_BODY).contains(length));
@@ -139,6 +156,9 @@ impl Line for ModbusTcp {
             );
             return Err(PortError::new(PortErrorKind::Unsupported, &self.connection.name, message));
         };
+        if !self.connection.is_ready {
+            self.make_ready()?;
+        }
         self.frame.clear();
         if self.waiting {
             if self.open.len() == MAX_OPEN {
@@ -200,9 +220,10 @@ impl Line for ModbusTcp {
     }
 
     fn notes(&self) -> Vec<String> {
-        match self.foreign {
-            0 => Vec::new(),
-            count => vec![format!("answers with another transaction than asked, dropped: {count}")],
-        }
+        let dropped = match self.foreign {
+            0 => None,
+            count => Some(format!("answers with another transaction than asked, dropped: {count}")),
+        };
+        dropped.into_iter().chain(self.connection.note()).collect()
     }
 }

@@ -9,6 +9,8 @@ use crate::line::Opener;
 #[cfg(any(not(feature = "serial"), not(feature = "tcp")))]
 use crate::line::{PortError, PortErrorKind};
 #[cfg(feature = "tcp")]
+use crate::ports::closing::Closing;
+#[cfg(feature = "tcp")]
 use crate::ports::mbap::ModbusTcp;
 #[cfg(feature = "tcp")]
 use crate::ports::tcp::RtuOverTcp;
@@ -70,8 +72,8 @@ fn serial(path: String, _: &PortOptions) -> Opener {
 
 #[cfg(feature = "tcp")]
 fn rtu_over_tcp(server: Server, options: &PortOptions) -> Opener {
-    let format = options.format;
-    Box::new(move || Ok(Box::new(RtuOverTcp::connect(&server.host, server.port, &format, CONNECT)?)))
+    let (format, closing) = (options.format, Closing::default());
+    Box::new(move || Ok(Box::new(RtuOverTcp::connect_to(&server.host, server.port, &format, CONNECT, &closing)?)))
 }
 
 #[cfg(not(feature = "tcp"))]
@@ -82,7 +84,8 @@ fn rtu_over_tcp(server: Server, _: &PortOptions) -> Opener {
 
 #[cfg(feature = "tcp")]
 fn modbus_tcp(server: Server) -> Opener {
-    Box::new(move || Ok(Box::new(ModbusTcp::connect(&server.host, server.port, CONNECT)?)))
+    let closing = Closing::default();
+    Box::new(move || Ok(Box::new(ModbusTcp::connect_to(&server.host, server.port, CONNECT, &closing)?)))
 }
 
 #[cfg(not(feature = "tcp"))]
