@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, TypeVar, overload
 
-from drivebus import _native, checks
+from drivebus import _native
 from drivebus.attributes import known_only
 from drivebus.drive import Drive
 from drivebus.identify import scan
@@ -67,6 +67,9 @@ class Bus(BusFace, Requests):
             has it and serves the others, who comes next uses it through that one; `"own"`: nobody is served where this
             program has the port; `"never"`: nobody is served, and a port that another program has is busy. For serial
             ports and `socket://`.
+        reserved: Whether what the specification reserves may be asked, by who knows that it is there: units 248 to 254
+            on a serial line, and writes to unit 0 over `tcp://`, which a gateway hands on to every unit behind it. Over
+            `tcp://` 0 can be read and 248 to 255 asked without it.
         trace: A file that gets every frame of this bus, for Wireshark: pcapng, which it dissects as Modbus RTU without
             a setting. A file that is there is replaced. None keeps nothing, and costs nothing.
 
@@ -150,7 +153,7 @@ class Bus(BusFace, Requests):
                 one alone, and who speaks Modbus is not told.
         """
         limit = scan.time_for(timeout, self._opening.timeout)
-        return self._scan(scan.units(units), limit, scan.protocol_of(protocol))
+        return self._scan(scan.units(units, self._opening.known.addresses), limit, scan.protocol_of(protocol))
 
     def _scan(self, units: Sequence[int], timeout: float, protocol: str) -> Iterator[Found]:
         async def read(unit: int, address: int, table: str = "holding") -> list[int]:
@@ -179,7 +182,7 @@ class Bus(BusFace, Requests):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(identify(BlockingBus(self).read, checks.unit(unit)))
+        return at_once(identify(BlockingBus(self).read, self._opening.known.addresses.unit(unit)))
 
     def drive(
         self,
@@ -212,7 +215,7 @@ class Bus(BusFace, Requests):
             NotAllowed: No such profile or variant; or what the drive tells is not sure enough: give a profile.
             NoAnswer, BadAnswer: The drive did not tell; only if *profile* is None.
         """
-        unit = checks.unit(unit)
+        unit = self._opening.known.addresses.unit(unit, changes=True)
         check_trust(profile, trust_profile)
         known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified, urgent))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)

@@ -25,6 +25,9 @@ use crate::owner::opener::LineOpener;
 use crate::trace::{Trace, Watched};
 use crate::turns::queue::Stops;
 
+/// As many as there are addresses, the reserved ones among them.
+const UNITS: usize = 256;
+
 /// The line, and all that is known about it.
 pub(crate) struct Owner {
     line: Option<Box<dyn Line>>,
@@ -32,7 +35,7 @@ pub(crate) struct Owner {
     clock: Option<LineClock>,
     opener: LineOpener,
     /// What is known of it, its adapter and its units.
-    pub(crate) known: Box<Known>,
+    pub(crate) known: Box<Known<UNITS>>,
     /// What its units say by their exceptions.
     pub(crate) meanings: Arc<UnitMeanings>,
     links: Arc<Mutex<Links>>,

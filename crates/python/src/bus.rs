@@ -14,7 +14,7 @@ use crate::arguments::{
     duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
 };
 use crate::clock::{UnixClock, to_seconds, unix_time};
-use crate::convert::{bytes_of, one_word, unit_address, words_of};
+use crate::convert::{any_unit, bytes_of, one_word, words_of};
 use crate::ending::detached;
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
@@ -186,7 +186,7 @@ impl Bus {
         table: &str,
     ) -> PyResult<()> {
         let options = write_options(timeout, read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
+        self.write_to(any_unit(unit)?.into(), table, address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
@@ -208,7 +208,7 @@ impl Bus {
             None => py.detach(|| self.core.fresh_word()),
         };
         let options = CallOptions::new().timeout(timeout);
-        let done = self.call(py, unit_address(unit)?.into(), &Request::echo(word), options, &mut |_| ())?;
+        let done = self.call(py, any_unit(unit)?.into(), &Request::echo(word), options, &mut |_| ())?;
         Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
     }
 
@@ -222,7 +222,7 @@ impl Bus {
         timeout: Option<f64>,
         in_doubt: bool,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let (unit, pdu) = (unit_address(unit)?, bytes_of(pdu)?);
+        let (unit, pdu) = (any_unit(unit)?, bytes_of(pdu)?);
         let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
         let pdu = pdu.as_bytes();
         let request = Request::raw(pdu, reply_length).map_err(refuse)?;
@@ -240,19 +240,19 @@ impl Bus {
     fn configure(&self, unit: &Bound<'_, PyAny>, timeout: Option<f64>, gap: Option<f64>) -> PyResult<()> {
         let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
         let gap = gap.map(|time| duration("gap", time)).transpose()?;
-        self.core.configure(unit_address(unit)?, UnitOptions::new().timeout(timeout).gap(gap));
+        self.core.configure(any_unit(unit)?, UnitOptions::new().timeout(timeout).gap(gap));
         Ok(())
     }
 
     #[pyo3(signature = (unit, profile, /))]
     fn set_meanings(&self, unit: &Bound<'_, PyAny>, profile: &Profile) -> PyResult<()> {
-        self.core.set_meanings(unit_address(unit)?, profile.meanings());
+        self.core.set_meanings(any_unit(unit)?, profile.meanings());
         Ok(())
     }
 
     #[pyo3(signature = (unit, /))]
     fn link(&self, py: Python<'_>, unit: &Bound<'_, PyAny>) -> PyResult<(u32, u32)> {
-        let unit = unit_address(unit)?;
+        let unit = any_unit(unit)?;
         let link = py.detach(|| self.core.link(unit));
         Ok((link.good, link.asked))
     }
@@ -266,7 +266,7 @@ impl Bus {
         look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
         silence: f64,
     ) -> PyResult<Option<u64>> {
-        let will = LastWill::new(unit_address(unit)?, ways).silence(duration("silence", silence)?);
+        let will = LastWill::new(any_unit(unit)?, ways).silence(duration("silence", silence)?);
         let will = match look {
             Some((question, others)) => will.look(question, others),
             None => will,
@@ -331,7 +331,7 @@ impl Bus {
         let options = options_for(&request, options, urgent);
         // Kept here while the interpreter is let go of, so that only the list is made.
         let (mut read, mut count) = ([0; MAX_READ_BITS as usize], 0);
-        let done = self.call(py, unit_address(unit)?.into(), &request, options, &mut |answer| {
+        let done = self.call(py, any_unit(unit)?.into(), &request, options, &mut |answer| {
             if let Answer::Read { words, .. } = answer {
                 count = words.len();
                 read.iter_mut().zip(words.iter()).for_each(|(slot, word)| *slot = word);

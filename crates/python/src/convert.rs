@@ -30,10 +30,16 @@ pub(crate) fn table_of(given: &str) -> PyResult<Table> {
     })
 }
 
-/// A unit that can answer.
+/// A unit that has its address by the specification.
 pub(crate) fn unit_address(given: &Bound<'_, PyAny>) -> PyResult<UnitAddress> {
     let raw = given.extract::<u8>().ok().and_then(|raw| UnitAddress::new(raw).ok());
     raw.ok_or_else(|| not_allowed(format!("unit {} is not a number from 1 to 247", shown(given))))
+}
+
+/// A unit of a line, also a reserved one: which lines have those, `drivebus.line.addresses` has checked.
+pub(crate) fn any_unit(given: &Bound<'_, PyAny>) -> PyResult<UnitAddress> {
+    let raw = given.extract::<u8>().ok().map(UnitAddress::by_name);
+    raw.ok_or_else(|| not_allowed(format!("unit {} is not a number from 0 to 255", shown(given))))
 }
 
 /// A unit, or 0 for all of them.

@@ -11,7 +11,7 @@ use pyo3::types::{PyByteArray, PyDict, PyInt, PyList, PyTuple};
 use crate::arguments::duration;
 use crate::bus::Bus;
 use crate::clock::UnixClock;
-use crate::convert::{one_word, shown, unit_address};
+use crate::convert::{any_unit, one_word, shown};
 use crate::errors::{Class, call_error, not_allowed, refuse};
 use crate::mailbox::Mailbox;
 use crate::plan::Plan;
@@ -46,7 +46,7 @@ impl Poller {
         let (mut asked, mut meanings) = (Vec::new(), Vec::new());
         for target in targets.try_iter()? {
             let (unit, what): (Bound<'_, PyAny>, Bound<'_, PyAny>) = target?.extract()?;
-            let unit = unit_address(&unit)?;
+            let unit = any_unit(&unit)?;
             if let Ok(plan) = what.cast::<Plan>() {
                 let plan = plan.get().core();
                 let reads = plan.reads().iter().map(|read| (table(read.table), read.address, read.count)).collect();

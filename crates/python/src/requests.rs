@@ -16,7 +16,7 @@ use crate::arguments::{
 };
 use crate::bus::{Bus, HOLDING, Heard};
 use crate::clock::UnixClock;
-use crate::convert::{one_word, unit_address, words_of};
+use crate::convert::{any_unit, one_word, words_of};
 use crate::errors::{call_error, refuse};
 use crate::format::SerialFormat;
 use crate::mailbox::{Inbox, Mailbox};
@@ -134,7 +134,7 @@ impl Requests {
         let request = read_request(table, address, count)?;
         let options = options_for(&request, read_options(timeout, retries, verify)?, urgent);
         let expected = request.expected();
-        Ok(self.ask(unit_address(unit)?.into(), &request, options, move |py, reply, _| {
+        Ok(self.ask(any_unit(unit)?.into(), &request, options, move |py, reply, _| {
             words(expected, &reply).into_pyobject(py)
         }))
     }
@@ -152,7 +152,7 @@ impl Requests {
         let request = read_request(table, address, count)?;
         let expected = request.expected();
         let options = options_for(&request, read_options(None, None, verify)?, urgent);
-        Ok(self.ask(unit_address(unit)?.into(), &request, options, move |py, reply, clock| {
+        Ok(self.ask(any_unit(unit)?.into(), &request, options, move |py, reply, clock| {
             let stamped = (words(expected, &reply), clock.at(reply.done.sent), clock.at(reply.done.ended));
             Ok(stamped.into_pyobject(py)?.into_any())
         }))
@@ -173,7 +173,7 @@ impl Requests {
         table: &str,
     ) -> PyResult<Asked> {
         let options = write_options(timeout, read_back, connection)?;
-        self.write_to(unit_address(unit)?.into(), table, address, value, options, urgent)
+        self.write_to(any_unit(unit)?.into(), table, address, value, options, urgent)
     }
 
     #[pyo3(signature = (address, value, /))]
@@ -184,7 +184,7 @@ impl Requests {
     #[pyo3(signature = (unit, word = None, /))]
     fn echo(&self, unit: &Bound<'_, PyAny>, word: Option<&Bound<'_, PyAny>>) -> PyResult<Asked> {
         let word = word.map(|word| one_word("word", word)).transpose()?;
-        let to = unit_address(unit)?.into();
+        let to = any_unit(unit)?.into();
         let options = CallOptions::default();
         Ok(match word {
             Some(word) => self.ask(to, &Request::echo(word), options, round_trip()),
@@ -203,14 +203,14 @@ impl Requests {
     ) -> PyResult<Asked> {
         let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
         let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
-        Ok(self.ask(unit_address(unit)?.into(), &request, options, |py, reply, _| {
+        Ok(self.ask(any_unit(unit)?.into(), &request, options, |py, reply, _| {
             Ok(PyBytes::new(py, &reply.pdu).into_any())
         }))
     }
 
     #[pyo3(signature = (unit, /))]
     fn link(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
-        let unit = unit_address(unit)?;
+        let unit = any_unit(unit)?;
         if let Some(link) = self.core.link_if_here(unit) {
             let number = self.inbox.number();
             self.inbox.post(number, shown(link));

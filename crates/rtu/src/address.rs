@@ -2,16 +2,16 @@
 
 use core::fmt;
 
-/// The address of one unit on the line: 1..=247.
+/// The address of one unit on the line: 1..=247, and where somebody asks for it by name any other.
 ///
 /// Source: *Modbus over Serial Line* V1.02, §2.2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct UnitAddress(u8);
 
 impl UnitAddress {
-    /// The lowest address a unit can have.
+    /// The lowest address a unit has by the specification.
     pub const MIN: Self = Self(1);
-    /// The highest address a unit can have.
+    /// The highest address a unit has by the specification.
     pub const MAX: Self = Self(247);
 
     /// Checks `raw`.
@@ -24,6 +24,23 @@ impl UnitAddress {
             1..=247 => Ok(Self(raw)),
             _ => Err(AddressError { raw }),
         }
+    }
+
+    /// `raw`, whatever it is, for who asks for it by name: 248..=255, which the specification reserves and some units have, and
+    /// 0, by which many a device means itself over Modbus TCP. On a serial line all units take 0 for a broadcast, and so they
+    /// do behind a gateway: whether it may be asked there is the caller's to know.
+    pub const fn by_name(raw: u8) -> Self {
+        Self(raw)
+    }
+
+    /// Who answers by `raw`; nobody does by 0 that was asked as one of several.
+    pub(crate) const fn of_answer(raw: u8) -> Option<Self> {
+        if raw == 0 { None } else { Some(Self(raw)) }
+    }
+
+    /// Whether no unit has it by the specification.
+    pub const fn is_reserved(self) -> bool {
+        !matches!(self.0, 1..=247)
     }
 
     /// The address as it stands on the wire.
@@ -114,6 +131,9 @@ mod tests {
                 Err(error) => assert!(raw > 247 && error == AddressError { raw }),
             }
             assert_eq!(UnitAddress::new(raw).is_ok(), (1..=247).contains(&raw));
+            let named = UnitAddress::by_name(raw);
+            assert_eq!((named.get(), named.is_reserved()), (raw, UnitAddress::new(raw).is_err()));
+            assert_eq!(Destination::Unit(named).to_wire(), raw);
         }
     }
 }

@@ -253,7 +253,7 @@ impl Doubts {
     /// Returns whether it can be none of ours, as far as is remembered.
     pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
         let is_new = self.hear(now, frame, at_once);
-        let Ok(unit) = UnitAddress::new(frame.address()) else { return false };
+        let Some(unit) = UnitAddress::of_answer(frame.address()) else { return false };
         if !is_new {
             return false;
         }

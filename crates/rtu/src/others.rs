@@ -116,7 +116,7 @@ impl Others {
         if let Some(place) = place {
             self.heard[place] = Some(theirs);
         } else if let Some(oldest) = self.heard.iter_mut().flatten().min_by_key(|theirs| theirs.until) {
-            if let Ok(unit) = UnitAddress::new(oldest.shape.unit) {
+            if let Some(unit) = UnitAddress::of_answer(oldest.shape.unit) {
                 self.forgotten.insert(unit);
                 self.forgotten_until = self.forgotten_until.max(oldest.until);
             }

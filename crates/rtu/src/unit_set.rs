@@ -2,7 +2,7 @@
 
 use crate::UnitAddress;
 
-/// Which of the 247 units are in it.
+/// Which of all units are in it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct UnitSet([u64; 4]);
 

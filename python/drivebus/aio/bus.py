@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any, TypeVar, overload
 
-from drivebus import _native, checks
+from drivebus import _native
 from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
@@ -222,7 +222,9 @@ class Bus(BusFace):
     ) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
         limit = scan.time_for(timeout, self.timeout)
-        return self._scan(self._asked(), scan.units(units), limit, scan.protocol_of(protocol))
+        return self._scan(
+            self._asked(), scan.units(units, self._opening.known.addresses), limit, scan.protocol_of(protocol)
+        )
 
     async def _scan(
         self, line: AwaitedRequests, units: Sequence[int], timeout: float, protocol: str
@@ -243,7 +245,7 @@ class Bus(BusFace):
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
-        return await identify(self.read, checks.unit(unit))
+        return await identify(self.read, self._opening.known.addresses.unit(unit))
 
     async def drive(
         self,
@@ -256,7 +258,7 @@ class Bus(BusFace):
         urgent: bool = False,
     ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
-        unit = checks.unit(unit)
+        unit = self._opening.known.addresses.unit(unit, changes=True)
         check_trust(profile, trust_profile)
         known, code = await profile_of(self, unit, profile, variants, unverified, urgent)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)

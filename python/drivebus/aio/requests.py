@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from drivebus import checks
 from drivebus.aio.line import Line
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.requests import (
@@ -89,7 +88,7 @@ class AwaitedRequests:
         retries: int | None = None,
     ) -> list[int]:
         """See `Requests`."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
         alone = alone_of(timeout, retries)
         return await self._line.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
 
@@ -104,7 +103,7 @@ class AwaitedRequests:
         table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `Requests`."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
         return await self._line.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     async def write(
@@ -133,7 +132,7 @@ class AwaitedRequests:
 
     async def link(self, unit: int) -> Link:
         """See `Requests`."""
-        return Link(*await self._line.link(checks.unit(unit)))
+        return Link(*await self._line.link(self._known.addresses.unit(unit)))
 
     async def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
         """See `Requests`."""
@@ -141,7 +140,7 @@ class AwaitedRequests:
 
     async def echo(self, unit: int, word: int | None = None) -> float:
         """See `Requests`."""
-        return await self._line.echo(*echo_of(unit, word))
+        return await self._line.echo(*echo_of(self._known, unit, word))
 
     async def transact(
         self,

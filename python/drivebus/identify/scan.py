@@ -18,6 +18,7 @@ from drivebus.identify.choose import usable
 from drivebus.identify.identify import Read, identify
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
+from drivebus.line.addresses import Addresses
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.scan_order import PROTOCOLS
 
@@ -27,11 +28,11 @@ _TIMEOUT = 0.1
 """Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
 
 
-def units(given: Iterable[int]) -> list[int]:
-    """The units of a scan."""
+def units(given: Iterable[int], addresses: Addresses) -> list[int]:
+    """The units of a scan, which may be asked as *addresses* says."""
     if not isinstance(given, Iterable):
         raise NotAllowed(f"units is {checks.shown(given)}; give addresses from 1 to 247, such as range(1, 248) or [5]")
-    return [checks.unit(unit) for unit in given]
+    return [addresses.unit(unit) for unit in given]
 
 
 def time_for(timeout: float | None, of_bus: float) -> float:

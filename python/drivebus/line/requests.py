@@ -10,6 +10,7 @@ from typing import Any
 
 from drivebus import _native, checks, places
 from drivebus.errors import NotAllowed
+from drivebus.line.addresses import only_reads
 from drivebus.line.stats import Link
 from drivebus.line.units import Units
 
@@ -92,7 +93,7 @@ class Requests:
             PortError: The port is lost, or the bus closed.
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
         alone = alone_of(timeout, retries)
         return self._native.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
 
@@ -107,7 +108,7 @@ class Requests:
         table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and at which the answer was complete."""
-        unit, address, count = read_of(unit, address, count, urgent=urgent, verify=verify, table=table)
+        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
         return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
 
     def write(
@@ -165,7 +166,7 @@ class Requests:
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
-        return Link(*self._native.link(checks.unit(unit)))
+        return Link(*self._native.link(self._known.addresses.unit(unit)))
 
     def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
         """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once.
@@ -176,7 +177,7 @@ class Requests:
 
     def echo(self, unit: int, word: int | None = None) -> float:
         """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
-        return self._native.echo(*echo_of(unit, word))
+        return self._native.echo(*echo_of(self._known, unit, word))
 
     def transact(
         self,
@@ -196,11 +197,12 @@ class Requests:
 
 
 def read_of(
-    unit: int, address: int, count: int, *, urgent: object, verify: object, table: object = "holding"
+    known: Units, unit: int, address: int, count: int, *, urgent: object, verify: object, table: object = "holding"
 ) -> tuple[int, int, int]:
     """What a read is of. Raises `NotAllowed` where something is out of range."""
     most = 125 if table == "holding" or checks.one_of("table", table, places.TABLES) not in places.BITS else 2000
-    unit, address, count = checks.unit(unit), checks.address(address), checks.whole("count", count, 1, most)
+    unit, address = known.addresses.unit(unit), checks.address(address)
+    count = checks.whole("count", count, 1, most)
     # Without a call for each of them where both are right.
     if type(urgent) is not bool or type(verify) is not bool:
         checks.flag("urgent", urgent)
@@ -234,7 +236,8 @@ def write_of(
         checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
     if connection is not None:
         checks.whole("connection", connection, 0, 2**63)
-    unit, address, words = checks.unit(unit), checks.address(address), checks.of_table(table, value)
+    unit, address = known.addresses.unit(unit, changes=True), checks.address(address)
+    words = checks.of_table(table, value)
     checks.flag("urgent", urgent)
     known.check(unit, places.place(str(table), address), words, checks.flag("force", force))
     return unit, address, words
@@ -247,11 +250,11 @@ def broadcast_of(known: Units, address: int, value: int | Sequence[int], force: 
     return address, words
 
 
-def echo_of(unit: int, word: int | None) -> tuple[int, int | None]:
+def echo_of(known: Units, unit: int, word: int | None) -> tuple[int, int | None]:
     """What an echo is of. Raises `NotAllowed` where something is out of range."""
     if word is not None:
         word = checks.whole("word", word, 0, 0xFFFF, hexadecimal=True)
-    return checks.unit(unit), word
+    return known.addresses.unit(unit), word
 
 
 def transact_of(
@@ -268,7 +271,7 @@ def transact_of(
         raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1 to 253 bytes, function code first")
     if reply_length is not None:
         reply_length = checks.whole("reply_length", reply_length, 1, 253)
-    unit = checks.unit(unit)
+    unit = known.addresses.unit(unit, changes=not only_reads(body))
     known.check_pdu(unit, body, checks.flag("force", force))
     return unit, body, reply_length
 

@@ -10,6 +10,7 @@ from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import NotAllowed
 from drivebus.line import ports
+from drivebus.line.addresses import Addresses
 from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
 from drivebus.line.units import Units
@@ -50,6 +51,7 @@ class Opening:
         low_latency: bool,
         queue: int,
         share: str,
+        reserved: bool,
         trace: object,
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
@@ -77,7 +79,8 @@ class Opening:
         if isinstance(target, Simulator):
             target = core_of(target) if target.transport == "process" else lasting_port(target)
         self.target = target
-        self.known = Units()
+        tcp = isinstance(target, str) and target.lower().startswith("tcp://")
+        self.known = Units(Addresses(tcp=tcp, reserved=checks.flag("reserved", reserved)))
         self.shown = str(port)
         self.trace = Trace(self.known, None if trace is None else _wire_file(trace, self.shown, self.format))
 
@@ -155,6 +158,7 @@ class BusFace:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        reserved: bool = False,
         trace: str | os.PathLike[str] | None = None,
     ) -> None:
         opening = Opening(
@@ -170,12 +174,14 @@ class BusFace:
             low_latency=low_latency,
             queue=queue,
             share=share,
+            reserved=reserved,
             trace=trace,
         )
         self.simulator = opening.simulator
         self.format = opening.format
         self._timeout = opening.timeout
         self._trace = opening.trace
+        self._addresses = opening.known.addresses
         self._begin(opening)
 
     def _begin(self, opening: Opening) -> None:
@@ -237,7 +243,7 @@ class BusFace:
             timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if gap is not None:
             gap = checks.number("gap", gap, 0.0, 3600.0)
-        self._core().configure(checks.unit(unit), timeout=timeout, gap=gap)
+        self._core().configure(self._addresses.unit(unit), timeout=timeout, gap=gap)
 
     def trace(self, on: bool = True) -> None:
         """Logs each frame on the line from now on: time, gap, direction, bytes and what they mean.

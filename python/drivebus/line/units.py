@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
+from drivebus.line.addresses import Addresses
 from drivebus.line.write_guard import check_words, prepare_guard
 from drivebus.profile import Profile
 from drivebus.rtu import written
@@ -96,9 +97,14 @@ class UnitRecord:
 
 
 class Units:
-    """The units of one line, by address."""
+    """The units of one line, by address.
 
-    def __init__(self) -> None:
+    Attributes:
+        addresses: Which may be asked.
+    """
+
+    def __init__(self, addresses: Addresses | None = None) -> None:
+        self.addresses = Addresses() if addresses is None else addresses
         self._records: dict[int, UnitRecord] = {}
 
     def record(self, unit: int) -> UnitRecord:

@@ -374,7 +374,7 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<
             Told::Stats(Box::new(Figures::from(stats)))
         }
         Wish::Link(unit) => {
-            let link = port.figures.link(UnitAddress::new(unit).ok()?);
+            let link = port.figures.link(UnitAddress::by_name(unit));
             Told::Link { good: link.good, asked: link.asked }
         }
         Wish::FreshWord => Told::Word(port.words.next()),
@@ -472,7 +472,7 @@ impl Wanted for Here<'_> {
 
 /// Carries out `order`; `None` where it is none.
 fn call(channel: &RefCell<Channel>, port: &Port, order: &Order, program: Program) -> Option<Told> {
-    let (destination, request, options) = (order.destination()?, order.request()?, order.options()?);
+    let (destination, request, options) = (order.destination(), order.request()?, order.options()?);
     let meanings = order.meanings();
     let ask = port.ask_as(UnitOptions::default(), destination, &request, &options);
     let ask = Ask { meanings: meanings.as_ref(), ..order.times(ask) };

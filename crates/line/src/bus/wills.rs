@@ -180,7 +180,7 @@ impl Wills {
         };
         let will = Will { program: readable(&will.program), ..will };
         let who = format!("{} (process {}), which ran unit {}, is gone", will.program, will.process, will.unit);
-        let Ok(unit) = UnitAddress::new(will.unit) else { return paper.remove() };
+        let unit = UnitAddress::by_name(will.unit);
         if will.characters != self.characters {
             state.note(&format!("{who}; it is not halted for it, since this port is open at other characters"));
             return;

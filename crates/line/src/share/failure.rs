@@ -142,10 +142,7 @@ impl From<Said> for Failure {
             Said::BeingStopped { unit, program, process } => Self::BeingStopped { unit, program, process },
             Said::OutOfTurn => Self::NotBegun(BeginError::OutOfTurn),
             Said::BroadcastRead => Self::NotBegun(BeginError::BroadcastRead),
-            Said::Quarantine { unit } => match UnitAddress::new(unit) {
-                Ok(unit) => Self::NotBegun(BeginError::Quarantine { unit }),
-                Err(_) => Self::Doubtful,
-            },
+            Said::Quarantine { unit } => Self::NotBegun(BeginError::Quarantine { unit: UnitAddress::by_name(unit) }),
             Said::NoAnswer { timeout, attempts } => Self::NoAnswer { timeout: Duration::from_nanos(timeout), attempts },
             Said::Unreached => Self::Unreached,
             Said::Doubtful => Self::Doubtful,

@@ -156,8 +156,8 @@ impl From<Stats> for Figures {
 impl Figures {
     /// As this program counts how often its port was opened again.
     pub(crate) fn into_stats(self, reconnects: u64) -> Stats {
-        let unit = |(unit, counters)| Some((UnitAddress::new(unit).ok()?, counters));
-        let units = self.units.into_iter().filter_map(unit).collect();
+        let unit = |(unit, counters)| (UnitAddress::by_name(unit), counters);
+        let units = self.units.into_iter().map(unit).collect();
         let Self { total, programs, settings_changed, .. } = self;
         Stats { total, units, reconnects, settings_changed, programs }
     }
@@ -232,11 +232,11 @@ impl Order {
         self
     }
 
-    /// Who is asked; `None` where no unit can have this number.
-    pub(crate) fn destination(&self) -> Option<Destination> {
+    /// Who is asked; its program has asked for a reserved one by name.
+    pub(crate) fn destination(&self) -> Destination {
         match self.unit {
-            0 => Some(Destination::Broadcast),
-            unit => UnitAddress::new(unit).ok().map(Destination::Unit),
+            0 => Destination::Broadcast,
+            unit => Destination::Unit(UnitAddress::by_name(unit)),
         }
     }
 

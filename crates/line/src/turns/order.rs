@@ -15,8 +15,8 @@ use class::{Class, Kin};
 /// of 9600 bit/s, where a turn takes some 30 ms, waits about a second for each who came before it.
 pub(crate) const OVERTAKEN_AT_MOST: u32 = 32;
 
-/// Broadcasts are a unit of their own, with the address they have on the wire; 247 is the highest.
-const UNITS: usize = 248;
+/// Broadcasts are a unit of their own, with the address they have on the wire, as the device that is 0 over Modbus TCP.
+const UNITS: usize = 256;
 /// Those beside stops.
 const CLASSES: usize = 3;
 

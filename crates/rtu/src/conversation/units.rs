@@ -17,7 +17,8 @@ pub(super) struct Unit {
     pub(super) watched: Watched,
 }
 
-/// The units that were asked. With room for all 247 each is found without a search.
+/// The units that were asked. With room for all 247 each is found without a search, and with 256 the
+/// reserved ones are, too.
 #[derive(Debug, Clone)]
 pub(super) struct Units<const N: usize> {
     records: [Unit; N],
@@ -36,7 +37,11 @@ impl<const N: usize> Units<N> {
         if self.place(unit).is_some() {
             return true;
         }
-        let free = if Self::has_all() { Some(direct(unit)) } else { self.numbers.iter().position(Option::is_none) };
+        let free = if Self::has_all() {
+            Some(direct(unit)).filter(|&place| place < N)
+        } else {
+            self.numbers.iter().position(Option::is_none)
+        };
         if let Some(number) = free.and_then(|free| self.numbers.get_mut(free)) {
             *number = Some(unit);
         }
@@ -98,12 +103,29 @@ impl<const N: usize> Units<N> {
 
     fn place(&self, unit: UnitAddress) -> Option<usize> {
         if Self::has_all() {
-            return Some(direct(unit)).filter(|&place| self.numbers[place].is_some());
+            return Some(direct(unit)).filter(|&place| matches!(self.numbers.get(place), Some(Some(_))));
         }
         self.numbers.iter().position(|number| *number == Some(unit))
     }
 }
 
 fn direct(unit: UnitAddress) -> usize {
-    usize::from(unit.get()) - 1
+    usize::from(unit.get().wrapping_sub(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reserved_unit_has_a_place_of_its_own_or_none() {
+        let (mut by_specification, mut all) = (Units::<247>::new(), Units::<256>::new());
+        for raw in 0..=u8::MAX {
+            let unit = UnitAddress::by_name(raw);
+            assert_eq!(by_specification.enter(unit), !unit.is_reserved(), "{raw}");
+            assert_eq!(by_specification.get(unit).is_some(), !unit.is_reserved(), "{raw}");
+            assert!(all.get(unit).is_none() && all.enter(unit) && all.get(unit).is_some(), "{raw}");
+        }
+        assert_eq!((by_specification.iter().count(), all.iter().count()), (247, 256));
+    }
 }

@@ -213,7 +213,7 @@ impl Master {
         self.torn.see(&frame);
         if self.doubts.seen(now, &frame, at_once) && self.others.may_be() && frame.as_bytes() != self.request.as_bytes()
         {
-            let first_contact = UnitAddress::new(frame.address()).ok();
+            let first_contact = UnitAddress::of_answer(frame.address());
             let strange_until = first_contact.and_then(|unit| self.doubts.first_contact_ends(now, unit));
             self.others.hear(now, &frame, strange_until);
         }
