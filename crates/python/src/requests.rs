@@ -203,9 +203,8 @@ impl Requests {
     ) -> PyResult<Asked> {
         let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
         let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
-        Ok(self.ask(any_unit(unit)?.into(), &request, options, |py, reply, _| {
-            Ok(PyBytes::new(py, &reply.pdu).into_any())
-        }))
+        Ok(self
+            .ask(any_unit(unit)?.into(), &request, options, |py, reply, _| Ok(PyBytes::new(py, &reply.pdu).into_any())))
     }
 
     #[pyo3(signature = (unit, /))]
