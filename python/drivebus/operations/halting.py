@@ -148,11 +148,14 @@ class Halt:
         if not self._aim.doubt():
             return False
         bus, aim = self.unit.bus, self._aim
-        began = bus.now()
+        began = heard = bus.now()
         try:
             while (target := await aim.take(self.command)) is None:
-                if bus.now() >= min(max(began, aim.heard) + _ASKED_FOR, began + self._within):
+                # One question alone may take seconds: what it heard before the last counts.
+                is_silent = aim.heard <= heard and bus.now() >= heard + _ASKED_FOR
+                if is_silent or bus.now() >= began + self._within:
                     break
+                heard = max(heard, aim.heard)
                 await bus.sleep(_PAUSE)
         except PortError:
             return False
