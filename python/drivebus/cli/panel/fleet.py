@@ -292,7 +292,7 @@ class Line:
 
     def _take(self, poll: drivebus.Poll[Any], by_drive: dict[drivebus.Drive, Member]) -> None:
         beats = 0
-        while not self._more.is_set() and not self._over.wait(_INTERVAL):
+        while True:
             # In virtual time nothing is asked unless somebody waits for it.
             for sample in poll.batch(len(by_drive), timeout=_INTERVAL):
                 by_drive[sample.drive].put(sample)
@@ -301,6 +301,8 @@ class Line:
                 self.links = {unit: self.bus.link(unit) for unit in units}
                 self.stats = self.bus.stats()
             beats += 1
+            if self._over.wait(_INTERVAL) or self._more.is_set():
+                return
 
 
 @contextmanager
