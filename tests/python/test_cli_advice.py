@@ -26,6 +26,7 @@ OF_PROGRAMS = (
     "resume=False",
     "read() needs",
     "with_variants()",
+    "reserved=True",
 )
 
 
