@@ -8,14 +8,13 @@ use core::ops::Range;
 
 use crate::answer::Answer;
 use crate::frame::Frame;
-use crate::pdu::function::{EXCEPTION_BIT, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::function::{EXCEPTION_BIT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::pdu::{MAX_WRITE, coil_of};
 use crate::request::Request;
 use crate::sniffer::{can_ask, may_be_answer, of_answer, of_request};
 use crate::{Table, UnitAddress};
 
 const WRITE_COILS: u8 = 0x0F;
-const WRITE_COIL: u8 = 0x05;
 /// Most coils of one 0FH write.
 const MAX_WRITE_BITS: u16 = 1_968;
 

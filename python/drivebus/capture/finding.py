@@ -13,15 +13,13 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from drivebus._native import crc16, frames_in, judge
-from drivebus.capture.frame import is_frame
+from drivebus.capture.frame import SHORTEST, is_frame
 from drivebus.capture.layout import Beside, body, without_times
 from drivebus.capture.tokens import MAY, READINGS, Reading, Run
 from drivebus.errors import DrivebusError
 
 __all__ = ["Piece", "pieces"]
 
-_SHORTEST = 4
-"""Bytes of the shortest frame, its address and its CRC included."""
 _HEAD = 6
 """Bytes of a Modbus TCP frame before the unit: transaction, protocol and length."""
 
@@ -149,13 +147,13 @@ def _with_crc(data: bytes) -> bytes:
 def _with_known(run: Run) -> list[tuple[int, int]]:
     """Where the frames in *run* stand, if one of them has a function that is known."""
     data = bytes(run.data)
-    return _frames(run) if len(data) >= _SHORTEST and frames_in(data) else []
+    return _frames(run) if len(data) >= SHORTEST and frames_in(data) else []
 
 
 def _frames(run: Run) -> list[tuple[int, int]]:
     """Where the frames in *run* stand."""
     data = bytes(run.data)
-    if len(data) < _SHORTEST:
+    if len(data) < SHORTEST:
         return []
     known = frames_in(data)
     edges = _edges(run)
@@ -171,7 +169,7 @@ def _frames(run: Run) -> list[tuple[int, int]]:
 def _edges(run: Run) -> list[int]:
     """Where in *run* a frame of a form that nobody knows may begin or end: where it looks other than before."""
     edges = {0, len(run.data)}
-    if len(run.data) > _SHORTEST:
+    if len(run.data) > SHORTEST:
         edges.add(run.spans.count(run.spans[0]))
     inner = [gap for gap, span, before in zip(run.gaps[1:], run.spans[1:], run.spans, strict=False) if span != before]
     usual = max(set(inner), key=inner.count) if inner else ""
@@ -201,7 +199,7 @@ def _is_meant(run: Run, start: int, end: int) -> bool:
     """Whether it cannot be chance by its looks: an address of a hexdump is one number among others."""
     is_all = start == 0 and end == len(run.data)
     is_one = run.spans[start] == run.spans[end - 1]
-    return run.data[start + 1] & 0x7F != 0 and (is_all or (not is_one and end - start > _SHORTEST))
+    return run.data[start + 1] & 0x7F != 0 and (is_all or (not is_one and end - start > SHORTEST))
 
 
 def _tcp(data: bytes, edges: Sequence[int] | None = None) -> list[tuple[int, int]]:
@@ -392,7 +390,7 @@ def _whole(rows: Sequence[_Row]) -> _Attempt:
     data = b"".join(row.data for row in rows)
     of = [row for row in rows for _ in row.data]
     spans, is_tcp = frames_in(data), False
-    if not spans and len(data) >= _SHORTEST:
+    if not spans and len(data) >= SHORTEST:
         is_one = is_frame(data) and data[1] & 0x7F != 0
         spans = [(0, len(data))] if is_one else _tcp(data)
         is_tcp = bool(spans) and not is_one
@@ -430,8 +428,8 @@ def _told_of_the_rest(lines: Sequence[_Line], names: Sequence[str]) -> None:
             continue
         own = _label(line.text[: run.spans[0][0]])
         written = _ways(run)
-        is_alike = written <= ways if ways else len(written) == 1 and (written != {_ROW} or len(run.data) > _SHORTEST)
-        is_meant = is_alike and (len(run.data) >= _SHORTEST or (len(run.data) > 1 and own in labels))
+        is_alike = written <= ways if ways else len(written) == 1 and (written != {_ROW} or len(run.data) > SHORTEST)
+        is_meant = is_alike and (len(run.data) >= SHORTEST or (len(run.data) > 1 and own in labels))
         data = bytes(run.data)
         # Some tools say the inside of a frame once more.
         if is_meant and data not in last:

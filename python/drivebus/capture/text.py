@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from drivebus import checks
 from drivebus.capture.finding import pieces
 from drivebus.capture.frame import Captured
 from drivebus.capture.speakers import Speakers, without_repeats
@@ -43,16 +44,12 @@ def heard(text: str) -> tuple[list[Captured], list[str]]:
 def _remarks(text: str, repeats: int, by_tcp: int) -> Iterator[str]:
     if by_tcp:
         added = "its is" if by_tcp == 1 else "theirs are"
-        yield f"{_counted(by_tcp)} of Modbus TCP, which has no CRC: {added} added here"
+        yield f"{checks.counted(by_tcp, 'frame')} of Modbus TCP, which has no CRC: {added} added here"
     if repeats:
-        yield f"{_counted(repeats)} told twice by the tool: shown once"
+        yield f"{checks.counted(repeats, 'frame')} told twice by the tool: shown once"
     lines = [number for number, line in enumerate(text.splitlines(), 1) if any(map(_is_ascii, _ASCII.findall(line)))]
     if lines:
         yield f"line {lines[0]} is Modbus ASCII, its LRC is right; here only RTU and TCP are taken apart"
-
-
-def _counted(count: int) -> str:
-    return f"{count} frame{'' if count == 1 else 's'}"
 
 
 def _is_ascii(digits: str) -> bool:
