@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from drivebus._native import crc16, frames_in, judge
-from drivebus.capture.frame import SHORTEST, is_frame
+from drivebus._native import frames_in, judge
+from drivebus.capture.frame import SHORTEST, framed, is_frame
 from drivebus.capture.layout import Beside, body, without_times
 from drivebus.capture.tokens import MAY, READINGS, Reading, Run
 from drivebus.errors import DrivebusError
@@ -130,7 +130,7 @@ def _piece(line: _Line, run: Run, start: int, end: int, label: str) -> Piece:
     data, column = bytes(run.data[start:end]), run.spans[start][0]
     if is_frame(data):
         return Piece(line.number, column, data, True, label)
-    return Piece(line.number, column, _with_crc(data[_HEAD:]), True, label, int.from_bytes(data[:2], "big"))
+    return Piece(line.number, column, framed(data[_HEAD:]), True, label, int.from_bytes(data[:2], "big"))
 
 
 def _label(text: str) -> str:
@@ -138,10 +138,6 @@ def _label(text: str) -> str:
     text = text.rstrip("<[({\"'")
     said = _BLANKS.sub(" ", _DIGITS.sub("#", without_times(text))).strip()
     return said if _SAYS.search(said) else ""
-
-
-def _with_crc(data: bytes) -> bytes:
-    return data + crc16(data).to_bytes(2, "little")
 
 
 def _with_known(run: Run) -> list[tuple[int, int]]:
@@ -225,7 +221,7 @@ def _is_said(data: bytes) -> bool:
         return False
     try:
         # Unit 0 answers here: it is the gateway.
-        asks, answers, wrong = judge(_with_crc(b"\x01" + data[1:]))
+        asks, answers, wrong = judge(framed(b"\x01" + data[1:]))
     except DrivebusError:
         return False
     return (asks or answers) and wrong is None
@@ -400,7 +396,7 @@ def _whole(rows: Sequence[_Row]) -> _Attempt:
         raw = data[start:end]
         piece = Piece(mine[0].line.number, mine[0].column, raw, True, mine[0].label)
         if is_tcp:
-            piece.data, piece.transaction = _with_crc(raw[_HEAD:]), int.from_bytes(raw[:2], "big")
+            piece.data, piece.transaction = framed(raw[_HEAD:]), int.from_bytes(raw[:2], "big")
         found.append((piece, mine))
     used = {at for start, end in spans for at in range(start, end)}
     unused, first = dict[int, tuple[bytes, bytes]](), 0

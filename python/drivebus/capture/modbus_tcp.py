@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-from drivebus._native import crc16, frame_len
-from drivebus.capture.frame import Captured, is_frame
+from drivebus._native import frame_len
+from drivebus.capture.frame import Captured, framed, is_frame
 from drivebus.capture.network import Connection, Side
 from drivebus.capture.streams import Piece, Record, pieces
 
@@ -95,8 +95,7 @@ def _told(records: Sequence[Record]) -> Iterator[_Told]:
             continue
         while ends[here] < end:
             here += 1
-        body = bytes([unit]) + data[at + 7 : end]
-        frame = body + crc16(body).to_bytes(2, "little")
+        frame = framed(bytes([unit]) + data[at + 7 : end])
         yield _Told(Piece(records[here].index, records[here].time, frame), transaction)
         at = end
 

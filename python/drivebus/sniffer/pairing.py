@@ -7,8 +7,9 @@ from dataclasses import replace
 from itertools import zip_longest
 from typing import TypedDict
 
-from drivebus._native import SerialFormat, Sniffer, crc16, exception_means, judge, misses
+from drivebus._native import SerialFormat, Sniffer, exception_means, judge, misses
 from drivebus.capture import Captured, answers
+from drivebus.capture.frame import framed
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.inside import wrong_inside
@@ -280,8 +281,7 @@ def _of_a_line(frame: bytes) -> bytes:
     """*frame* as if it were of a unit that a serial line can have."""
     if 1 <= frame[0] <= _LAST_UNIT:
         return frame
-    body = bytes([1]) + frame[1:-2]
-    return body + crc16(body).to_bytes(2, "little")
+    return framed(bytes([1]) + frame[1:-2])
 
 
 def _why_not(data: bytes) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from drivebus._native import crc16
+from drivebus.capture.frame import framed
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.frames import carried, place_of, written_by
 
@@ -40,8 +40,7 @@ class Seen:
         data = b"".join(word.to_bytes(2, "big") for word in words if word is not None)
         if len(data) < 2 * len(words):
             return None
-        body = bytes([request[0], _READ, len(data)]) + data
-        return body + crc16(body).to_bytes(2, "little")
+        return framed(bytes([request[0], _READ, len(data)]) + data)
 
     def _word(self, unit: int, address: int, now: int) -> int | None:
         words = self._words.get((unit, address))
