@@ -125,6 +125,7 @@ impl Owner {
         self.count_strays();
     }
 
+    /// Keeps the count of what came while nothing was asked.
     fn count_strays(&mut self) {
         let tally = self.known.take_strays();
         if tally != Tally::default() {

@@ -116,6 +116,8 @@ pub struct Conversation<'r> {
     attempt: Attempt,
     /// How the attempt before this one ended, if that was with the port.
     port_failed: Option<Slip>,
+    /// What came while it stood by was not taken down yet.
+    has_paused: bool,
     /// Whether that is how the call ended.
     ended_before: bool,
     state: State<'r>,
@@ -164,6 +166,7 @@ impl<'r> Conversation<'r> {
             course: Course::new(question.timeout, question.retries),
             attempt: Attempt::new(question.verify, 0),
             port_failed: None,
+            has_paused: false,
             ended_before: false,
             state: State::Sparing { patience: None },
             answer: Kept::NONE,
@@ -219,7 +222,8 @@ impl<'r> Conversation<'r> {
                     return Step::LetPass;
                 }
                 State::Passed => self.passed(now, known),
-                State::Overhearing | State::Proving { .. } => return Step::Listen(now),
+                State::Overhearing => return Step::Listen(known.master.hears_until().unwrap_or(now).max(now)),
+                State::Proving { .. } => return Step::Listen(now),
                 State::Deciding => self.decide(now, known),
                 State::InFlight(_) => match self.poll(now, known) {
                     Polled::Send => return Step::Send(known.master.frame()),
@@ -233,6 +237,7 @@ impl<'r> Conversation<'r> {
                 State::Heard(flight, result) => self.conclude(now, known, flight, result),
                 State::Pausing(until) => {
                     self.state = State::Passing;
+                    self.has_paused = true;
                     return Step::StandBy(until);
                 }
                 State::Done(result) => return Step::Done(self.outcome(result)),
@@ -285,8 +290,9 @@ impl<'r> Conversation<'r> {
                 known.stray(now, bytes);
                 Ok(bytes.len())
             }
+            State::Overhearing if known.master.hears_until().is_some_and(|silent| now < silent) => Ok(0),
             State::Overhearing => {
-                known.master.overhear(now);
+                known.take_down(now);
                 self.state = State::Deciding;
                 Ok(0)
             }

@@ -19,13 +19,18 @@
 //! it cannot pass for, or again and again: see [`Attribution`]. What another program asked is not known to anybody; at
 //! first contact an echo is believed on every line.
 
+mod lateness;
+
 use core::time::Duration;
 
 use crate::answer::Answer;
 use crate::expected::Expected;
 use crate::frame::Frame;
+use crate::master::{HEAD, could_be_left_of, damaged_head, is_left_of, is_surely_left_of, rest_of};
 use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};
+
+use lateness::Lateness;
 
 /// How long after a line was opened the answer to another program's question may come.
 ///
@@ -52,6 +57,9 @@ const MUTE: u8 = 5;
 
 /// Open requests that are told apart; of more, only the unit and the time are kept.
 const KEPT: usize = 32;
+
+/// So many open requests of one kind have each its own time; more share that of the latest.
+const APART: usize = 4;
 
 /// More answers than this that could pass for one are waited for, not outvoted.
 const MAX_RIVALS: u8 = 3;
@@ -94,6 +102,8 @@ impl Attribution {
 struct Open {
     unit: UnitAddress,
     expected: Expected,
+    /// Whether they came damaged, and may come again.
+    again: bool,
     count: u8,
     /// When the latest of them was given up, or the one that it displaced.
     given_up: Instant,
@@ -101,6 +111,8 @@ struct Open {
     last: Instant,
     /// How long after that it may still come.
     window: Duration,
+    /// Until when it may come right behind the answer that was taken first and may have been it.
+    follows: Option<Instant>,
 }
 
 impl Open {
@@ -128,6 +140,8 @@ pub(crate) struct Doubts {
     forgotten_until: Instant,
     /// The frame that was heard last since a request went out, by unit and CRC, and when: a line may bring it twice at once.
     heard: Option<(u8, [u8; 2], Instant)>,
+    /// How late answers come that come late.
+    lateness: Lateness,
 }
 
 impl Doubts {
@@ -141,6 +155,7 @@ impl Doubts {
         forgotten: UnitSet::EMPTY,
         forgotten_until: Instant::ZERO,
         heard: None,
+        lateness: Lateness::UNKNOWN,
     };
 
     /// The line was opened at `now`: anybody may have asked anything before.
@@ -151,23 +166,35 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.enter(now, unit, expected, window(timeout), now);
+        self.enter(now, (unit, expected, false), window(timeout), now);
         self.open.insert(unit);
     }
 
     /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
-        self.enter(now, unit, expected, window, now);
+        self.enter(now, (unit, expected, true), window, now);
     }
 
-    /// `since`: when the answer was given up that started it.
-    fn enter(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration, since: Instant) {
+    /// What is open: of whom, what, and whether it came damaged before. `since`: when the answer was given up that started it.
+    fn enter(
+        &mut self,
+        now: Instant,
+        (unit, expected, again): (UnitAddress, Expected, bool),
+        window: Duration,
+        since: Instant,
+    ) {
         let last = capped(now, since, window);
         let alike = |open: &Open| {
-            open.unit == unit && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
+            open.unit == unit
+                && open.again == again
+                && (open.expected == expected || (expected.is_echo() && open.expected.is_echo()))
         };
-        if let Some(open) = self.ledger.iter_mut().flatten().find(|open| alike(open)) {
+        // Each has its own time, as long as they are few.
+        let is_one_more =
+            expected.is_read() && !again && self.ledger.iter().flatten().filter(|open| alike(open)).count() < APART;
+        let latest = self.ledger.iter_mut().flatten().filter(|open| alike(open)).max_by_key(|open| open.last);
+        if let Some(open) = latest.filter(|_| !is_one_more) {
             let over = open.is_past(now) && !self.open.contains(unit) && !expected.is_echo();
             open.count = if over { 1 } else { open.count.saturating_add(1) };
             open.given_up = open.given_up.max(since);
@@ -179,7 +206,7 @@ impl Doubts {
             return;
         }
         self.listed.insert(unit);
-        let open = Open { unit, expected, count: 1, given_up: since, last, window };
+        let open = Open { unit, expected, again, count: 1, given_up: since, last, window, follows: None };
         let over = |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && open.is_past(now));
         if let Some(place) = self.ledger.iter().position(over) {
             self.ledger[place] = Some(open);
@@ -266,15 +293,82 @@ impl Doubts {
             open.unit == unit
                 && matches!(open.expected.judge(frame.pdu()), Ok(answer) if !matches!(answer, Answer::Exception { .. }))
         };
-        let mut fitting = self.ledger.iter_mut().filter(|open| open.as_ref().is_some_and(answers));
-        let (Some(place), None) = (fitting.next(), fitting.next()) else { return is_nobodys };
-        match place {
-            Some(open) if open.expected.may_repeat_request() => return is_nobodys,
-            Some(open) if open.count > 1 => open.count -= 1,
-            other => *other = None,
+        self.closes(now, answers, |open| !open.expected.may_repeat_request());
+        is_nobodys
+    }
+
+    /// What came at `now` could be the answers that it `fits`: if these are alike, and it `is_it`, one of them is not open any
+    /// more. Of several that is the one whose time ends first. Returns whether one was closed.
+    fn closes(&mut self, now: Instant, fits: impl Fn(&Open) -> bool, is_it: impl Fn(&Open) -> bool) -> bool {
+        let ends = |open: &Open| if self.open.contains(open.unit) { None } else { Some(open.last + open.window) };
+        let still = |open: &&Open| fits(open) && ends(open).is_none_or(|end| now < end);
+        let Some(first) = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window) else {
+            return false;
+        };
+        let (unit, expected, given_up) = (first.unit, first.expected, first.given_up);
+        let (end, count) = (first.last + first.window, first.count);
+        let others = self.ledger.iter().flatten().filter(still);
+        if !is_it(first) || others.clone().any(|open| (open.unit, open.expected) != (unit, expected)) {
+            return false;
+        }
+        let is_only = others.count() == 1 && count == 1 && !first.again && now < end;
+        let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
+        for place in &mut self.ledger {
+            match place {
+                Some(open) if is_first(open) && open.count > 1 => open.count -= 1,
+                Some(open) if is_first(open) => *place = None,
+                _ => continue,
+            }
+            break;
+        }
+        if is_only {
+            self.lateness.came(now, unit, given_up);
         }
         self.ends_unless_open(now, unit);
-        is_nobodys
+        true
+    }
+
+    /// Something came damaged at `now` that answers nothing in flight. Where it is beyond doubt one that is open, and could be
+    /// no other, that one is not any more. Returns whether it is.
+    pub(crate) fn seen_damaged(&mut self, now: Instant, bytes: &[u8], is_idle: bool) -> bool {
+        if now < self.forgotten_until {
+            return false;
+        }
+        let (strangers, until) = (self.strangers, self.strangers_until);
+        let strange = |unit| now < until && strangers.contains(unit);
+        let could_be = |open: &Open| !open.again && could_be_left_of(open.unit, open.expected, bytes, HEAD - 1);
+        self.closes(now, could_be, |open| {
+            !open.expected.may_repeat_request()
+                && !strange(open.unit)
+                && is_left_of(open.unit, open.expected, bytes)
+                && (is_idle || is_surely_left_of(open.unit, open.expected, bytes))
+        })
+    }
+
+    /// Whether `bytes`, which came in the place of the answer of `unit` to `expected`, could be left of another open one.
+    ///
+    /// No more of that one's beginning is damaged then than of this.
+    pub(crate) fn could_be_another(&self, now: Instant, unit: UnitAddress, expected: Expected, bytes: &[u8]) -> bool {
+        let most = damaged_head(unit, expected, bytes);
+        let is_other = |open: &Open| {
+            (open.unit != unit || !open.expected.could_pass_for(expected))
+                && (self.open.contains(open.unit) || !open.is_past(now))
+                && could_be_left_of(open.unit, open.expected, bytes, most)
+        };
+        now < self.forgotten_until || self.ledger.iter().flatten().any(is_other)
+    }
+
+    /// How many bytes may follow `bytes`, which came in the place of the answer of `unit` to `expected` and cannot be told: of
+    /// the longest among the answers that begin like them.
+    pub(crate) fn rest(&self, now: Instant, unit: UnitAddress, expected: Expected, bytes: &[u8]) -> usize {
+        let is_open = |open: &&Open| self.open.contains(open.unit) || !open.is_past(now);
+        let open = self.ledger.iter().flatten().filter(is_open).map(|open| rest_of(open.unit, open.expected, bytes));
+        let own = rest_of(unit, expected, bytes);
+        open.fold(
+            own,
+            |best, other| if other.0 < best.0 || (other.0 == best.0 && other.1 > best.1) { other } else { best },
+        )
+        .1
     }
 
     /// At `now` it is known by other means that `unit` owes no answer to `expected`.
@@ -293,6 +387,11 @@ impl Doubts {
     /// Whether `frame` is, as it stands, the answer to something that `unit` left open.
     pub(crate) fn owes(&self, now: Instant, unit: UnitAddress, frame: &Frame<'_>) -> bool {
         self.possible(now, unit).any(|open| open.expected.judge_frame(unit, frame).is_ok())
+    }
+
+    /// Whether `frame` is, as it stands, the answer to something that `unit` left open and of which nothing came.
+    pub(crate) fn awaits(&self, now: Instant, unit: UnitAddress, frame: &Frame<'_>) -> bool {
+        self.possible(now, unit).any(|open| !open.again && open.expected.judge_frame(unit, frame).is_ok())
     }
 
     /// Whether `frame`, which came whole at `now`, is another one than the last since a request went out, or came later than
@@ -322,6 +421,7 @@ impl Doubts {
         expected: Expected,
         timeout: Duration,
         refused: bool,
+        follow: Duration,
     ) {
         if !self.listed.contains(unit) {
             return;
@@ -331,6 +431,9 @@ impl Doubts {
             let rival =
                 open.expected.could_pass_for(expected) || (refused && open.expected.function() == expected.function());
             if open.unit == unit && rival && !open.is_past(now) {
+                if !open.again && !refused {
+                    open.follows.get_or_insert(now + follow);
+                }
                 open.window = open.window.max(window(timeout));
                 open.last = capped(now, open.given_up, open.window);
                 if open.expected != expected {
@@ -339,7 +442,7 @@ impl Doubts {
             }
         }
         if let Some((since, window)) = displaced {
-            self.enter(now, unit, expected, window, since);
+            self.enter(now, (unit, expected, false), window, since);
         }
     }
 
@@ -365,9 +468,41 @@ impl Doubts {
             None => Attribution::Certain,
             // What refuses another is told by the master as that.
             Some(_) if !expected.is_read() && words == 1 => Attribution::Certain,
-            Some(latest) if !expected.is_read() || words > 1 + MAX_RIVALS => Attribution::Wait(latest),
+            Some(latest) if !expected.is_read() => Attribution::Wait(latest),
+            Some(latest) if words > 1 + MAX_RIVALS => {
+                Attribution::Wait(self.none_come_again(now, unit, expected).unwrap_or(latest))
+            }
             Some(_) => Attribution::Repeat { words, refusal },
         }
+    }
+
+    /// When no answer that came damaged may come again and pass for that of `unit` to `expected`, if those that are left then can
+    /// be outvoted.
+    fn none_come_again(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
+        let rivals = || self.of(unit).filter(|open| !open.is_past(now) && open.expected.could_pass_for(expected));
+        let others = rivals().filter(|open| !open.again).fold(0_u8, |count, open| count.saturating_add(open.count));
+        let ends = rivals().filter(|open| open.again).map(|open| open.last + open.window);
+        ends.max().filter(|_| others <= MAX_RIVALS)
+    }
+
+    /// Until when it is worth to wait whether an answer that `unit` owes is seen, before it is asked for `expected`: a little while,
+    /// where that is soon to come if it comes. Nothing is asked then that would meet it on the wire, or be taken for it.
+    pub(crate) fn worth_watching(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
+        let is_open = |open: &&Open| !open.expected.is_echo() && !open.is_past(now);
+        let until = self.of(unit).filter(is_open).map(|open| {
+            let worth = match expected.is_read() && open.expected.could_pass_for(expected) {
+                true if open.again => open.last + open.window,
+                true => self.lateness.worth(unit, open.given_up),
+                false => Instant::ZERO,
+            };
+            open.follows.map_or(worth, |follows| follows.max(worth))
+        });
+        until.max().filter(|&until| now < until)
+    }
+
+    /// Whether an answer of `unit` that came damaged may come again, and pass for that to `expected`.
+    pub(crate) fn may_come_whole(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
+        self.of(unit).any(|open| open.again && !open.is_past(now) && open.expected.could_pass_for(expected))
     }
 
     /// When the doubt of first contact with `unit` will be over by itself, if there is one.

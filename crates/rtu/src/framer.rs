@@ -177,6 +177,11 @@ impl Framer {
         }
     }
 
+    /// When the latest byte came.
+    pub(crate) const fn last_byte(&self) -> Option<Instant> {
+        self.last
+    }
+
     /// When nothing more is expected to follow what came last, however it is delivered; `None` where that may take for ever.
     pub(crate) fn gives_up(&self) -> Option<Instant> {
         let (pause, least) = self.patience?;
@@ -272,6 +277,13 @@ impl Framer {
         self.overrun = !quiet && found.is_none() && give_up > self.ended;
         self.take(give_up);
         Some(Step::Skipped { range, error, expected })
+    }
+
+    /// Hands out all that is held, frame or not.
+    pub(crate) fn gives_up_rest(&mut self) -> Range<usize> {
+        let range = self.taken..self.len;
+        self.take(self.len);
+        range
     }
 
     fn is_quiet(&self, now: Instant) -> bool {

@@ -26,6 +26,7 @@ use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 use beside::Beside;
 use torn::Torn;
+pub(crate) use torn::{HEAD, could_be_left_of, damaged_head, is_left_of, is_surely_left_of, rest_of};
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
 ///
@@ -81,6 +82,8 @@ pub struct Master {
     beside: Beside,
     /// What came in its place, to be told.
     instead: Bytes,
+    /// When nothing more follows it, where that is known.
+    ends_at: Option<Instant>,
     torn: Torn,
     /// When the line was last busy, as far as is known.
     busy: Option<Instant>,
@@ -142,6 +145,7 @@ impl Master {
             echo_due: false,
             beside: Beside::NOTHING,
             instead: Bytes::NONE,
+            ends_at: None,
             torn: Torn::NONE,
             busy: None,
             doubts: Doubts::NONE,
@@ -312,6 +316,7 @@ impl Master {
                     self.others.goes_out();
                     self.beside.clear();
                     self.instead.clear();
+                    self.ends_at = None;
                     self.state = State::Sending { job };
                     Some(Event::Transmit(self.request.as_bytes()))
                 } else if now >= give_up {
@@ -422,6 +427,17 @@ impl Master {
             return Attribution::Others(until);
         }
         self.doubts.attribution(now, unit, expected)
+    }
+
+    /// Until when it is worth to wait whether what `unit` owes is seen, before it is asked `request`; `None` where nothing is soon
+    /// to come.
+    pub(crate) fn worth_watching(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<Instant> {
+        self.doubts.worth_watching(now, unit, request.expected())
+    }
+
+    /// Whether an answer of `unit` that came damaged may come again, whole, and pass for that to `request`.
+    pub(crate) fn may_come_whole(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> bool {
+        self.doubts.may_come_whole(now, unit, request.expected())
     }
 
     /// Whether the adapter sends every request back, so that it is to be taken off before the answer.

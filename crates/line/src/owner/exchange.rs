@@ -152,6 +152,7 @@ impl Owner {
     ) -> Then {
         let then = self.carry_out(talk, now, give_up, take);
         self.count(talk.ask, talk.call.take_counts());
+        self.count_strays();
         then
     }
 

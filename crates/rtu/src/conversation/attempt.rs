@@ -37,7 +37,8 @@ impl<'r> Conversation<'r> {
             let slip = self.slip(Unanswered::Reopened, None, now);
             return self.end_attempt(now, known, Err(slip));
         }
-        self.state = if known.others { State::Overhearing } else { State::Deciding };
+        let overhears = core::mem::take(&mut self.has_paused) || known.others;
+        self.state = if overhears { State::Overhearing } else { State::Deciding };
     }
 
     /// Chooses the next request, and begins it, or leaves the line to others.
@@ -47,6 +48,7 @@ impl<'r> Conversation<'r> {
     pub(super) fn decide<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) {
         let ask = self.ask();
         let in_time = self.course.is_in_time(now);
+        let is_stop = self.question.urgency == Urgency::Stop;
         if !self.course.sends() {
             let result = match &self.course.hearing {
                 Some(Hearing { asked, .. }) if self.attempt.tried.failure.is_none() => {
@@ -60,7 +62,13 @@ impl<'r> Conversation<'r> {
         }
         if let Some(unit) = self.unit()
             && let Some(form) = self.course.owes_only_this(known.asked(unit))
+            && (is_stop || !known.master.may_come_whole(now, unit, &ask.request))
         {
+            let watches = known.watches_before_asking_again(now, unit, &ask).filter(|_| in_time && !is_stop);
+            if let (Form::Plain | Form::Repeated, Some(until)) = (form, watches) {
+                self.course.is_still_owed(known.asked(unit), form);
+                return self.watch(until);
+            }
             match form {
                 Form::Plain => self.put(now, known, Ask { in_doubt: true, ..ask }, Purpose::Same),
                 Form::Apart(count) => self.ask_apart(now, known, ask, count, true),
@@ -69,7 +77,6 @@ impl<'r> Conversation<'r> {
             }
             return;
         }
-        let is_stop = self.question.urgency == Urgency::Stop;
         if is_stop
             && !self.question.verify
             && let Some(put) = known.at_first_contact(now, &ask)
@@ -78,7 +85,8 @@ impl<'r> Conversation<'r> {
             return;
         }
         let can_look_up = self.write.as_ref().is_some_and(|write| !write.is_reading());
-        match known.next(now, &ask, self.words, &self.attempt.tried, in_time, self.attempt.apart) {
+        let waits = !is_stop && in_time;
+        match known.next(now, &ask, self.words, &self.attempt.tried, (in_time, waits), self.attempt.apart) {
             Next::Ask(attribution) => self.ask_sure(now, known, ask, attribution, false),
             Next::AskApart(count) => self.ask_apart(now, known, ask, count, false),
             Next::OthersAsk => {
@@ -103,12 +111,19 @@ impl<'r> Conversation<'r> {
                 self.attempt.tried = Tried::default(); // others will have asked the unit meanwhile
                 self.state = State::Pausing(until);
             }
+            Next::Watch(until) => self.watch(until),
             Next::Wait(until) => self.state = State::Pausing(until),
             Next::GiveUp => {
                 let slip = self.none_settled(now);
                 self.end_attempt(now, known, Err(slip));
             }
         }
+    }
+
+    /// Stands by until then, for what may come; nothing is sent.
+    fn watch(&mut self, until: Instant) {
+        self.course.prepared();
+        self.state = State::Pausing(until);
     }
 
     /// What is said where nothing that was tried made sure of the unit.

@@ -159,6 +159,11 @@ impl Course {
         self.left_open.take().filter(|(then, _)| *then == asked).map(|(_, form)| form)
     }
 
+    /// It was not asked again yet, and may be: see [`owes_only_this`](Self::owes_only_this).
+    pub(super) fn is_still_owed(&mut self, asked: Asked, form: Form) {
+        self.left_open = Some((asked, form));
+    }
+
     /// The question is put in another way the next time.
     pub(super) fn asks_otherwise(&mut self) {
         self.left_open = None;

@@ -37,11 +37,16 @@ pub(super) enum Next {
     Wait(Instant),
     /// The same: until then an open answer could be taken for its own.
     Overtaken(Instant),
+    /// See until this moment whether what the unit owes comes; others may use the line.
+    Watch(Instant),
     /// The unit may still answer something else, and everything was tried.
     GiveUp,
     /// Another master asks the same, in every length that the unit gives.
     OthersAsk,
 }
+
+/// What may come is looked for so often at the most.
+const LOOKS_APART: Duration = Duration::from_millis(5);
 
 /// What a line is like that was opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -207,6 +212,13 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         self.strays.add(&seen);
     }
 
+    /// Takes down what came by `now` while nothing was asked, and that no more of it comes.
+    pub(super) fn take_down(&mut self, now: Instant) {
+        self.master.take_down(now);
+        let seen = self.master.take_tally();
+        self.strays.add(&seen);
+    }
+
     /// What came while nothing was asked, since the last call.
     pub const fn take_strays(&mut self) -> Tally {
         core::mem::replace(&mut self.strays, Tally::EMPTY)
@@ -242,7 +254,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         ask: &Ask<'_>,
         words: &FreshWords,
         tried: &Tried,
-        in_time: bool,
+        (in_time, waits): (bool, bool),
         apart: bool,
     ) -> Next {
         let Destination::Unit(unit) = ask.destination else {
@@ -265,6 +277,12 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             && let Some(count) = self.longer.form(&self.master, now, unit, &ask.request)
         {
             return Next::AskApart(count);
+        }
+        if waits
+            && (in_quarantine || attribution.may_be_mistaken())
+            && let Some(until) = self.master.worth_watching(now, unit, &ask.request)
+        {
+            return Next::Watch(self.looks_again(now, until, &ask.request));
         }
         if self.echo == OwnEcho::Unknown && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;
@@ -290,6 +308,26 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             Attribution::Others(_) => Next::OthersAsk,
             sure @ (Attribution::Certain | Attribution::Repeat { .. }) => Next::Ask(sure),
         }
+    }
+
+    /// Until when it is worth to wait, before the same is asked again, whether the unit answers late what it was asked: where no
+    /// longer read would be told apart from that.
+    pub(super) fn watches_before_asking_again(
+        &self,
+        now: Instant,
+        unit: UnitAddress,
+        ask: &Ask<'_>,
+    ) -> Option<Instant> {
+        if self.longer.form(&self.master, now, unit, &ask.request).is_some() {
+            return None;
+        }
+        let until = self.master.worth_watching(now, unit, &ask.request)?;
+        Some(self.looks_again(now, until, &ask.request))
+    }
+
+    /// When to look again whether something has come that may by `until`.
+    fn looks_again(&self, now: Instant, until: Instant, request: &Request<'_>) -> Instant {
+        until.min(now + self.answer_time(request).max(LOOKS_APART))
     }
 
     pub(super) fn knows_no_echo(&self, unit: UnitAddress) -> bool {

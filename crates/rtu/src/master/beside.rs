@@ -39,6 +39,7 @@ impl Beside {
 
     pub(super) const fn clear(&mut self) {
         self.len = 0;
+        self.in_a_row_from = 0;
         self.spoilt = None;
     }
 
@@ -48,9 +49,6 @@ impl Beside {
 
     /// Adds `bytes`, and returns what there is no room for.
     pub(super) fn add<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
-        if self.is_empty() {
-            self.in_a_row_from = 0;
-        }
         let (kept, rest) = bytes.split_at(bytes.len().min(CAPACITY - self.len));
         self.bytes[self.len..self.len + kept.len()].copy_from_slice(kept);
         self.len += kept.len();
@@ -86,6 +84,16 @@ impl Beside {
                 self.spoilt.get_or_insert((from, Why::Damaged(error)));
             }
         }
+    }
+
+    /// What came last, and in a row.
+    pub(super) fn in_a_row(&self) -> &[u8] {
+        &self.bytes[self.in_a_row_from..self.len]
+    }
+
+    /// What came last, and in a row, came in the place of the answer.
+    pub(super) fn is_all_spoilt(&mut self, why: Why) {
+        self.spoilt.get_or_insert((self.in_a_row_from, why));
     }
 
     /// Whether something came in the place of the answer.

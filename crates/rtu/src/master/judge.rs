@@ -5,15 +5,22 @@ use core::time::Duration;
 
 use super::beside::Why;
 use super::overheard::passed_over;
-use super::torn::{Open, is_left_of_answer};
+use super::torn::{HEAD, Open, could_be_left_of, is_left_of_answer};
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
 use crate::expected::Expected;
-use crate::frame::Frame;
+use crate::frame::{Frame, FrameError};
 use crate::framer::Step;
 use crate::pdu::function::DIAGNOSTICS;
 use crate::{Instant, UnitAddress};
+
+/// How much later than the wire carries it an answer is handed over, where nothing holds it back.
+const LAG: Duration = Duration::from_millis(2);
+
+/// How long behind a damaged answer the right one may come, where nothing of the damaged one is missing: as long as common
+/// adapters hold bytes back, and a little.
+pub(super) const BEHIND: Duration = Duration::from_millis(20);
 
 impl Master {
     /// What came of the request in flight by `now`, if anything did.
@@ -30,13 +37,17 @@ impl Master {
         }
         while let Some(step) = self.framer.step(now) {
             match step {
+                Step::Skipped { range, .. } if self.is_late_and_damaged(now, unit, expected, &range) => {
+                    self.beside.cut();
+                    self.tally.add_noise(self.framer.held(range));
+                }
                 Step::Skipped { range, error, expected: is_damaged } => {
                     if is_damaged {
                         self.spoils(&range, Why::Damaged(error));
                     }
                     self.add_beside(range);
                     if !is_damaged && self.framer.pending().is_empty() {
-                        self.beside.look_for_lost_head(unit, expected);
+                        self.look_for_answer(unit, expected, error);
                     }
                     if self.patience.is_none() && self.beside.is_spoilt() {
                         return Some(self.end_in_vain(now, unit, expected, timeout));
@@ -54,6 +65,14 @@ impl Master {
                     let doubted = self.in_quarantine(now, unit);
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     match judged {
+                        // Nobody was asked for it, and it stands amid other bytes: it has a right CRC by chance.
+                        Err(AnswerError::Unit { .. } | AnswerError::Function { .. })
+                            if !self.others.may_be()
+                                && !self.beside.in_a_row().is_empty()
+                                && !self.is_owed_by_anybody(now, &frame) =>
+                        {
+                            self.add_beside(range);
+                        }
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. }) => {
                             self.beside.cut();
                             self.count_other(now, &range, unit, doubted);
@@ -120,7 +139,10 @@ impl Master {
                                 (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
                                 (true, true, true) => self.doubts.refused_echo(now, unit),
                                 (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
-                                (true, refused, _) => self.doubts.taken(now, unit, expected, timeout, refused),
+                                (true, refused, _) => {
+                                    let follow = self.time_to_follow(expected);
+                                    self.doubts.taken(now, unit, expected, timeout, refused, follow);
+                                }
                             }
                             return Some(self.tell(expected, range, wrong));
                         }
@@ -128,10 +150,22 @@ impl Master {
                 }
             }
         }
+        self.ends_at = self.ends_at(now, unit, expected, timeout);
         if now < self.listens_until(until) {
             return None;
         }
+        self.ends_at.is_some().then(|| self.gives_the_rest_up());
         Some(self.end_in_vain(now, unit, expected, timeout))
+    }
+
+    /// What is held begins the answer, and no more of it is waited for.
+    fn gives_the_rest_up(&mut self) {
+        if !self.framer.pending().is_empty() {
+            let range = self.framer.gives_up_rest();
+            let error = Frame::parse(self.framer.held(range.clone())).err();
+            self.spoils(&range, Why::Damaged(error.unwrap_or(FrameError::TooShort { len: range.len() })));
+            self.add_beside(range);
+        }
     }
 
     /// The request ends without its answer.
@@ -143,14 +177,17 @@ impl Master {
         let is_refusal = |frame: Frame<'_>| matches!(expected.judge(frame.pdu()), Ok(Answer::Exception { .. }));
         if expected.is_read() && !doubted && passed.is_some_and(is_refusal) {
             // It counts as the own one; where it is not, that one is nobody's when it comes.
-            self.doubts.taken(now, unit, expected, timeout, true);
+            self.doubts.taken(now, unit, expected, timeout, true, Duration::ZERO);
             return match self.others.passed() {
                 Some(frame) => passed_over(expected, frame, doubted),
                 None => Event::NoAnswer { bytes: &[] },
             };
         }
-        match self.is_still_open(now, unit, expected) {
-            Open::No => self.doubts.taken(now, unit, expected, timeout, false),
+        match self.is_still_open(now, unit, expected, timeout) {
+            Open::No => {
+                let follow = self.time_to_follow(expected);
+                self.doubts.taken(now, unit, expected, timeout, false, follow);
+            }
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
             Open::Long => self.doubts.left_open(now, unit, expected, timeout),
         }
@@ -163,30 +200,84 @@ impl Master {
         self.beside.event().unwrap_or(Event::NoAnswer { bytes: self.framer.pending() })
     }
 
+    /// When nothing more is waited for behind what came in the place of the answer, where that is told, and damaged: at once on a
+    /// line on which such do not come again, if nothing of it is missing. Else the right one may come right behind it.
+    fn ends_at(&self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Option<Instant> {
+        let pending = self.framer.pending();
+        self.patience.filter(|_| expected.is_read())?;
+        let came = match self.beside.damaged() {
+            Some(damaged) if pending.is_empty() => damaged,
+            None if !pending.is_empty() && self.beside.is_empty() => pending,
+            _ => return None,
+        };
+        if !self.is_told(now, unit, expected, came) {
+            return None;
+        }
+        let is_all = pending.is_empty() && expected.adu_len() == Some(came.len());
+        let behind = if is_all && self.torn.none_comes_again(now, timeout) { Duration::ZERO } else { BEHIND };
+        self.framer.last_byte().map(|last| last + behind)
+    }
+
+    /// Whether `came` is the answer that is waited for, damaged, and no other.
+    fn is_told(&self, now: Instant, unit: UnitAddress, expected: Expected, came: &[u8]) -> bool {
+        is_left_of_answer(unit, expected, self.request.as_bytes(), came)
+            && !self.doubts.could_be_another(now, unit, expected, came)
+    }
+
+    /// Whether what came at `range` is a late answer, damaged, and not the one that is waited for; then it is open no more.
+    fn is_late_and_damaged(
+        &mut self,
+        now: Instant,
+        unit: UnitAddress,
+        expected: Expected,
+        range: &Range<usize>,
+    ) -> bool {
+        let bytes = self.framer.held(range.clone());
+        !self.others.may_be()
+            && self.beside.in_a_row().is_empty()
+            && !could_be_left_of(unit, expected, bytes, HEAD - 1)
+            && self.doubts.seen_damaged(now, bytes, false)
+    }
+
+    /// Whether `frame` is the answer to something that its unit left open.
+    fn is_owed_by_anybody(&self, now: Instant, frame: &Frame<'_>) -> bool {
+        UnitAddress::new(frame.address()).is_ok_and(|unit| self.doubts.owes(now, unit, frame))
+    }
+
+    /// Looks whether what came last, which looked like noise, is what is left of the answer.
+    #[cold]
+    fn look_for_answer(&mut self, unit: UnitAddress, expected: Expected, error: FrameError) {
+        self.beside.look_for_lost_head(unit, expected);
+        let is_told = |came: &[u8]| is_left_of_answer(unit, expected, self.request.as_bytes(), came);
+        if expected.is_read() && !self.others.may_be() && !self.beside.is_spoilt() && is_told(self.beside.in_a_row()) {
+            self.beside.is_all_spoilt(Why::Damaged(error));
+        }
+    }
+
     /// How long the answer may still come: what came in its place may have been the answer, damaged.
-    fn is_still_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected) -> Open {
-        let is_told = |damaged: &[u8]| is_left_of_answer(unit, expected, self.request.as_bytes(), damaged);
-        if !self.beside.damaged().is_some_and(is_told) {
+    fn is_still_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Open {
+        let damaged = self.beside.damaged().filter(|damaged| self.is_told(now, unit, expected, damaged));
+        let Some(len) = damaged.map(<[u8]>::len) else {
             if !self.beside.noise(true).is_empty() || !self.framer.pending().is_empty() {
-                self.torn.broke_off(now);
+                let begun =
+                    if self.beside.in_a_row().is_empty() { self.framer.pending() } else { self.beside.in_a_row() };
+                self.torn.broke_off(now, self.doubts.rest(now, unit, expected, begun));
             }
             return Open::Long;
-        }
+        };
         // Where nothing was waited for, the right one may follow; a stranger's may have been damaged; and a write or an echo
         // may have come back from the adapter.
         if !expected.is_read() || self.patience.is_none() || self.doubts.first_contact_ends(now, unit).is_some() {
             return Open::Long;
         }
-        self.torn.came(now, unit, expected)
+        self.torn.came(now, (unit, expected), len, timeout)
     }
 
     /// Until when the answer is waited for that has to be there by `until`: no longer than something may still follow what
     /// came in its place.
     pub(super) fn listens_until(&self, until: Instant) -> Instant {
-        if !self.beside.is_spoilt() {
-            return until;
-        }
-        self.framer.gives_up().map_or(until, |moment| moment.min(until))
+        let gives_up = self.framer.gives_up().filter(|_| self.beside.is_spoilt());
+        [gives_up, self.ends_at].into_iter().flatten().fold(until, Ord::min)
     }
 
     /// The frame that ends the request, and what is wrong with it.
@@ -210,7 +301,11 @@ impl Master {
     /// A frame came that answers nothing in flight.
     pub(super) fn see(&mut self, now: Instant, range: Range<usize>) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
-        self.torn.see(&frame);
+        // Of what is late nothing is learned.
+        let is_late = UnitAddress::new(frame.address()).is_ok_and(|unit| self.doubts.awaits(now, unit, &frame));
+        if !is_late {
+            self.torn.see(&frame);
+        }
         if self.doubts.seen(now, &frame, at_once) && self.others.may_be() && frame.as_bytes() != self.request.as_bytes()
         {
             let first_contact = UnitAddress::of_answer(frame.address());
@@ -227,7 +322,19 @@ impl Master {
 
     /// How soon after another one a frame of `len` bytes can have come with no silence between them.
     fn at_once(&self, len: usize) -> Duration {
-        self.char_time.saturating_mul(u32::try_from(len).unwrap_or(u32::MAX)).saturating_add(self.silence)
+        // Less one character: what a unit answers right behind another has its silence to the last bit.
+        let chars = u32::try_from(len.saturating_sub(1)).unwrap_or(u32::MAX);
+        self.char_time.saturating_mul(chars).saturating_add(self.silence)
+    }
+
+    /// How long after one answer another of this kind can have come that the unit gave right behind it.
+    fn time_to_follow(&self, expected: Expected) -> Duration {
+        match expected.adu_len().and_then(|len| u32::try_from(len).ok()) {
+            Some(len) if self.char_time != Duration::MAX => {
+                self.char_time.saturating_mul(len).saturating_add(self.silence.saturating_mul(2)).saturating_add(LAG)
+            }
+            _ => Duration::ZERO,
+        }
     }
 
     /// What was seen beside the request that ends; what came in the place of an answer that is `right` was none.
@@ -300,8 +407,16 @@ impl Master {
                     self.see(now, range);
                     self.tally.add_late();
                 }
-                Step::Skipped { range, .. } => self.tally.add_noise(self.framer.held(range)),
+                Step::Skipped { range, .. } => self.skip_stray(now, range),
             }
         }
+    }
+
+    /// What came at `range` while nothing was waited for is no frame: it may be left of one.
+    pub(super) fn skip_stray(&mut self, now: Instant, range: Range<usize>) {
+        if !self.others.may_be() {
+            self.doubts.seen_damaged(now, self.framer.held(range.clone()), true);
+        }
+        self.tally.add_noise(self.framer.held(range));
     }
 }

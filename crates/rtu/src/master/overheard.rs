@@ -2,7 +2,9 @@
 //! answer that may be the other's.
 
 use core::ops::Range;
+use core::time::Duration;
 
+use super::judge::BEHIND;
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
@@ -26,6 +28,25 @@ impl Master {
         if self.others.may_be() && matches!(self.state, State::Idle) {
             self.framer.listen();
             self.count_strays(now);
+        }
+    }
+
+    /// Until when the rest may come of what is coming in while nothing is in flight; `None` where nothing is.
+    pub(crate) fn hears_until(&self) -> Option<Instant> {
+        let is_coming = !self.framer.pending().is_empty();
+        let pause = self.patience.map_or(Duration::ZERO, |patience| patience.pause.min(BEHIND));
+        self.framer.last_byte().filter(|_| is_coming).map(|last| last + self.silence.max(pause))
+    }
+
+    /// Takes down what came by `now`, while nothing is in flight, and nothing more has come.
+    pub(crate) fn take_down(&mut self, now: Instant) {
+        self.overhear(now);
+        if matches!(self.state, State::Idle) {
+            self.count_strays(now);
+            if !self.framer.pending().is_empty() {
+                let rest = self.framer.gives_up_rest();
+                self.skip_stray(now, rest);
+            }
         }
     }
 

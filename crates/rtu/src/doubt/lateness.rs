@@ -1,0 +1,42 @@
+//! How late the answers of a unit come that come late at all: so long it is worth to wait whether one is seen, where lengths do
+//! not tell it from the next.
+//!
+//! It says nothing of how long one may come: the next may be later than all before.
+
+use core::time::Duration;
+
+use crate::{Instant, UnitAddress};
+
+/// So many times as long as the latest that was seen it is worth to wait.
+const WORTH: u32 = 2;
+
+/// Units that are remembered; of others nothing is known.
+const KEPT: usize = 8;
+
+/// What the units have taught that were late last: the longest time from when an answer was given up to when it came.
+#[derive(Debug, Clone)]
+pub(super) struct Lateness([Option<(UnitAddress, Duration)>; KEPT]);
+
+impl Lateness {
+    pub(super) const UNKNOWN: Self = Self([None; KEPT]);
+
+    /// An answer of `unit` came at `now` that was given up at `given_up`. With more units than are kept, the one that was late
+    /// longest ago is forgotten.
+    pub(super) fn came(&mut self, now: Instant, unit: UnitAddress, given_up: Instant) {
+        let late = self.of(unit).max(now.saturating_duration_since(given_up));
+        let is_it = |place: &Option<(UnitAddress, Duration)>| place.is_none_or(|(of, _)| of == unit);
+        let place = self.0.iter().position(is_it).unwrap_or(KEPT - 1);
+        self.0[place] = Some((unit, late));
+        self.0[..=place].rotate_right(1);
+    }
+
+    /// Until when it is worth to wait for an answer of `unit` that was given up at `given_up`: no time at all where none was
+    /// seen yet.
+    pub(super) fn worth(&self, unit: UnitAddress, given_up: Instant) -> Instant {
+        given_up + self.of(unit).saturating_mul(WORTH)
+    }
+
+    fn of(&self, unit: UnitAddress) -> Duration {
+        self.0.iter().flatten().find(|(of, _)| *of == unit).map_or(Duration::ZERO, |(_, late)| *late)
+    }
+}
