@@ -19,6 +19,7 @@
 //! it cannot pass for, or again and again: see [`Attribution`]. What another program asked is not known to anybody; at
 //! first contact an echo is believed on every line.
 
+mod damaged;
 mod lateness;
 
 use core::time::Duration;
@@ -26,7 +27,6 @@ use core::time::Duration;
 use crate::answer::Answer;
 use crate::expected::Expected;
 use crate::frame::Frame;
-use crate::master::{HEAD, could_be_left_of, damaged_head, is_left_of, is_surely_left_of, rest_of};
 use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};
 
@@ -295,80 +295,6 @@ impl Doubts {
         };
         self.closes(now, answers, |open| !open.expected.may_repeat_request());
         is_nobodys
-    }
-
-    /// What came at `now` could be the answers that it `fits`: if these are alike, and it `is_it`, one of them is not open any
-    /// more. Of several that is the one whose time ends first. Returns whether one was closed.
-    fn closes(&mut self, now: Instant, fits: impl Fn(&Open) -> bool, is_it: impl Fn(&Open) -> bool) -> bool {
-        let ends = |open: &Open| if self.open.contains(open.unit) { None } else { Some(open.last + open.window) };
-        let still = |open: &&Open| fits(open) && ends(open).is_none_or(|end| now < end);
-        let Some(first) = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window) else {
-            return false;
-        };
-        let (unit, expected, given_up) = (first.unit, first.expected, first.given_up);
-        let (end, count) = (first.last + first.window, first.count);
-        let others = self.ledger.iter().flatten().filter(still);
-        if !is_it(first) || others.clone().any(|open| (open.unit, open.expected) != (unit, expected)) {
-            return false;
-        }
-        let is_only = others.count() == 1 && count == 1 && !first.again && now < end;
-        let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
-        for place in &mut self.ledger {
-            match place {
-                Some(open) if is_first(open) && open.count > 1 => open.count -= 1,
-                Some(open) if is_first(open) => *place = None,
-                _ => continue,
-            }
-            break;
-        }
-        if is_only {
-            self.lateness.came(now, unit, given_up);
-        }
-        self.ends_unless_open(now, unit);
-        true
-    }
-
-    /// Something came damaged at `now` that answers nothing in flight. Where it is beyond doubt one that is open, and could be
-    /// no other, that one is not any more. Returns whether it is.
-    pub(crate) fn seen_damaged(&mut self, now: Instant, bytes: &[u8], is_idle: bool) -> bool {
-        if now < self.forgotten_until {
-            return false;
-        }
-        let (strangers, until) = (self.strangers, self.strangers_until);
-        let strange = |unit| now < until && strangers.contains(unit);
-        let could_be = |open: &Open| !open.again && could_be_left_of(open.unit, open.expected, bytes, HEAD - 1);
-        self.closes(now, could_be, |open| {
-            !open.expected.may_repeat_request()
-                && !strange(open.unit)
-                && is_left_of(open.unit, open.expected, bytes)
-                && (is_idle || is_surely_left_of(open.unit, open.expected, bytes))
-        })
-    }
-
-    /// Whether `bytes`, which came in the place of the answer of `unit` to `expected`, could be left of another open one.
-    ///
-    /// No more of that one's beginning is damaged then than of this.
-    pub(crate) fn could_be_another(&self, now: Instant, unit: UnitAddress, expected: Expected, bytes: &[u8]) -> bool {
-        let most = damaged_head(unit, expected, bytes);
-        let is_other = |open: &Open| {
-            (open.unit != unit || !open.expected.could_pass_for(expected))
-                && (self.open.contains(open.unit) || !open.is_past(now))
-                && could_be_left_of(open.unit, open.expected, bytes, most)
-        };
-        now < self.forgotten_until || self.ledger.iter().flatten().any(is_other)
-    }
-
-    /// How many bytes may follow `bytes`, which came in the place of the answer of `unit` to `expected` and cannot be told: of
-    /// the longest among the answers that begin like them.
-    pub(crate) fn rest(&self, now: Instant, unit: UnitAddress, expected: Expected, bytes: &[u8]) -> usize {
-        let is_open = |open: &&Open| self.open.contains(open.unit) || !open.is_past(now);
-        let open = self.ledger.iter().flatten().filter(is_open).map(|open| rest_of(open.unit, open.expected, bytes));
-        let own = rest_of(unit, expected, bytes);
-        open.fold(
-            own,
-            |best, other| if other.0 < best.0 || (other.0 == best.0 && other.1 > best.1) { other } else { best },
-        )
-        .1
     }
 
     /// At `now` it is known by other means that `unit` owes no answer to `expected`.

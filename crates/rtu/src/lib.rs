@@ -22,6 +22,7 @@ mod pdu;
 mod raw;
 mod request;
 mod serial;
+mod sketch;
 mod slave;
 mod sniffer;
 mod table;

@@ -26,7 +26,6 @@ use crate::{Destination, Instant, SerialFormat, UnitAddress};
 
 use beside::Beside;
 use torn::Torn;
-pub(crate) use torn::{HEAD, could_be_left_of, damaged_head, is_left_of, is_surely_left_of, rest_of};
 
 /// The turnaround delay after a broadcast that the specification suggests: units need time to act.
 ///

@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use super::beside::Why;
 use super::overheard::passed_over;
-use super::torn::{HEAD, Open, could_be_left_of, is_left_of_answer};
+use super::torn::{BEHIND, Open, is_left_of_answer};
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
@@ -13,14 +13,11 @@ use crate::expected::Expected;
 use crate::frame::{Frame, FrameError};
 use crate::framer::Step;
 use crate::pdu::function::DIAGNOSTICS;
+use crate::sketch::{HEAD, could_be_left_of};
 use crate::{Instant, UnitAddress};
 
 /// How much later than the wire carries it an answer is handed over, where nothing holds it back.
 const LAG: Duration = Duration::from_millis(2);
-
-/// How long behind a damaged answer the right one may come, where nothing of the damaged one is missing: as long as common
-/// adapters hold bytes back, and a little.
-pub(super) const BEHIND: Duration = Duration::from_millis(20);
 
 impl Master {
     /// What came of the request in flight by `now`, if anything did.
@@ -37,18 +34,8 @@ impl Master {
         }
         while let Some(step) = self.framer.step(now) {
             match step {
-                Step::Skipped { range, .. } if self.is_late_and_damaged(now, unit, expected, &range) => {
-                    self.beside.cut();
-                    self.tally.add_noise(self.framer.held(range));
-                }
                 Step::Skipped { range, error, expected: is_damaged } => {
-                    if is_damaged {
-                        self.spoils(&range, Why::Damaged(error));
-                    }
-                    self.add_beside(range);
-                    if !is_damaged && self.framer.pending().is_empty() {
-                        self.look_for_answer(unit, expected, error);
-                    }
+                    self.skips(now, (unit, expected), range, (error, is_damaged));
                     if self.patience.is_none() && self.beside.is_spoilt() {
                         return Some(self.end_in_vain(now, unit, expected, timeout));
                     }
@@ -122,28 +109,13 @@ impl Master {
                         outcome => {
                             let refused = matches!(outcome, Ok(Answer::Exception { .. }));
                             let wrong = outcome.err();
-                            let right = wrong.is_none();
-                            self.give_account(right);
-                            self.state = State::Idle;
-                            if right || !self.others.may_be() {
-                                self.hear(now, range.clone());
-                            } else {
-                                self.see(now, range.clone());
-                            }
-                            // The answer proves that the request has left the wire, whatever was computed; but not one
-                            // that may be late.
-                            if apart || !doubted {
-                                self.busy = Some(now);
-                            }
-                            match (right, refused, expected.is_echo()) {
-                                (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
-                                (true, true, true) => self.doubts.refused_echo(now, unit),
-                                (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
-                                (true, refused, _) => {
-                                    let follow = self.time_to_follow(expected);
-                                    self.doubts.taken(now, unit, expected, timeout, refused, follow);
-                                }
-                            }
+                            self.is_told_by(
+                                now,
+                                (unit, expected, timeout),
+                                range.clone(),
+                                (refused, wrong),
+                                (apart, doubted),
+                            );
                             return Some(self.tell(expected, range, wrong));
                         }
                     }
@@ -154,8 +126,64 @@ impl Master {
         if now < self.listens_until(until) {
             return None;
         }
-        self.ends_at.is_some().then(|| self.gives_the_rest_up());
+        if self.ends_at.is_some() {
+            self.gives_the_rest_up();
+        }
         Some(self.end_in_vain(now, unit, expected, timeout))
+    }
+
+    /// The frame at `range` ends the request: it is the answer, or the refusal, or what is `wrong` with it.
+    fn is_told_by(
+        &mut self,
+        now: Instant,
+        (unit, expected, timeout): (UnitAddress, Expected, Duration),
+        range: Range<usize>,
+        (refused, wrong): (bool, Option<AnswerError>),
+        (apart, doubted): (bool, bool),
+    ) {
+        let right = wrong.is_none();
+        self.give_account(right);
+        self.state = State::Idle;
+        if right || !self.others.may_be() {
+            self.hear(now, range);
+        } else {
+            self.see(now, range);
+        }
+        // The answer proves that the request has left the wire, whatever was computed; but not one that may be late.
+        if apart || !doubted {
+            self.busy = Some(now);
+        }
+        match (right, refused, expected.is_echo()) {
+            (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
+            (true, true, true) => self.doubts.refused_echo(now, unit),
+            (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
+            (true, refused, _) => {
+                let follow = self.time_to_follow(expected);
+                self.doubts.taken(now, unit, expected, timeout, refused, follow);
+            }
+        }
+    }
+
+    /// What came at `range` is no frame: noise, or `is_damaged`: it begins as the answer does.
+    fn skips(
+        &mut self,
+        now: Instant,
+        (unit, expected): (UnitAddress, Expected),
+        range: Range<usize>,
+        (error, is_damaged): (FrameError, bool),
+    ) {
+        if self.is_late_and_damaged(now, unit, expected, &range) {
+            self.beside.cut();
+            self.tally.add_noise(self.framer.held(range));
+            return;
+        }
+        if is_damaged {
+            self.spoils(&range, Why::Damaged(error));
+        }
+        self.add_beside(range);
+        if !is_damaged && self.framer.pending().is_empty() {
+            self.look_for_answer(unit, expected, error);
+        }
     }
 
     /// What is held begins the answer, and no more of it is waited for.

@@ -4,7 +4,7 @@
 use core::ops::Range;
 use core::time::Duration;
 
-use super::judge::BEHIND;
+use super::torn::BEHIND;
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;

@@ -45,7 +45,7 @@ impl Careful {
         let (mut came, limit) = (Vec::new(), sent + self.timeout);
         while came.len() < len && !(came.len() >= 5 && came[1] & 0x80 != 0) {
             let until = if came.is_empty() { limit } else { limit.min(self.last + self.format.t35()) };
-            let Some(byte) = self.line.next(until) else { return None };
+            let byte = self.line.next(until)?;
             came.push(byte);
             self.last = self.line.now();
         }
@@ -55,7 +55,7 @@ impl Careful {
     fn echoes(&mut self, unit: UnitAddress) -> bool {
         for _ in 0..ECHOES {
             self.quiet();
-            let request = Request::echo(self.words.next() as u16);
+            let request = Request::echo(self.words.word());
             let adu = Adu::request(unit.into(), &request);
             let sent = self.send(adu.as_bytes());
             let mut came = Vec::new();

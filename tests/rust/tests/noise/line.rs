@@ -25,6 +25,11 @@ impl Chance {
         mixed ^ (mixed >> 31)
     }
 
+    pub(crate) fn word(&mut self) -> u16 {
+        let [high, low, ..] = self.next().to_be_bytes();
+        u16::from_be_bytes([high, low])
+    }
+
     /// In `percent` of a hundred.
     fn happens(&mut self, percent: u64) -> bool {
         self.next() % 100 < percent
@@ -63,7 +68,8 @@ const LATE: Duration = Duration::from_millis(150);
 /// The word in register `address`.
 pub(crate) const fn word(address: u16) -> u16 {
     let mixed = (address as u32 ^ 0x9E37).wrapping_mul(0x85EB_CA6B);
-    (mixed ^ (mixed >> 15)) as u16
+    let [_, _, high, low] = (mixed ^ (mixed >> 15)).to_be_bytes();
+    u16::from_be_bytes([high, low])
 }
 
 /// An answer on its way: when it is due, and its characters, of which the lost ones are none.

@@ -50,8 +50,8 @@ fn reads(count: u32, words: u16, line: &NoisyLine, mut read: impl FnMut(u16) -> 
 }
 
 fn by_bus(count: u32, words: u16, format: SerialFormat, line: &NoisyLine) -> Came {
-    let opened = line.clone();
-    let opener = Box::new(move || Ok(Box::new(opened.clone()) as Box<dyn Line>));
+    let wired = line.clone();
+    let opener = Box::new(move || Ok(Box::new(wired.clone()) as Box<dyn Line>));
     let options = BusOptions::new(format).timeout(TIMEOUT).retries(3).echo(AdapterEcho::Absent);
     let bus = Bus::open(opener, options, &mut || false).unwrap();
     line.0.lock().unwrap().now = line.now() + FIRST_CONTACT;
