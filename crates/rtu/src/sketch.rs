@@ -10,6 +10,11 @@ use crate::framer::lost_its_head;
 const LOST: usize = 2;
 const LOST_OF_EACH: usize = 16;
 
+/// How many of `len` bytes may be lost, so that what is left is not taken for a beginning.
+pub(crate) const fn may_lose(len: usize) -> usize {
+    LOST + len / LOST_OF_EACH
+}
+
 /// Unit, function and number of bytes, or what stands in its place.
 pub(crate) const HEAD: usize = 3;
 
@@ -52,9 +57,8 @@ impl Sketch {
         self.damaged_in(bytes) <= 1 && self.lost_in(bytes).is_some_and(|lost| lost <= self.may_lose())
     }
 
-    /// How many may be lost, so that what is left is not taken for a beginning.
     const fn may_lose(self) -> usize {
-        LOST + self.len / LOST_OF_EACH
+        may_lose(self.len)
     }
 }
 

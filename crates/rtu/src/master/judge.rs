@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use super::beside::Why;
 use super::overheard::passed_over;
-use super::torn::{BEHIND, Open, is_left_of_answer};
+use super::torn::{BEHIND, Open, is_left_of_answer, is_long_enough};
 use super::{Master, State};
 use crate::answer::{Answer, AnswerError};
 use crate::event::Event;
@@ -238,7 +238,8 @@ impl Master {
             None if !pending.is_empty() && self.beside.is_empty() => pending,
             _ => return None,
         };
-        if !self.is_told(now, unit, expected, came) {
+        // Most looks find the beginning of an answer that goes on.
+        if !is_long_enough(expected, came.len()) || !self.is_told(now, unit, expected, came) {
             return None;
         }
         let is_all = pending.is_empty() && expected.adu_len() == Some(came.len());

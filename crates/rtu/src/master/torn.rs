@@ -13,7 +13,7 @@ use crate::doubt::OVERTAKING;
 use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::framer::lost_its_head;
-use crate::sketch::Sketch;
+use crate::sketch::{Sketch, may_lose};
 use crate::{Instant, UnitAddress};
 
 use super::remnant::may_be_left_of;
@@ -117,4 +117,9 @@ pub(super) fn is_left_of_answer(unit: UnitAddress, expected: Expected, request: 
     (sketch.is_told_in(bytes) && !is_own)
         || sketch.has_its_crc(bytes)
         || lost_its_head(bytes, unit, expected.function(), sketch.len)
+}
+
+/// Whether `len` bytes can be what is left of the answer to `expected`: no more than its head and a few are missing.
+pub(super) fn is_long_enough(expected: Expected, len: usize) -> bool {
+    expected.adu_len().is_some_and(|whole| len + may_lose(whole) >= whole)
 }
