@@ -27,6 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 DOUBT = "crates/rtu/src/doubt.rs"
+DAMAGED = "crates/rtu/src/doubt/damaged.rs"
 JUDGE = "crates/rtu/src/master/judge.rs"
 MASTER = "crates/rtu/src/master.rs"
 AGREEMENT = "crates/rtu/src/agreement.rs"
@@ -82,7 +83,7 @@ class Found:
 
 
 # A damaged answer is believed to be all, from the first on.
-BELIEVED = ("self.latest[0].is_some() && now >= *self.enough.get_or_insert(now) + AGAIN", "true")
+BELIEVED = ("self.enough.is_some_and(|enough| now >= enough + again(timeout))", "true")
 
 # The master begins what could be mistaken, in quarantine.
 BEGUN = (
@@ -307,15 +308,15 @@ BREAKS = [
     Break(
         "nor where another kind displaces it",
         DOUBT,
-        "self.enter(now, unit, expected, window, since);",
-        "self.enter(now, unit, expected, window, now.max(since));",
+        "self.enter(now, (unit, expected, false), window, since);",
+        "self.enter(now, (unit, expected, false), window, now.max(since));",
         # A read given up is displaced by the refusal of a longer one, and this by that of the first: nine seconds pass.
         "overtaking-one --requests 5 --refusals 1 --quits 2 --retries 0",
     ),
     Break(
         "a refusal may have been another's",
         DOUBT,
-        "self.enter(now, unit, expected, window, since);\n        }\n    }",
+        "self.enter(now, (unit, expected, false), window, since);\n        }\n    }",
         "let _ = (window, since);\n        }\n    }",
         # A refusal is taken for another read's, whose answer for the next's, and so on: until nobody asks twice.
         "overtaking --requests 5 --refusals 1 --retries 0",
@@ -337,8 +338,8 @@ BREAKS = [
     Break(
         "a write waits",
         DOUBT,
-        "Some(latest) if !expected.is_read() || words",
-        "Some(latest) if words",
+        "Some(latest) if !expected.is_read() => Attribution::Wait(latest),",
+        "",
         "overtaking-commands --requests 4 --refusals 0",
     ),
     Break(
@@ -351,8 +352,8 @@ BREAKS = [
     # --- what was seen
     Break(
         "an answer seen takes one of its kind away",
-        DOUBT,
-        "Some(open) if open.count > 1 => open.count -= 1,",
+        DAMAGED,
+        "Some(open) if is_first(open) && open.count > 1 => open.count -= 1,",
         "",
         "overtaking --requests 4 --faults 0",
     ),
@@ -366,8 +367,8 @@ BREAKS = [
     Break(
         "nor when the adapter may have sent it",
         DOUBT,
-        "Some(open) if open.expected.may_repeat_request() => return is_nobodys,",
-        "",
+        "self.closes(now, answers, |open| !open.expected.may_repeat_request());",
+        "self.closes(now, answers, |_| true);",
         "adapter-echoes --requests 4 --retries 0",
     ),
     # --- what is forgotten
@@ -424,8 +425,8 @@ BREAKS = [
     Break(
         "a second has to pass",
         TORN,
-        "now >= *self.enough.get_or_insert(now) + AGAIN",
-        "now >= *self.enough.get_or_insert(now)",
+        "self.enough.is_some_and(|enough| now >= enough + again(timeout))",
+        "self.enough.is_some_and(|enough| now >= enough)",
         "damaged-again --requests 2 --retries 0",
         # Else it takes four calls, three of them damaged.
         beside=(TORN, "const ALONE: usize = 3;", "const ALONE: usize = 1;"),
@@ -433,7 +434,8 @@ BREAKS = [
     Break(
         "a damaged answer may have been another's",
         JUDGE,
-        "Open::No => self.doubts.taken(now, unit, expected, timeout, false),",
+        "Open::No => {\n                let follow = self.time_to_follow(expected);\n"
+        "                self.doubts.taken(now, unit, expected, timeout, false, follow);\n            }",
         "Open::No => {}",
         "damaged-once --lingers 1",
         beside=(TORN, *BELIEVED),
