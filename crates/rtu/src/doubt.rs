@@ -412,13 +412,20 @@ impl Doubts {
     }
 
     /// Until when it is worth to wait whether an answer that `unit` owes is seen, before it is asked for `expected`: a little while,
-    /// where that is soon to come if it comes. Nothing is asked then that would meet it on the wire, or be taken for it.
-    pub(crate) fn worth_watching(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
+    /// where that is soon to come if it comes: no longer than `timeout` after it was given up. Nothing is asked then that would
+    /// meet it on the wire, or be taken for it.
+    pub(crate) fn worth_watching(
+        &self,
+        now: Instant,
+        unit: UnitAddress,
+        expected: Expected,
+        timeout: Duration,
+    ) -> Option<Instant> {
         let is_open = |open: &&Open| !open.expected.is_echo() && !open.is_past(now);
         let until = self.of(unit).filter(is_open).map(|open| {
             let worth = match expected.is_read() && open.expected.could_pass_for(expected) {
                 true if open.again => open.last + open.window,
-                true => self.lateness.worth(unit, open.given_up),
+                true => open.given_up + self.lateness.worth(unit, timeout),
                 false => Instant::ZERO,
             };
             open.follows.map_or(worth, |follows| follows.max(worth))

@@ -430,8 +430,14 @@ impl Master {
 
     /// Until when it is worth to wait whether what `unit` owes is seen, before it is asked `request`; `None` where nothing is soon
     /// to come.
-    pub(crate) fn worth_watching(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<Instant> {
-        self.doubts.worth_watching(now, unit, request.expected())
+    pub(crate) fn worth_watching(
+        &self,
+        now: Instant,
+        unit: UnitAddress,
+        request: &Request<'_>,
+        timeout: Duration,
+    ) -> Option<Instant> {
+        self.doubts.worth_watching(now, unit, request.expected(), timeout)
     }
 
     /// Whether an answer of `unit` that came damaged may come again, whole, and pass for that to `request`.

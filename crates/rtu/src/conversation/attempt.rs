@@ -49,6 +49,7 @@ impl<'r> Conversation<'r> {
         let ask = self.ask();
         let in_time = self.course.is_in_time(now);
         let is_stop = self.question.urgency == Urgency::Stop;
+        let waits = !is_stop && in_time && self.course.may_watch();
         if !self.course.sends() {
             let result = match &self.course.hearing {
                 Some(Hearing { asked, .. }) if self.attempt.tried.failure.is_none() => {
@@ -64,10 +65,10 @@ impl<'r> Conversation<'r> {
             && let Some(form) = self.course.owes_only_this(known.asked(unit))
             && (is_stop || !known.master.may_come_whole(now, unit, &ask.request))
         {
-            let watches = known.watches_before_asking_again(now, unit, &ask).filter(|_| in_time && !is_stop);
+            let watches = known.watches_before_asking_again(now, unit, &ask).filter(|_| waits);
             if let (Form::Plain | Form::Repeated, Some(until)) = (form, watches) {
                 self.course.is_still_owed(known.asked(unit), form);
-                return self.watch(until);
+                return self.watch(now, until);
             }
             match form {
                 Form::Plain => self.put(now, known, Ask { in_doubt: true, ..ask }, Purpose::Same),
@@ -85,7 +86,6 @@ impl<'r> Conversation<'r> {
             return;
         }
         let can_look_up = self.write.as_ref().is_some_and(|write| !write.is_reading());
-        let waits = !is_stop && in_time;
         match known.next(now, &ask, self.words, &self.attempt.tried, (in_time, waits), self.attempt.apart) {
             Next::Ask(attribution) => self.ask_sure(now, known, ask, attribution, false),
             Next::AskApart(count) => self.ask_apart(now, known, ask, count, false),
@@ -111,7 +111,7 @@ impl<'r> Conversation<'r> {
                 self.attempt.tried = Tried::default(); // others will have asked the unit meanwhile
                 self.state = State::Pausing(until);
             }
-            Next::Watch(until) => self.watch(until),
+            Next::Watch(until) => self.watch(now, until),
             Next::Wait(until) => self.state = State::Pausing(until),
             Next::GiveUp => {
                 let slip = self.none_settled(now);
@@ -121,9 +121,8 @@ impl<'r> Conversation<'r> {
     }
 
     /// Stands by until then, for what may come; nothing is sent.
-    fn watch(&mut self, until: Instant) {
-        self.course.prepared();
-        self.state = State::Pausing(until);
+    fn watch(&mut self, now: Instant, until: Instant) {
+        self.state = State::Pausing(self.course.watches(now, until));
     }
 
     /// What is said where nothing that was tried made sure of the unit.

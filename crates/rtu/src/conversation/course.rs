@@ -45,6 +45,8 @@ pub(super) struct Course {
     allowed: Duration,
     /// When that is over: from the first look on, and then from the first question on.
     until: Option<Instant>,
+    /// For how much longer it may be seen whether what the unit owes comes: that takes none of the time for asking.
+    watchable: Duration,
     attempts: u32,
     /// How often it was asked; a question that is repeated to be sure of its answer counts once.
     asked: u32,
@@ -75,6 +77,7 @@ impl Course {
         Self {
             allowed,
             until: None,
+            watchable: allowed,
             attempts: 0,
             asked: 0,
             granted: 0,
@@ -101,6 +104,20 @@ impl Course {
     /// What was sent last was no try: it only prepares the question, and there is an end to such.
     pub(super) fn prepared(&mut self) {
         self.requests = self.requests.saturating_add(1);
+    }
+
+    /// Whether there is time left to see whether what the unit owes comes.
+    pub(super) fn may_watch(&self) -> bool {
+        !self.watchable.is_zero()
+    }
+
+    /// It is seen from `now` to `until` whether what the unit owes comes, as far as there is time left for that: until then.
+    pub(super) fn watches(&mut self, now: Instant, until: Instant) -> Instant {
+        let time = until.saturating_duration_since(now).min(self.watchable);
+        self.prepared();
+        self.watchable -= time;
+        self.until = self.until.map(|until| until + time);
+        now + time
     }
 
     /// What confirmed the write may have been meant for another one.

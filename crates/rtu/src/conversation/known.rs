@@ -280,7 +280,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         }
         if waits
             && (in_quarantine || attribution.may_be_mistaken())
-            && let Some(until) = self.master.worth_watching(now, unit, &ask.request)
+            && let Some(until) = self.master.worth_watching(now, unit, &ask.request, ask.timeout)
         {
             return Next::Watch(self.looks_again(now, until, &ask.request));
         }
@@ -321,7 +321,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         if self.longer.form(&self.master, now, unit, &ask.request).is_some() {
             return None;
         }
-        let until = self.master.worth_watching(now, unit, &ask.request)?;
+        let until = self.master.worth_watching(now, unit, &ask.request, ask.timeout)?;
         Some(self.looks_again(now, until, &ask.request))
     }
 

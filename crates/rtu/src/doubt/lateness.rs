@@ -30,10 +30,11 @@ impl Lateness {
         self.0[..=place].rotate_right(1);
     }
 
-    /// Until when it is worth to wait for an answer of `unit` that was given up at `given_up`: no time at all where none was
-    /// seen yet.
-    pub(super) fn worth(&self, unit: UnitAddress, given_up: Instant) -> Instant {
-        given_up + self.of(unit).saturating_mul(WORTH)
+    /// How long it is worth to wait for an answer of `unit`, from when it was given up: no time at all where none was late yet,
+    /// nor where it takes more than `most`, in which it can be asked again.
+    pub(super) fn worth(&self, unit: UnitAddress, most: Duration) -> Duration {
+        let worth = self.of(unit).saturating_mul(WORTH);
+        if worth <= most { worth } else { Duration::ZERO }
     }
 
     fn of(&self, unit: UnitAddress) -> Duration {
