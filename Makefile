@@ -269,6 +269,7 @@ soak: soak-virtual soak-realtime ## a day of traffic on a hostile line in virtua
 
 soak-virtual:
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-soak -- --hours $(HOURS) --seed $(SEED)
+	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-soak -- --hours $(HOURS) --seed $(SEED) --lengths whole
 
 soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)

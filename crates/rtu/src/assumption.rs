@@ -13,10 +13,11 @@ pub enum Assumption {
     /// doing and counts once. A unit that answers twice, with a pause, has a second answer that nothing is known of: it may be
     /// taken for the answer to the next read of the same length.
     AnswersOnce,
-    /// An answer has as many words as were asked for.
+    /// An answer has as many words as were asked for, or the first of its unit that has not comes in its turn.
     ///
-    /// Then the length of an answer tells reads apart. A unit that gives fewer, or more, is told as wrong, and may be mistaken
-    /// where that is the length of another read that is open.
+    /// Then the length of an answer tells reads apart, and where it was seen to tell nothing, it is not relied on any more: only an
+    /// echo and time end a doubt about such a unit. Where its first answer of another length overtakes, it may be taken for that
+    /// to another read, whose length it has.
     AnswersWhole,
     /// An answer comes within [`OVERTAKING`](crate::OVERTAKING), or four time-outs where that is longer, of being given up, or
     /// never.
@@ -56,7 +57,9 @@ impl Assumption {
     pub const fn text(self) -> &'static str {
         match self {
             Self::AnswersOnce => "A unit answers at most once each time it is asked.",
-            Self::AnswersWhole => "It answers with as many words as it was asked for.",
+            Self::AnswersWhole => {
+                "It answers with as many words as it was asked for; where it does not, the first such answer comes in its turn."
+            }
             Self::AnswersInTime => {
                 "It answers within three seconds, or four time-outs where that is longer, after it was given up, or never."
             }

@@ -21,6 +21,7 @@
 
 mod damaged;
 mod lateness;
+mod lengths;
 
 use core::time::Duration;
 
@@ -31,6 +32,7 @@ use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};
 
 use lateness::Lateness;
+use lengths::{is_read_by, passes};
 
 /// How long after a line was opened the answer to another program's question may come.
 ///
@@ -142,6 +144,8 @@ pub(crate) struct Doubts {
     heard: Option<(u8, [u8; 2], Instant)>,
     /// How late answers come that come late.
     lateness: Lateness,
+    /// Units whose answers have any number of words: one had another than it was asked for.
+    any_length: UnitSet,
 }
 
 impl Doubts {
@@ -156,6 +160,7 @@ impl Doubts {
         forgotten_until: Instant::ZERO,
         heard: None,
         lateness: Lateness::UNKNOWN,
+        any_length: UnitSet::EMPTY,
     };
 
     /// The line was opened at `now`: anybody may have asked anything before.
@@ -241,7 +246,9 @@ impl Doubts {
             || (expected.is_read()
                 && !self.is_strange(now, unit)
                 && !self.has_forgotten(now, unit)
-                && !self.possible(now, unit).any(|open| open.expected.could_pass_for_cut(expected)))
+                && !self
+                    .possible(now, unit)
+                    .any(|open| self.could_pass(open, expected) || open.expected.could_pass_for_cut(expected)))
     }
 
     /// Whether a refusal that `unit` gives to `expected` may be meant for something else that it was asked before.
@@ -288,6 +295,10 @@ impl Doubts {
         let is_nobodys = !self.has_forgotten(now, unit) && !self.of(unit).any(fits);
         if self.is_strange(now, unit) {
             return is_nobodys;
+        }
+        // Which of its open reads it answers, if any, nothing tells.
+        if self.gives_any_length(unit) && self.of(unit).any(|open| is_read_by(open, frame)) {
+            return false;
         }
         let answers = |open: &Open| {
             open.unit == unit
@@ -353,9 +364,10 @@ impl Doubts {
             return;
         }
         let mut displaced = None;
+        let any_length = self.gives_any_length(unit);
         for open in self.ledger.iter_mut().flatten() {
             let rival =
-                open.expected.could_pass_for(expected) || (refused && open.expected.function() == expected.function());
+                passes(open, expected, any_length) || (refused && open.expected.function() == expected.function());
             if open.unit == unit && rival && !open.is_past(now) {
                 if !open.again && !refused {
                     open.follows.get_or_insert(now + follow);
@@ -382,7 +394,7 @@ impl Doubts {
         }
         let (mut words, mut refusal, mut latest) = (1_u8, 1_u8, None);
         for open in self.of(unit).filter(|open| !open.is_past(now)) {
-            if open.expected.could_pass_for(expected) {
+            if self.could_pass(open, expected) {
                 words = words.saturating_add(open.count);
             }
             if open.expected.function() == expected.function() {
@@ -405,7 +417,7 @@ impl Doubts {
     /// When no answer that came damaged may come again and pass for that of `unit` to `expected`, if those that are left then can
     /// be outvoted.
     fn none_come_again(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
-        let rivals = || self.of(unit).filter(|open| !open.is_past(now) && open.expected.could_pass_for(expected));
+        let rivals = || self.of(unit).filter(|open| !open.is_past(now) && self.could_pass(open, expected));
         let others = rivals().filter(|open| !open.again).fold(0_u8, |count, open| count.saturating_add(open.count));
         let ends = rivals().filter(|open| open.again).map(|open| open.last + open.window);
         ends.max().filter(|_| others <= MAX_RIVALS)
@@ -423,7 +435,7 @@ impl Doubts {
     ) -> Option<Instant> {
         let is_open = |open: &&Open| !open.expected.is_echo() && !open.is_past(now);
         let until = self.of(unit).filter(is_open).map(|open| {
-            let worth = match expected.is_read() && open.expected.could_pass_for(expected) {
+            let worth = match expected.is_read() && self.could_pass(open, expected) {
                 true if open.again => open.last + open.window,
                 true => open.given_up + self.lateness.worth(unit, timeout),
                 false => Instant::ZERO,
@@ -435,7 +447,7 @@ impl Doubts {
 
     /// Whether an answer of `unit` that came damaged may come again, and pass for that to `expected`.
     pub(crate) fn may_come_whole(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
-        self.of(unit).any(|open| open.again && !open.is_past(now) && open.expected.could_pass_for(expected))
+        self.of(unit).any(|open| open.again && !open.is_past(now) && self.could_pass(open, expected))
     }
 
     /// When the doubt of first contact with `unit` will be over by itself, if there is one.

@@ -4,7 +4,9 @@ mod shape;
 
 use crate::answer::{Answer, AnswerError};
 use crate::frame::Frame;
-use crate::pdu::function::{DIAGNOSTICS, EXCEPTION_BIT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::function::{
+    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+};
 use crate::pdu::{AROUND_PDU, AnswerLength, coil_word};
 use crate::request::Request;
 use crate::{Table, UnitAddress};
@@ -164,6 +166,12 @@ impl Expected {
             }
             _ => self.could_pass_for(other),
         }
+    }
+
+    /// As [`could_pass_for`](Self::could_pass_for), of a unit that gives other numbers of words than it is asked for.
+    pub(crate) fn could_pass_at_any_length(self, other: Self) -> bool {
+        let is_read = matches!(self.function(), READ_COILS..=READ_INPUT);
+        (is_read && self.function() == other.function()) || self.could_pass_for(other)
     }
 
     /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.

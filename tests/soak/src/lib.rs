@@ -46,6 +46,9 @@ pub struct Plan {
     pub pull_every: Duration,
     /// How many threads use the bus, 1..=8.
     pub threads: usize,
+    /// Whether all units answer with as many words as they are asked for. Else each has shown before that it does not: the first
+    /// such answer comes in its turn ([`ASSUMED`]).
+    pub whole: bool,
 }
 
 impl Default for Plan {
@@ -59,6 +62,7 @@ impl Default for Plan {
             unplug_rate: 0.000_05,
             pull_every: Duration::from_secs(60),
             threads: 8,
+            whole: false,
         }
     }
 }

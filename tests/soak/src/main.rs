@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use drivebus_soak::{Plan, run};
 
-const USAGE: &str = "drivebus-soak [--hours H] [--calls N] [--seed N] [--rate SHARE] [--threads 1..8]";
+const USAGE: &str =
+    "drivebus-soak [--hours H] [--calls N] [--seed N] [--rate SHARE] [--threads 1..8] [--lengths any|whole]";
 
 #[expect(clippy::print_stdout, clippy::print_stderr, reason = "what it is for")]
 fn main() -> ExitCode {
@@ -36,6 +37,7 @@ fn plan(mut words: impl Iterator<Item = String>) -> Result<Plan, String> {
             "--rate" => plan.rate = value.parse().map_err(|_| USAGE)?,
             "--calls" => plan.calls = value.parse().map_err(mistake)?,
             "--seed" => plan.seed = value.parse().map_err(mistake)?,
+            "--lengths" if value == "any" || value == "whole" => plan.whole = value == "whole",
             "--threads" => plan.threads = value.parse::<usize>().map_err(mistake)?.clamp(1, 8),
             _ => return Err(format!("{name} is unknown; {USAGE}")),
         }

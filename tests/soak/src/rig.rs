@@ -84,6 +84,9 @@ impl Rig {
             most_calls: plan.calls,
         };
         rig.fill().map_err(|error| error.to_string())?;
+        if !plan.whole {
+            rig.show_lengths()?;
+        }
         rig.begin = rig.simulator.now();
         rig.end = rig.begin + plan.time;
         rig.spoil(plan).map_err(|error| error.to_string())?;
@@ -104,9 +107,26 @@ impl Rig {
         Ok(())
     }
 
+    /// Each unit answers once with another number of words than it was asked for, on a line that is still good.
+    fn show_lengths(&self) -> Result<(), String> {
+        for unit in UNITS {
+            self.wire.script(&[(1, FaultKind::Long)]);
+            let read = Request::read(BLOCKS[0].0, 1).map_err(|error| error.to_string())?;
+            if self.ask(unit, &read, CallOptions::default().retries(0), &mut |_| ()).is_ok() {
+                return Err(format!("unit {unit} gave as many words as it was asked for"));
+            }
+        }
+        self.calls.store(0, Ordering::Relaxed);
+        Ok(())
+    }
+
     fn spoil(&self, plan: &Plan) -> Result<(), drivebus_sim::SimError> {
         for kind in FaultKind::ALL {
-            let rate = if kind == FaultKind::Unplug { plan.unplug_rate } else { plan.rate };
+            let rate = match kind {
+                FaultKind::Unplug => plan.unplug_rate,
+                FaultKind::Short | FaultKind::Long if plan.whole => 0.0,
+                _ => plan.rate,
+            };
             self.wire.set_rate(kind, rate)?;
         }
         self.wire.set_delay(DELAY);
@@ -178,7 +198,8 @@ impl Rig {
         verdict.silence_violations = self.wire.silence_violations();
         verdict.calls = self.calls.load(Ordering::Relaxed);
         verdict.simulated = self.simulator.now().saturating_duration_since(self.begin);
-        verdict.faults = FaultKind::ALL.map(|kind| (kind.name(), self.wire.counts(kind))).to_vec();
+        let kinds = self.wire.rates().into_iter().map(|(kind, _)| (kind.name(), self.wire.counts(kind)));
+        verdict.faults = kinds.collect();
         let pulls = self.hand.lock().map_or(0, |hand| hand.pulls);
         verdict.faults.push(("pulled out by hand", pulls));
         verdict.faults.push(("requests echoed", stats.total.own_echoes));

@@ -43,11 +43,12 @@ impl Doubts {
         if now < self.forgotten_until {
             return false;
         }
-        let (strangers, until) = (self.strangers, self.strangers_until);
+        let (strangers, until, any_length) = (self.strangers, self.strangers_until, self.any_length);
         let strange = |unit| now < until && strangers.contains(unit);
         let could_be = |open: &Open| !open.again && could_be_left_of(open.unit, open.expected, bytes, HEAD - 1);
         self.closes(now, could_be, |open| {
             !open.expected.may_repeat_request()
+                && !any_length.contains(open.unit)
                 && !strange(open.unit)
                 && is_left_of(open.unit, open.expected, bytes)
                 && (is_idle || is_surely_left_of(open.unit, open.expected, bytes))
@@ -64,7 +65,7 @@ impl Doubts {
                 && (self.open.contains(open.unit) || !open.is_past(now))
                 && could_be_left_of(open.unit, open.expected, bytes, most)
         };
-        now < self.forgotten_until || self.ledger.iter().flatten().any(is_other)
+        now < self.forgotten_until || self.gives_any_length(unit) || self.ledger.iter().flatten().any(is_other)
     }
 
     /// How many bytes may follow `bytes`, which came in the place of the answer of `unit` to `expected` and cannot be told: of

@@ -51,6 +51,9 @@ impl Master {
                     let judged = expected.judge_frame(unit, &frame).and_then(|answer| self.check(expected, answer));
                     let doubted = self.in_quarantine(now, unit);
                     let apart = self.doubts.sorts_out(now, unit, expected);
+                    if judged.is_err() && !self.others.may_be() {
+                        self.doubts.learn_length(now, (unit, expected), &frame);
+                    }
                     match judged {
                         // Nobody was asked for it, and it stands amid other bytes: it has a right CRC by chance.
                         Err(AnswerError::Unit { .. } | AnswerError::Function { .. })
@@ -334,6 +337,11 @@ impl Master {
         let is_late = UnitAddress::new(frame.address()).is_ok_and(|unit| self.doubts.awaits(now, unit, &frame));
         if !is_late {
             self.torn.see(&frame);
+        }
+        if !self.others.may_be()
+            && let Ok(unit) = UnitAddress::new(frame.address())
+        {
+            self.doubts.learn_length_beside(now, unit, &frame);
         }
         if self.doubts.seen(now, &frame, at_once) && self.others.may_be() && frame.as_bytes() != self.request.as_bytes()
         {

@@ -6,6 +6,7 @@ mod agreement;
 mod asker;
 mod beside;
 mod forgotten;
+mod lengths;
 mod open;
 mod others;
 mod quarantine;
