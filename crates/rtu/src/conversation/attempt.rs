@@ -47,6 +47,7 @@ impl<'r> Conversation<'r> {
     /// question that was answered, since this call began. The unit stays in quarantine for whatever is asked next.
     pub(super) fn decide<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) {
         let ask = self.ask();
+        self.course.has_watched(now);
         let in_time = self.course.is_in_time(now);
         let is_stop = self.question.urgency == Urgency::Stop;
         let waits = !is_stop && in_time && self.course.may_watch();

@@ -47,6 +47,8 @@ pub(super) struct Course {
     until: Option<Instant>,
     /// For how much longer it may be seen whether what the unit owes comes: that takes none of the time for asking.
     watchable: Duration,
+    /// When that began that is under way.
+    watching_since: Option<Instant>,
     attempts: u32,
     /// How often it was asked; a question that is repeated to be sure of its answer counts once.
     asked: u32,
@@ -78,6 +80,7 @@ impl Course {
             allowed,
             until: None,
             watchable: allowed,
+            watching_since: None,
             attempts: 0,
             asked: 0,
             granted: 0,
@@ -116,8 +119,16 @@ impl Course {
         let time = until.saturating_duration_since(now).min(self.watchable);
         self.prepared();
         self.watchable -= time;
-        self.until = self.until.map(|until| until + time);
+        self.watching_since = Some(now);
         now + time
+    }
+
+    /// At `now` there is no more to be seen, and the line is its own again: what others used of it meanwhile is none of its time.
+    pub(super) fn has_watched(&mut self, now: Instant) {
+        if let Some(since) = self.watching_since.take() {
+            let time = now.saturating_duration_since(since);
+            self.until = self.until.map(|until| until + time);
+        }
     }
 
     /// What confirmed the write may have been meant for another one.

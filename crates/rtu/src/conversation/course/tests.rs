@@ -144,19 +144,22 @@ fn what_goes_on_with_something_else_has_only_the_requests_that_are_left() {
     assert_eq!(questions(&mut course, SILENCE), 3);
 }
 
-/// What is watched takes its own time: that of all time-outs, in one call.
+/// What is watched takes its own time: that of all time-outs, in one call; and what others use of the line meanwhile, none of it.
 #[test]
 fn the_time_to_watch_is_none_of_that_to_ask() {
     let mut course = Course::new(TIMEOUT, 1);
     course.asks(at(0));
     assert!(course.sends() && course.may_watch());
     assert_eq!(course.watches(at(50), at(180)), at(180));
-    assert!(course.is_in_time(at(200 + 129)) && !course.is_in_time(at(200 + 130)));
+    course.has_watched(at(350));
+    assert!(course.is_in_time(at(200 + 299)) && !course.is_in_time(at(200 + 300)));
     assert!(course.may_watch());
-    assert_eq!(course.watches(at(200), at(500)), at(270), "no longer than there is time for");
+    assert_eq!(course.watches(at(400), at(900)), at(470), "no longer than there is time for");
+    course.has_watched(at(470));
     assert!(!course.may_watch());
+    course.has_watched(at(480));
+    assert!(course.is_in_time(at(569)) && !course.is_in_time(at(570)));
     assert_eq!((0..99).take_while(|_| course.sends()).count(), 16, "nor of the requests, of which there were 15");
-    assert!(course.is_in_time(at(399)) && !course.is_in_time(at(400)));
 }
 
 /// The time-outs of all questions once before the first of them, and once from it on.
