@@ -28,6 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 DOUBT = "crates/rtu/src/doubt.rs"
 DAMAGED = "crates/rtu/src/doubt/damaged.rs"
+LENGTHS = "crates/rtu/src/doubt/lengths.rs"
 JUDGE = "crates/rtu/src/master/judge.rs"
 MASTER = "crates/rtu/src/master.rs"
 AGREEMENT = "crates/rtu/src/agreement.rs"
@@ -370,6 +371,63 @@ BREAKS = [
         "self.closes(now, answers, |open| !open.expected.may_repeat_request());",
         "self.closes(now, answers, |_| true);",
         "adapter-echoes --requests 4 --retries 0",
+    ),
+    # --- other lengths
+    Break(
+        "of a unit that gave another length no length proves anything",
+        LENGTHS,
+        "self.any_length.insert(unit);",
+        "",
+        "other-lengths --requests 3",
+    ),
+    Break(
+        "one that comes in its turn shows it",
+        JUDGE,
+        "self.doubts.learn_length(now, (unit, expected), &frame);",
+        "",
+        "other-lengths --requests 3",
+    ),
+    Break(
+        "so does one that comes beside",
+        JUDGE,
+        "self.doubts.learn_length_beside(now, unit, &frame);",
+        "",
+        "other-lengths --requests 3",
+    ),
+    Break(
+        "the answer to a read of any length may be taken for that to any other",
+        DOUBT,
+        "if self.could_pass(open, expected) {\n                words",
+        "if open.expected.could_pass_for(expected) {\n                words",
+        "other-lengths",
+    ),
+    Break(
+        "no read tells its answer from that to another",
+        DOUBT,
+        ".any(|open| self.could_pass(open, expected) || open.expected.could_pass_for_cut(expected)))",
+        ".any(|open| open.expected.could_pass_for_cut(expected)))",
+        "other-lengths",
+    ),
+    Break(
+        "which of its reads was answered is not known",
+        DOUBT,
+        "if self.gives_any_length(unit) && self.of(unit).any(|open| is_read_by(open, frame)) {",
+        "if false && self.of(unit).any(|open| is_read_by(open, frame)) {",
+        "other-lengths --requests 5",
+    ),
+    Break(
+        "what is taken may have been the open one, of whatever length",
+        DOUBT,
+        "passes(open, expected, any_length) || (refused",
+        "passes(open, expected, false) || (refused",
+        "other-lengths --requests 5",
+    ),
+    Break(
+        "something damaged may be left of any of its reads",
+        DAMAGED,
+        "&& !any_length.contains(open.unit)",
+        "",
+        "other-lengths --faults 1",
     ),
     # --- what is forgotten
     Break(

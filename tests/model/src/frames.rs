@@ -150,6 +150,8 @@ pub struct Coming {
     pub content: Content,
     /// Where was read, if something was.
     pub place: u16,
+    /// Whether it has another number of words than was asked for.
+    pub is_other_length: bool,
     /// When its request ended without it.
     pub given_up: Option<Instant>,
     /// When it arrived damaged, if it has.

@@ -79,6 +79,9 @@ impl State {
             None => false,
             Some(Unanswered::Refused { .. }) => true,
             Some(why) => {
+                if let Unanswered::Wrong(AnswerError::Count { .. }) = why {
+                    step.sights.push(Sight::OtherLength);
+                }
                 let is_refusal = matches!(why, Unanswered::Wrong(AnswerError::Refusal { .. }));
                 self.told.outcome = Some(if is_refusal { "it may refuse another: left open" } else { "left open" });
                 self.left_open(call.unit, flight.kind);
@@ -126,7 +129,7 @@ impl State {
         // Who refuses more words than were asked for has not refused what was asked.
         let is_asked =
             !refused || matches!(came.content, Content::Refused(kind) if kind.request() == call.kind.request());
-        let is_own = is_asked && came.is_since(call.first) && came.place == flight.place;
+        let is_own = is_asked && came.is_since(call.first) && came.place == flight.place && !came.is_other_length;
         let before = call.truth.row.filter(|(content, ..)| alike(*content, came.content));
         let (times, was_own) = before.map_or((0, false), |(_, times, own)| (times, own));
         call.truth.row = Some((came.content, times + 1, is_own || was_own));

@@ -3,6 +3,7 @@
 use drivebus_rtu::Duration;
 
 use crate::frames::{Content, Kind};
+use crate::search::{Action, Heard, How};
 
 /// What a unit makes of an echo (08H).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -46,6 +47,8 @@ pub struct Budget {
     pub faults: u8,
     /// Requests that a unit refuses.
     pub refusals: u8,
+    /// Reads that a unit answers with another number of words than was asked for.
+    pub lengths: u8,
     /// Calls given up at any time: what is on the wire then, before its time.
     pub aborts: u8,
     /// Calls given up between two of their requests.
@@ -69,6 +72,7 @@ impl Budget {
             "requests" => &mut self.requests,
             "faults" => &mut self.faults,
             "refusals" => &mut self.refusals,
+            "lengths" => &mut self.lengths,
             "aborts" => &mut self.aborts,
             "quits" => &mut self.quits,
             "openings" => &mut self.openings,
@@ -86,6 +90,7 @@ impl Budget {
             requests,
             faults: 0,
             refusals: 0,
+            lengths: 0,
             aborts: 0,
             quits: 0,
             openings: 0,
@@ -127,6 +132,8 @@ pub enum Sight {
     EndedBySight,
     /// The adapter was found to send requests back.
     AdapterFound,
+    /// An answer of another length than was asked for was told as wrong.
+    OtherLength,
 }
 
 /// A line, what happens on it, and how far it is searched.
@@ -150,6 +157,8 @@ pub struct Scenario {
     pub heeds: bool,
     /// What may become of an answer that arrives damaged.
     pub damage: Damage,
+    /// What came before, in one way or another. None of it is open any more when the search begins.
+    pub before: &'static [&'static [Action]],
     /// What the program asks.
     pub kinds: &'static [Kind],
     /// The most words that a unit gives at once; more it refuses.
@@ -198,6 +207,17 @@ const SOMEBODY: &[&[Content]] = &[
 ];
 /// Two questions of a program that asks one at a time: the one that it gave up, and the one behind it.
 const TWO_READS: &[&[Content]] = &[&[Content::Words(1, false), Content::Words(2, false)]];
+const NOTHING: &[&[Action]] = &[&[]];
+/// A unit gives two words in place of one: while it is asked for that, and later, when nothing is.
+const OTHER_LENGTHS: &[&[Action]] = &[
+    &[Action::Ask(0, Kind::Read(1)), Action::Send(Heard::OtherLength(2)), Action::Arrive(0, 0, How::Whole)],
+    &[
+        Action::Ask(0, Kind::Read(1)),
+        Action::Send(Heard::OtherLength(2)),
+        Action::TimeOut,
+        Action::Arrive(0, 0, How::Whole),
+    ],
+];
 const READS: &[Kind] = &[Kind::Echo(0), Kind::Read(1), Kind::Read(2)];
 const COMMANDS: &[Kind] = &[Kind::Read(1), Kind::Run, Kind::Stop];
 
@@ -212,6 +232,7 @@ const LINE: Scenario = Scenario {
     replaced_by: None,
     heeds: true,
     damage: Damage::Final,
+    before: NOTHING,
     kinds: READS,
     longest: 16,
     timeout: HALF_A_SECOND,
@@ -308,6 +329,17 @@ pub const SCENARIOS: &[Scenario] = &[
         small: Budget { faults: 1, ..Budget::requests(3) },
         deep: Budget { refusals: 1, openings: 1, ..Budget::requests(2) },
         sights: &[Sight::ReadAtOnce, Sight::EndedByTime],
+        ..LINE
+    },
+    Scenario {
+        name: "other-lengths",
+        about: "the same, and the unit, which has done so before, answers reads with another number of words",
+        overtaking: true,
+        before: OTHER_LENGTHS,
+        kinds: &[Kind::Read(1), Kind::Read(2)],
+        small: Budget { lengths: 1, retries: 0, ..Budget::requests(4) },
+        deep: Budget { lengths: 2, ..Budget::requests(4) },
+        sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::EndedByEcho, Sight::OtherLength],
         ..LINE
     },
     Scenario {

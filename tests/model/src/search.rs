@@ -11,7 +11,7 @@ use crate::ends;
 use crate::frames::{Coming, Content, Kind};
 use crate::judge::{Source, Step};
 use crate::program::{Call, Standing};
-use crate::scenario::{Budget, Damage, Scenario, Sight};
+use crate::scenario::{Budget, Damage, LONGEST, Scenario, Sight};
 use crate::trace;
 use crate::world::{State, TICK, Told, Wrong, address};
 
@@ -22,6 +22,8 @@ pub enum Heard {
     Answered,
     /// The unit refuses it.
     Refused,
+    /// The unit answers a read with so many words, and not as many as were asked for.
+    OtherLength(u16),
     /// The unit does not hear it.
     Lost,
     /// The unit takes it, and the port is lost while it goes out.
@@ -106,6 +108,9 @@ pub enum Order {
     Deepest,
 }
 
+/// What comes before a search may ask and answer as it likes.
+const BEFORE: Budget = Budget { lengths: u8::MAX, retries: 0, ..Budget::requests(u8::MAX) };
+
 const ATTRIBUTED: &str = "no answer is attributed to a request it was not sent for";
 const DONE: &str = "no write is reported that did not happen";
 const ONCE: &str = "nothing that moves is sent twice";
@@ -115,6 +120,28 @@ impl Search {
     /// A search of `scenario` as far as `budget` goes.
     pub fn new(scenario: &Scenario, budget: Budget) -> Self {
         Self { scenario: scenario.clone(), budget, seen: Arc::default(), found: Arc::default() }
+    }
+
+    /// `state`, once what came before has happened, an echo has come back, and nothing is open any more. `None` where that cannot
+    /// happen.
+    fn after(&self, before: &[Action], mut state: State) -> Option<State> {
+        if before.is_empty() {
+            return Some(state);
+        }
+        state.left = BEFORE;
+        let over = state.now + LONGEST + LONGEST;
+        let end = [
+            Action::Ask(0, Kind::Echo(0)),
+            Action::Send(Heard::Answered),
+            Action::Arrive(0, 0, How::Whole),
+            Action::Wait(over),
+        ];
+        for &action in before.iter().chain(&end) {
+            let mut step = Step { scenario: &self.scenario, sights: Vec::new(), doubted: false };
+            self.step(&mut step, &mut state, action)?;
+        }
+        let is_over = state.program.call.is_none() && state.wrong.is_none();
+        is_over.then(|| State { left: self.budget, requests: 0, told: Told::default(), ..state })
     }
 
     /// Goes through every state.
@@ -145,6 +172,9 @@ impl Search {
         }
         if heard != Heard::Lost {
             state.hear(&self.scenario, unit, (flight.kind, flight.place), heard == Heard::Refused);
+        }
+        if let Heard::OtherLength(count) = heard {
+            state.has_other_length(unit, count)?;
         }
         state.look_at_registers();
         let State { program, known, .. } = state;
@@ -177,6 +207,10 @@ impl Search {
         actions.extend([Action::Send(Heard::Answered), Action::Send(Heard::Lost)]);
         if left.refusals > 0 {
             actions.push(Action::Send(Heard::Refused));
+        }
+        if left.lengths > 0 {
+            // As many as the program asks for, or one more.
+            actions.extend((1..=3).map(|count| Action::Send(Heard::OtherLength(count))));
         }
         if left.faults > 0 {
             actions.push(Action::Send(Heard::Broken));
@@ -276,6 +310,7 @@ impl State {
         self.left.requests -= 1;
         self.left.faults -= u8::from(matches!(heard, Heard::Broken | Heard::BackDamaged));
         self.left.refusals -= u8::from(heard == Heard::Refused);
+        self.left.lengths -= u8::from(matches!(heard, Heard::OtherLength(_)));
     }
 }
 
@@ -285,7 +320,10 @@ impl Model for Search {
 
     fn init_states(&self) -> Vec<State> {
         let strangers: &[&[_]] = if self.scenario.strangers.is_empty() { &[&[]] } else { self.scenario.strangers };
-        strangers.iter().map(|strangers| State::new(&self.scenario, self.budget, strangers)).collect()
+        let states = strangers.iter().map(|strangers| State::new(&self.scenario, self.budget, strangers));
+        states
+            .flat_map(|state| self.scenario.before.iter().filter_map(move |before| self.after(before, state.clone())))
+            .collect()
     }
 
     fn actions(&self, state: &State, actions: &mut Vec<Action>) {

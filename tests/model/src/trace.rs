@@ -18,11 +18,12 @@ pub fn told(scenario: &Scenario, property: &str, path: Vec<(State, Option<Action
     if !strangers.is_empty() {
         let _ = writeln!(text, "    0.00 s  the line is opened{}", also_asked(&strangers));
     }
+    let began = path.first().map_or(START, |(state, _)| state.now);
     let mut last = None;
     let mut steps = path.into_iter().peekable();
     while let Some((before, Some(action))) = steps.next() {
         if let Some((after, _)) = steps.peek() {
-            let _ = writeln!(text, "{}  {}", moment(after.now), line(&before, action, after));
+            let _ = writeln!(text, "{}  {}", moment(began, after.now), line(&before, action, after));
             last = Some(after.clone());
         }
     }
@@ -40,8 +41,8 @@ pub fn told(scenario: &Scenario, property: &str, path: Vec<(State, Option<Action
     text
 }
 
-fn moment(at: Instant) -> String {
-    let since = at.saturating_duration_since(START);
+fn moment(began: Instant, at: Instant) -> String {
+    let since = at.saturating_duration_since(began);
     format!("{:8.2} s", since.as_secs_f64())
 }
 
@@ -98,6 +99,7 @@ const fn way(heard: Heard) -> &'static str {
     match heard {
         Heard::Answered => "",
         Heard::Refused => ", which refuses it",
+        Heard::OtherLength(_) => ", which gives another number of words",
         Heard::Lost => ", which does not hear it",
         Heard::Broken => "; the port is lost while it goes out",
         Heard::BackDamaged => "; the adapter sends it back damaged",

@@ -153,6 +153,7 @@ impl State {
             asker: Asker::Stranger,
             content,
             place: 0,
+            is_other_length: false,
             given_up: None,
             damaged: None,
         });
@@ -251,7 +252,16 @@ impl State {
             (Kind::Run | Kind::Stop | Kind::Set, _) => Content::Done(kind),
         };
         let asker = Asker::Request(self.requests);
-        unit.coming.push(Coming { asker, content, place, given_up: None, damaged: None });
+        let is_other_length = false;
+        unit.coming.push(Coming { asker, content, place, is_other_length, given_up: None, damaged: None });
+    }
+
+    /// What unit `index` answered last has `count` words, and not as many as were asked for. `None`: it is no such answer.
+    pub fn has_other_length(&mut self, index: usize, count: u16) -> Option<()> {
+        let coming = self.units[index].coming.last_mut()?;
+        let Content::Words(asked, changed) = coming.content else { return None };
+        (coming.content, coming.is_other_length) = (Content::Words(count, changed), true);
+        (asked != count).then_some(())
     }
 
     /// Takes the answer at `place` of what comes of unit `index` off the line, and with it what cannot come any more.
@@ -269,12 +279,13 @@ impl State {
     }
 
     /// All of `coming` that can make a difference from now on.
-    pub fn signature(&self, coming: &Coming) -> (Content, u16, Option<i64>, Option<i64>, bool, bool, bool) {
+    pub fn signature(&self, coming: &Coming) -> (Content, u16, Option<i64>, Option<i64>, [bool; 4]) {
         let given_up = coming.given_up.map(|at| offset(self.now, at));
         let damaged = coming.damaged.map(|at| offset(self.now, at));
         let in_flight = self.program.in_flight().is_some_and(|flight| coming.is_since(flight.number));
         let current = self.program.call.as_ref().is_some_and(|call| coming.is_since(call.first));
-        (coming.content, coming.place, given_up, damaged, coming.asker == Asker::Stranger, in_flight, current)
+        let is_strangers = coming.asker == Asker::Stranger;
+        (coming.content, coming.place, given_up, damaged, [is_strangers, coming.is_other_length, in_flight, current])
     }
 
     /// Fields of the code under test that it only asks whether there is something in, or compares with moments that are over

@@ -34,6 +34,7 @@ lines! {
     overtaking_one_word_at_a_time: "overtaking-one",
     overtaking_commands: "overtaking-commands",
     overtaking_without_echo: "overtaking-no-echo",
+    overtaking_with_other_lengths: "other-lengths",
     values_read_back: "read-back",
     reads_of_a_stop: "stop-reads",
     two_units: "two-units",
