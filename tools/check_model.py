@@ -413,7 +413,7 @@ BREAKS = [
         DOUBT,
         "if self.gives_any_length(unit) && self.of(unit).any(|open| is_read_by(open, frame)) {",
         "if false && self.of(unit).any(|open| is_read_by(open, frame)) {",
-        "other-lengths --requests 5",
+        "other-lengths --requests 5 --quits 1",
     ),
     Break(
         "what is taken may have been the open one, of whatever length",
@@ -427,7 +427,7 @@ BREAKS = [
         DAMAGED,
         "&& !any_length.contains(open.unit)",
         "",
-        "other-lengths --faults 1",
+        "other-lengths --requests 5 --faults 1 --quits 2",
     ),
     # --- what is forgotten
     Break(
