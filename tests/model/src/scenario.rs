@@ -2,8 +2,9 @@
 
 use drivebus_rtu::Duration;
 
+use crate::before::{NOTHING, OTHER_LENGTHS};
 use crate::frames::{Content, Kind};
-use crate::search::{Action, Heard, How};
+use crate::search::Action;
 
 /// What a unit makes of an echo (08H).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -207,17 +208,6 @@ const SOMEBODY: &[&[Content]] = &[
 ];
 /// Two questions of a program that asks one at a time: the one that it gave up, and the one behind it.
 const TWO_READS: &[&[Content]] = &[&[Content::Words(1, false), Content::Words(2, false)]];
-const NOTHING: &[&[Action]] = &[&[]];
-/// A unit gives two words in place of one: while it is asked for that, and later, when nothing is.
-const OTHER_LENGTHS: &[&[Action]] = &[
-    &[Action::Ask(0, Kind::Read(1)), Action::Send(Heard::OtherLength(2)), Action::Arrive(0, 0, How::Whole)],
-    &[
-        Action::Ask(0, Kind::Read(1)),
-        Action::Send(Heard::OtherLength(2)),
-        Action::TimeOut,
-        Action::Arrive(0, 0, How::Whole),
-    ],
-];
 const READS: &[Kind] = &[Kind::Echo(0), Kind::Read(1), Kind::Read(2)];
 const COMMANDS: &[Kind] = &[Kind::Read(1), Kind::Run, Kind::Stop];
 
@@ -338,7 +328,7 @@ pub const SCENARIOS: &[Scenario] = &[
         before: OTHER_LENGTHS,
         kinds: &[Kind::Read(1), Kind::Read(2)],
         small: Budget { lengths: 1, retries: 0, ..Budget::requests(4) },
-        deep: Budget { lengths: 2, ..Budget::requests(4) },
+        deep: Budget { lengths: 2, retries: 0, ..Budget::requests(5) },
         sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::EndedByEcho, Sight::OtherLength],
         ..LINE
     },

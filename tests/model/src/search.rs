@@ -11,7 +11,7 @@ use crate::ends;
 use crate::frames::{Coming, Content, Kind};
 use crate::judge::{Source, Step};
 use crate::program::{Call, Standing};
-use crate::scenario::{Budget, Damage, LONGEST, Scenario, Sight};
+use crate::scenario::{Budget, Damage, Scenario, Sight};
 use crate::trace;
 use crate::world::{State, TICK, Told, Wrong, address};
 
@@ -75,8 +75,8 @@ pub enum Action {
 /// The model of one line.
 #[derive(Debug, Clone)]
 pub struct Search {
-    scenario: Scenario,
-    budget: Budget,
+    pub(crate) scenario: Scenario,
+    pub(crate) budget: Budget,
     seen: Arc<AtomicU32>,
     /// Whether something was found wrong: what is found after it, in the same go, is no shorter.
     found: Arc<AtomicBool>,
@@ -108,9 +108,6 @@ pub enum Order {
     Deepest,
 }
 
-/// What comes before a search may ask and answer as it likes.
-const BEFORE: Budget = Budget { lengths: u8::MAX, retries: 0, ..Budget::requests(u8::MAX) };
-
 const ATTRIBUTED: &str = "no answer is attributed to a request it was not sent for";
 const DONE: &str = "no write is reported that did not happen";
 const ONCE: &str = "nothing that moves is sent twice";
@@ -120,28 +117,6 @@ impl Search {
     /// A search of `scenario` as far as `budget` goes.
     pub fn new(scenario: &Scenario, budget: Budget) -> Self {
         Self { scenario: scenario.clone(), budget, seen: Arc::default(), found: Arc::default() }
-    }
-
-    /// `state`, once what came before has happened, an echo has come back, and nothing is open any more. `None` where that cannot
-    /// happen.
-    fn after(&self, before: &[Action], mut state: State) -> Option<State> {
-        if before.is_empty() {
-            return Some(state);
-        }
-        state.left = BEFORE;
-        let over = state.now + LONGEST + LONGEST;
-        let end = [
-            Action::Ask(0, Kind::Echo(0)),
-            Action::Send(Heard::Answered),
-            Action::Arrive(0, 0, How::Whole),
-            Action::Wait(over),
-        ];
-        for &action in before.iter().chain(&end) {
-            let mut step = Step { scenario: &self.scenario, sights: Vec::new(), doubted: false };
-            self.step(&mut step, &mut state, action)?;
-        }
-        let is_over = state.program.call.is_none() && state.wrong.is_none();
-        is_over.then(|| State { left: self.budget, requests: 0, told: Told::default(), ..state })
     }
 
     /// Goes through every state.
@@ -231,7 +206,7 @@ impl Search {
         !self.scenario.overtaking || !answers[..place].iter().any(alike)
     }
 
-    fn step(&self, step: &mut Step<'_>, state: &mut State, action: Action) -> Option<()> {
+    pub(crate) fn step(&self, step: &mut Step<'_>, state: &mut State, action: Action) -> Option<()> {
         match action {
             Action::Ask(unit, kind) => state.ask(step, unit, kind),
             Action::Send(heard) => self.send(step, state, heard)?,
