@@ -1,5 +1,6 @@
 //! Each line searched as far as it goes in seconds. `make model` goes further, and breaks the rules one by one.
 
+use drivebus_model::before::NOTHING;
 use drivebus_model::{Budget, Order, SCENARIOS, Scenario, Search};
 
 fn line(name: &str) -> &'static Scenario {
@@ -70,4 +71,15 @@ on the line \"in-order\": a unit that echoes and answers in order, damage, abort
             WRONG: it was not given to this request
 ";
     assert_eq!(trace, expected);
+}
+
+/// What is assumed of such a unit is assumed for a reason.
+#[test]
+fn an_answer_of_another_length_is_believed_where_it_is_the_first_and_overtakes() {
+    let scenario = Scenario { before: NOTHING, ..line("other-lengths").clone() };
+    let budget = Budget { lengths: 1, retries: 0, ..Budget::requests(3) };
+    let (property, trace) = Search::new(&scenario, budget).run(Order::Shortest, 1).refuted.unwrap();
+    assert_eq!(property, "no answer is attributed to a request it was not sent for");
+    assert!(trace.contains("request 1: read 1 word of unit 1, which gives another number of words"), "{trace}");
+    assert!(trace.contains("the answer to request 1 (the words of 2 registers) arrives, while request 3"), "{trace}");
 }
