@@ -422,13 +422,6 @@ BREAKS = [
         "passes(open, expected, false) || (refused",
         "other-lengths --requests 5",
     ),
-    Break(
-        "something damaged may be left of any of its reads",
-        DAMAGED,
-        "&& !any_length.contains(open.unit)",
-        "",
-        "other-lengths --requests 5 --faults 1 --quits 2",
-    ),
     # --- what is forgotten
     Break(
         "what there is no room for is waited for",

@@ -328,7 +328,7 @@ pub const SCENARIOS: &[Scenario] = &[
         before: OTHER_LENGTHS,
         kinds: &[Kind::Read(1), Kind::Read(2)],
         small: Budget { lengths: 1, retries: 0, ..Budget::requests(4) },
-        deep: Budget { lengths: 2, retries: 0, ..Budget::requests(5) },
+        deep: Budget { lengths: 2, quits: 1, retries: 0, ..Budget::requests(5) },
         sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::EndedByEcho, Sight::OtherLength],
         ..LINE
     },
