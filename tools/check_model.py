@@ -211,7 +211,8 @@ BREAKS = [
     Break(
         "a read of the same length tells nothing apart",
         DOUBT,
-        "&& !self.possible(now, unit).any(|open| open.expected.could_pass_for_cut(expected)))",
+        "&& !self\n                    .possible(now, unit)\n                    "
+        ".any(|open| self.could_pass(open, expected) || open.expected.could_pass_for_cut(expected)))",
         ")",
         "in-order",
     ),
