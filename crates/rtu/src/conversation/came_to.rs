@@ -132,7 +132,12 @@ impl<'r> Conversation<'r> {
                 Err(Slip { sent: None, ..slip })
             }
             _ if is_last => Err(self.slip(Unanswered::Doubtful, None, now)),
-            _ => Ok(()),
+            // Where no more is sent, this is what is told.
+            Err(slip) => {
+                self.attempt.tried.failure = Some((Slip { sent: None, ..slip }, self.came));
+                Ok(())
+            }
+            Ok(_) => Ok(()),
         };
         match ended {
             Ok(()) => self.state = State::Passing,
