@@ -55,10 +55,18 @@ def meeting_in_a_folder_of_its_own() -> Iterator[Path]:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def apart() -> Iterator[None]:
-    """No test meets the programs of whoever runs it, nor those of tests that run beside it."""
-    with meeting_in_a_folder_of_its_own():
-        yield
+def apart() -> Iterator[Path]:
+    """Where tests meet no programs of whoever runs them, nor those of tests that run beside them."""
+    with meeting_in_a_folder_of_its_own() as folder:
+        yield folder
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left_to_do(apart: Path) -> Iterator[None]:
+    """No test finds what a program that an earlier one killed left to be done: pseudo-terminals have its name again."""
+    yield
+    for will in apart.glob("*.will"):
+        will.unlink(missing_ok=True)
 
 
 @pytest.fixture
