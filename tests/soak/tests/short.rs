@@ -1,5 +1,7 @@
 //! A few minutes of the soak, so that no change leaves it broken.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::time::Duration;
 
 use drivebus_soak::{Plan, run};
