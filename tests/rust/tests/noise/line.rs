@@ -142,26 +142,29 @@ impl Wire {
         self.format.chars(u32::try_from(characters).unwrap())
     }
 
-    /// Puts on the wire what is due by `until`.
-    fn put(&mut self, until: Instant) {
-        while let Some(first) = (0..self.answering.len()).min_by_key(|&place| self.answering[place].due) {
-            if self.answering[first].due > until {
-                return;
+    /// Puts on the wire what is due first, if that is by `until`.
+    fn put_first(&mut self, until: Instant) -> bool {
+        let first = (0..self.answering.len()).min_by_key(|&place| self.answering[place].due);
+        let Some(first) = first.filter(|&first| self.answering[first].due <= until) else { return false };
+        let Answering { due, characters } = self.answering.remove(first);
+        let begin = due.max(self.busy);
+        for (place, character) in characters.iter().enumerate() {
+            if let Some(byte) = character {
+                self.coming.push_back((begin + self.time_of(place + 1), *byte));
             }
-            let Answering { due, characters } = self.answering.remove(first);
-            let begin = due.max(self.busy);
-            for (place, character) in characters.iter().enumerate() {
-                if let Some(byte) = character {
-                    self.coming.push_back((begin + self.time_of(place + 1), *byte));
-                }
-            }
-            self.busy = begin + self.time_of(characters.len());
         }
+        self.busy = begin + self.time_of(characters.len());
+        true
+    }
+
+    /// When the next character arrives, no later than `until`, as far as nobody sends anything.
+    fn front(&self, until: Instant) -> Instant {
+        self.coming.front().map_or(until, |&(at, _)| at.min(until))
     }
 
     /// Sends `request`, and returns when its last bit has left.
     pub(crate) fn send(&mut self, request: &[u8]) -> Instant {
-        self.put(self.now);
+        while self.put_first(self.now) {}
         let begin = self.now;
         // Two at a time: neither is heard.
         let collides = self.busy > begin;
@@ -178,15 +181,17 @@ impl Wire {
 
     /// The next character that arrives until `until`; `None`: it is `until` then.
     pub(crate) fn next(&mut self, until: Instant) -> Option<u8> {
-        self.put(until.max(self.now));
+        let until = until.max(self.now);
+        // What comes later is put on the wire later: who sends until then finds it free.
+        while self.put_first(self.front(until)) {}
         match self.coming.front() {
-            Some(&(at, byte)) if at <= until.max(self.now) => {
+            Some(&(at, byte)) if at <= until => {
                 self.now = self.now.max(at);
                 self.coming.pop_front();
                 Some(byte)
             }
             _ => {
-                self.now = self.now.max(until);
+                self.now = until;
                 None
             }
         }
