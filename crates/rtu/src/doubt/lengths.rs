@@ -4,7 +4,7 @@
 //! late and in the place of another read's answer is taken for that ([`Assumption::AnswersWhole`](crate::Assumption)).
 
 use super::{Doubts, Open};
-use crate::answer::AnswerError;
+use crate::answer::{Answer, AnswerError};
 use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::{Instant, UnitAddress};
@@ -47,9 +47,11 @@ impl Doubts {
     }
 }
 
-/// Whether `frame` is words of the table that `open` reads.
+/// Whether `frame` is words of the table that `open` reads: not one of which bytes are lost, and which has a right CRC by chance.
 pub(super) fn is_read_by(open: &Open, frame: &Frame<'_>) -> bool {
-    open.expected.is_read() && frame.pdu().first() == Some(&open.expected.function())
+    open.expected.is_read()
+        && frame.pdu().first() == Some(&open.expected.function())
+        && matches!(Answer::parse(frame.pdu()), Ok(Answer::Read { .. }))
 }
 
 /// Whether the answer to `open` could be taken for that to `expected`, by a unit that may give `any_length`.

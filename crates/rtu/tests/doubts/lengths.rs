@@ -77,6 +77,23 @@ fn so_is_one_that_comes_while_another_unit_is_asked() {
     assert!(!prove(&asker, 6_000));
 }
 
+/// One frame in 65 536 that is damaged has a right CRC.
+#[test]
+fn a_frame_whose_bytes_are_not_as_many_as_it_says_teaches_nothing() {
+    for cut in [&[3, 6, 0, 7, 0, 8, 0][..], &[3, 4, 0, 7, 0, 8, 0, 9], &[3, 0], &[3]] {
+        let frame = Adu::answer(unit(1), &Answer::custom(cut).unwrap());
+        let mut asker = Asker::of_a_unit_that_echoes();
+        asker.leaves_open(1_000, unit(1), &read(3));
+        assert_eq!(asker.asks(1_100, unit(2), &WRITE, &frame), Came::Nothing);
+        asker.master.abort(ms(1_200));
+        let came = asker.asks(1_300, unit(1), &read(3), &frame);
+        assert!(came != Came::Answer, "{cut:?}: {came:?}");
+        asker.master.abort(ms(1_400));
+        asker.echoes(6_000, unit(1));
+        assert!(prove(&asker, 6_000), "{cut:?}");
+    }
+}
+
 /// Which of those that are open it is, nothing tells.
 #[test]
 fn none_that_is_seen_ends_a_doubt_about_it() {
