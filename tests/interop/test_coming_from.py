@@ -39,6 +39,7 @@ def words(result: Any) -> object:
 @pytest.mark.parametrize(("theirs", "ours"), rows("instrument."), ids=lambda text: str(text))
 def test_minimalmodbus(simulator: Simulator, theirs: str, ours: str) -> None:
     instrument = minimalmodbus.Instrument(simulator.port, 1, close_port_after_each_call=True)
+    instrument.serial.timeout = 1  # 50 ms from its factory, which a busy machine may need
     _compare(simulator, {"instrument": instrument}, theirs, ours)
 
 
