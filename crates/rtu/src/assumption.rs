@@ -22,7 +22,9 @@ pub enum Assumption {
     /// An answer comes within [`OVERTAKING`](crate::OVERTAKING), or four time-outs where that is longer, of being given up, or
     /// never.
     ///
-    /// What comes later is taken for the answer to what is asked then, where it has its unit, its function and its length.
+    /// What comes later is taken for the answer to what is asked then, where it has its unit, its function and its length. The rest
+    /// of one that broke off comes within a second, or two time-outs where that is less: a later rest may be taken for a damaged
+    /// answer to what is asked then, which is owed no more, and is taken for the next of its length.
     AnswersInTime,
     /// What another program asked before the line was opened is answered in the order it was asked, and within
     /// [`FIRST_CONTACT`](crate::FIRST_CONTACT).

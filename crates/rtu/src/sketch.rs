@@ -90,10 +90,10 @@ pub(crate) fn is_surely_left_of(unit: UnitAddress, expected: Expected, bytes: &[
     is_whole || sketch.has_its_crc(bytes) || lost_its_head(bytes, unit, expected.function(), sketch.len)
 }
 
-/// How many bytes more the answer of `unit` to `expected` has than the `bytes` that came, and how badly these begin it.
-/// Of an answer of unknown length nobody knows.
+/// How many bytes more the answer of `unit` to `expected` has than the `bytes` that came, and how badly these begin it: none
+/// where it has fewer. Of an answer of unknown length nobody knows.
 pub(crate) fn rest_of(unit: UnitAddress, expected: Expected, bytes: &[u8]) -> (usize, usize) {
     let Some(sketch) = Sketch::of(unit, expected) else { return (0, MAX_ADU) };
-    let longer = sketch.lost_in(bytes).unwrap_or(sketch.len);
+    let longer = sketch.lost_in(bytes).unwrap_or(0);
     (sketch.damaged_in(bytes), longer)
 }

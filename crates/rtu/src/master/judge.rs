@@ -293,7 +293,7 @@ impl Master {
             if !self.beside.noise(true).is_empty() || !self.framer.pending().is_empty() {
                 let begun =
                     if self.beside.in_a_row().is_empty() { self.framer.pending() } else { self.beside.in_a_row() };
-                self.torn.broke_off(now, self.doubts.rest(now, unit, expected, begun));
+                self.torn.broke_off(now, self.doubts.rest(now, unit, expected, begun), timeout);
             }
             return Open::Long;
         };

@@ -3,13 +3,12 @@
 //! A unit answers at most once. What is left of its answer is told by where it came, how long it is, and how it begins: unit,
 //! function and number of bytes are known beforehand. It is no other's, as nothing else is open that could look so. But a
 //! line may bring an answer twice, the first time damaged, and the second long after. So each stays open for [`AGAIN`],
-//! until [`ALONE`] were damaged and none came whole by then. Nor is anything believed that is no longer than the rest of
-//! something that broke off before, and may go on: it looks like the end of an answer.
+//! until [`ALONE`] were damaged and none came whole by then. Nor is anything believed for as long that is no longer than the
+//! rest of something that broke off before, and may go on: it looks like the end of an answer.
 
 use core::time::Duration;
 
 use crate::answer::Answer;
-use crate::doubt::OVERTAKING;
 use crate::expected::Expected;
 use crate::frame::Frame;
 use crate::framer::lost_its_head;
@@ -60,10 +59,12 @@ impl Torn {
         *self = Self { rest: self.rest, ..Self::NONE };
     }
 
-    /// Something came by `now` in the place of an answer, or before it, that cannot be told: `rest` bytes of it may follow.
-    pub(super) fn broke_off(&mut self, now: Instant, rest: usize) {
-        let before = self.rest.filter(|&(until, _)| now < until).map_or(0, |(_, rest)| rest);
-        self.rest = Some((now + OVERTAKING, rest.max(before)));
+    /// Something came by `now` in the place of an answer, or before it, that cannot be told: `rest` bytes of it may follow, as long
+    /// as it may come again. It was waited for for `timeout`.
+    pub(super) fn broke_off(&mut self, now: Instant, rest: usize, timeout: Duration) {
+        let before = self.rest.filter(|&(until, _)| now < until);
+        let until = before.map_or(now, |(until, _)| until).max(now + again(timeout));
+        self.rest = Some((until, before.map_or(rest, |(_, before)| rest.max(before))));
     }
 
     /// `len` bytes of the answer of `unit` to `expected` came damaged at `now`. It was waited for for `timeout`.
