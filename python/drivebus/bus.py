@@ -52,7 +52,8 @@ class Bus(BusFace, Requests):
         timeout: Seconds to wait for an answer after the request has left.
         retries: How often a *read* is repeated after silence; a damaged answer, which took no time-out, counts half.
             Writes are never repeated, unless they can be read back: see `write`.
-        read_only: Refuse every write before it is sent.
+        read_only: Refuse before it is sent every write, and bytes that have not the form of a read (`transact`): to a
+            unit that speaks another protocol they may be a command.
         rs485: Direction control, for ports wired to a bare transceiver: `{"mode": "kernel"}` by the driver, `"rts"` by
             this program, `"auto"` by whichever can; with `rts_on_send`, `delay_before_ms`, `delay_after_ms`.
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.

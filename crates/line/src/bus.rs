@@ -169,13 +169,8 @@ impl Bus {
             return Err(ask.failed(Failure::Forked, None, None, &[]));
         }
         let ask = self.port().ask(destination, request, &options);
-        if self.port().options.read_only && request.is_write() {
-            return Err(ask.failed(
-                Failure::ReadOnly { function: request.function() },
-                None,
-                self.port().now_if_known(),
-                &[],
-            ));
+        if let Some(failure) = self.port().options.kept_from(request) {
+            return Err(ask.failed(failure, None, self.port().now_if_known(), &[]));
         }
         let mut give_up = || self.is_shut() || give_up();
         let result = match &self.shared.sharing {

@@ -169,6 +169,15 @@ pub enum Failure {
         /// The function asked for.
         function: u8,
     },
+    /// The bus was opened for reading only, and the request has not the form that a read of its function has. Nothing was sent.
+    #[error(
+        "this bus is read-only: the request has not the form of a read of function {function:02X}H, and what has another \
+         may be a write or a command to the unit, as 02H and 03H are in Huanyang's own protocol, so nothing was sent"
+    )]
+    NotARead {
+        /// The function asked for.
+        function: u8,
+    },
     /// As many wait for the line as may. Nothing was sent.
     #[error("{room} requests wait for this line already, and no more may; nothing was sent")]
     QueueFull {

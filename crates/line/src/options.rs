@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{OwnEcho, SerialFormat, TURNAROUND, UnitAddress};
+use drivebus_rtu::{OwnEcho, Request, SerialFormat, TURNAROUND, UnitAddress};
 
+use crate::error::Failure;
 use crate::turns::order::Priority;
 use crate::turns::queue::DEFAULT_QUEUE;
 
@@ -17,7 +18,8 @@ pub struct BusOptions {
     pub timeout: Duration,
     /// How often a read is asked once more. A damaged answer, which took no time-out, counts half. A write is never.
     pub retries: u32,
-    /// Whether every request that may change something in a unit is refused before it is sent.
+    /// Whether every request that may change something in a unit is refused before it is sent; also bytes that have not the
+    /// form of a read, by which a unit that speaks no Modbus may be told something.
     pub read_only: bool,
     /// What is known about the adapter sending our own bytes back.
     pub echo: AdapterEcho,
@@ -73,6 +75,16 @@ impl BusOptions {
     #[must_use]
     pub const fn read_only(self, read_only: bool) -> Self {
         Self { read_only, ..self }
+    }
+
+    /// Why `request` is not sent over a bus that is for reading only; `None` of one that is.
+    pub(crate) fn kept_from(&self, request: &Request<'_>) -> Option<Failure> {
+        let function = request.function();
+        match (self.read_only, request.is_write(), request.only_reads()) {
+            (false, _, _) | (true, false, true) => None,
+            (true, true, _) => Some(Failure::ReadOnly { function }),
+            (true, false, false) => Some(Failure::NotARead { function }),
+        }
     }
 
     /// Sets [`echo`](Self#structfield.echo).

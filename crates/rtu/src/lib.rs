@@ -17,6 +17,7 @@ mod framer;
 mod inside;
 mod master;
 mod meaning;
+mod only_reads;
 mod others;
 mod pdu;
 mod raw;

@@ -172,6 +172,73 @@ fn a_write_is_known_as_one() {
     }
 }
 
+/// Forms: *Modbus Application Protocol* V1.1b3, §6.1 to §6.4, §6.7, §6.8, §6.9, §6.10, §6.13, §6.14, §6.18. Huanyang's own
+/// protocol is as LinuxCNC has it, src/hal/user_comps/huanyang-vfd/hy_modbus.c: function, number of bytes, bytes; 02H writes a
+/// parameter, 03H is a command, 04H reads a status.
+#[test]
+fn only_what_has_the_form_of_a_read_is_known_to_be_one() {
+    let only_reads = |pdu: &[u8]| Request::custom(pdu, AnswerLength::BySilence).unwrap().only_reads();
+    for function in 0x01..=0x04 {
+        assert!(only_reads(&[function, 0, 19, 0, 19]), "{function:02X}H");
+        assert!(only_reads(&[function, 0xFF, 0xFF, 0, 1]), "{function:02X}H");
+        let most: u16 = if function < 3 { 2000 } else { 125 };
+        for (count, good) in [(0, false), (1, true), (most, true), (most + 1, false), (0xFFFF, false)] {
+            let [c1, c0] = count.to_be_bytes();
+            assert_eq!(only_reads(&[function, 0, 0, c1, c0]), good, "{function:02X}H, {count}");
+        }
+        assert!(!only_reads(&[function, 0xFF, 0xFF, 0, 2]), "beyond the last");
+        let long = [function, 0, 19, 0, 19, 0, 0];
+        for length in (1..=4).chain([6, 7]) {
+            assert!(!only_reads(&long[..length]), "{function:02X}H, {length} bytes");
+        }
+    }
+    for command in [0x01, 0x11, 0x08] {
+        assert!(!only_reads(&[0x03, 1, command]), "runs, reverses, stops");
+    }
+    for word in [0u16, 1, 8, 2000, 2001, 0xFFFF] {
+        let [w1, w0] = word.to_be_bytes();
+        assert!(!only_reads(&[0x02, 3, 5, w1, w0]), "writes {word} to PD005, byte for byte");
+    }
+    assert!(only_reads(&[0x04, 3, 0, 0, 0]), "asks for a status; to a unit of Modbus it is a read of nothing");
+    assert!(!only_reads(&[0x04, 2, 0, 0, 0]));
+    for (pdu, good) in [
+        (&[0x07][..], true),
+        (&[0x07, 0], false),
+        (&[0x0B], true),
+        (&[0x0C], true),
+        (&[0x0C, 1, 2], false),
+        (&[0x11], true),
+        (&[0x11, 0], false),
+        (&[0x08, 0, 0, 0xA5, 0x37], true),
+        (&[0x08, 0, 0, 1, 2, 3, 4], true),
+        (&[0x08, 0, 2, 0, 0], true),
+        (&[0x08, 0, 0x0B, 0, 0], true),
+        (&[0x08, 0, 0x0B], false),
+        (&[0x08, 0, 1, 0, 0], false),
+        (&[0x08], false),
+        (&[0x14, 7, 6, 0, 4, 0, 1, 0, 2], true),
+        (&[0x14, 7, 5, 0, 4, 0, 1, 0, 2], false),
+        (&[0x14, 14, 6, 0, 4, 0, 1, 0, 2], false),
+        (&[0x14, 0], false),
+        (&[0x14], false),
+        (&[0x18, 0x04, 0xDE], true),
+        (&[0x18, 0x04], false),
+        (&[0x05, 0, 0, 0xFF, 0], false),
+        (&[0x06, 0, 0, 0, 0], false),
+        (&[0x2B, 14, 1, 0], false),
+        (&[0x41], false),
+    ] {
+        assert_eq!(only_reads(pdu), good, "{pdu:02X?}");
+    }
+    for table in Table::ALL {
+        assert!(Request::read_of(table, 0x0305, 17).unwrap().only_reads(), "who says so means the table");
+    }
+    assert!(Request::echo(7).only_reads());
+    assert!(!Request::write(0, 0).only_reads());
+    assert!(!Request::write_coil(0, true).only_reads());
+    assert!(!Request::write_many(0, &[0]).unwrap().only_reads());
+}
+
 #[test]
 fn a_refusal_of_another_function_is_no_answer() {
     let expected = Request::read(0, 1).unwrap().expected();

@@ -44,11 +44,10 @@ impl Bus {
         } else if self.is_shut() {
             Failure::Closed
         } else {
-            match errand.request(|| 0) {
-                Some(request) if self.options().read_only && request.is_write() => {
-                    Failure::ReadOnly { function: request.function() }
-                }
-                request => return self.enqueue(request.is_some_and(|request| request.is_write()), errand),
+            let request = errand.request(|| 0);
+            match request.and_then(|request| self.options().kept_from(&request)) {
+                Some(failure) => failure,
+                None => return self.enqueue(request.is_some_and(|request| request.is_write()), errand),
             }
         };
         errand.fail(failure, self.port().now_if_known());

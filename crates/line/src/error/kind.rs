@@ -39,9 +39,11 @@ impl Failure {
     fn kind_of(&self, came: bool) -> ErrorKind {
         match self {
             Self::Port(_) | Self::Reopened | Self::Forked | Self::Closed => ErrorKind::Port,
-            Self::NotBegun(_) | Self::ReadOnly { .. } | Self::QueueFull { .. } | Self::BeingStopped { .. } => {
-                ErrorKind::NotAllowed
-            }
+            Self::NotBegun(_)
+            | Self::ReadOnly { .. }
+            | Self::NotARead { .. }
+            | Self::QueueFull { .. }
+            | Self::BeingStopped { .. } => ErrorKind::NotAllowed,
             Self::Doubtful | Self::NotAsked { .. } | Self::Unreached => ErrorKind::NoAnswer,
             Self::NotTaken { .. } | Self::Limited { .. } | Self::Acknowledged { .. } => ErrorKind::Unconfirmed,
             Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,

@@ -97,7 +97,8 @@ impl From<&Failure> for Said {
             Failure::Reopened => Self::Reopened,
             Failure::Closed | Failure::Forked => Self::Closed,
             Failure::Interrupted => Self::Interrupted,
-            Failure::ReadOnly { function } => Self::ReadOnly { function: *function },
+            // Each program looks at its own requests before it hands them over.
+            Failure::ReadOnly { function } | Failure::NotARead { function } => Self::ReadOnly { function: *function },
             Failure::QueueFull { room } => Self::QueueFull { room: whole(*room) },
             Failure::BeingStopped { unit, program, process } => {
                 Self::BeingStopped { unit: *unit, program: program.clone(), process: *process }
