@@ -6,6 +6,7 @@ the streams is described in `src/stream.rs`.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import tomli
@@ -219,7 +220,7 @@ def buses() -> dict[str, bytes]:
 
 def guests() -> dict[str, bytes]:
     """For `guest`: whether it is greeted rightly, then messages as `postcard` writes them, each behind its length."""
-    calls, listening, figures, link, word, reconnects, cancel = range(7)
+    calls, listening, overhearing, figures, link, word, reconnects, wills, cancel = range(9)
     second = b"\x80\x94\xeb\xdc\x03"  # nanoseconds, seven bits a byte
     for_ever = b"\xff" * 9 + b"\x01"
 
@@ -232,7 +233,9 @@ def guests() -> dict[str, bytes]:
 
     read, write, echo = bytes([3, 0x21, 3, 0, 1]), bytes([6, 0x80, 11, 0, 5]), bytes([8, 0, 0, 0x12, 0xAB])
     many = bytes([16, 0x80, 11, 0, 2, 4, 0, 1, 0, 2])
-    hello = b"drivebus share \4\1f\x80\x96\1\x08E\1"
+    [version] = re.findall(rb'GREETING.*b"drivebus share \\x(..)"', (HERE / "src/guest.rs").read_bytes())
+    other = bytes([int(version, 16) - 1])
+    hello = b"drivebus share " + bytes.fromhex(version.decode()) + b"\1f\x80\x96\1\x08E\1\0"
     greet = b"\0" + bytes([len(hello)]) + hello
     return {
         "read": say(call(read)),
@@ -252,9 +255,12 @@ def guests() -> dict[str, bytes]:
         "asks-for-figures": say(*(bytes([kind]) for kind in (figures, word, reconnects)), bytes([link, 1])),
         "listens": say(bytes([listening]) + second),
         "listens-for-ever": say(bytes([listening]) + for_ever),
+        "overhears": say(bytes([overhearing]) + second),
+        "tells-of-a-will": say(bytes([wills])),
         "cancels": say(bytes([cancel]), bytes([listening]) + second + bytes([cancel])),
         "greets-itself": greet + bytes([1, word]),
-        "another-version": b"\0" + bytes([len(hello)]) + hello.replace(b" \4", b" \3"),
+        "greets-for-a-stop": b"\0" + bytes([len(hello)]) + hello[:-1] + b"\1" + bytes([1, word]),
+        "another-version": b"\0" + bytes([len(hello)]) + hello[:15] + other + hello[16:],
         "other-characters": b"\0" + bytes([len(hello)]) + hello.replace(b"E", b"N"),
         "no-greeting": b"\0" + b"\5hello",
         "too-long": b"\1\xff\4\xff\xff\0\0",
