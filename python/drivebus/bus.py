@@ -13,6 +13,7 @@ from typing import Any, TypeVar, overload
 
 from drivebus import _native
 from drivebus.attributes import known_only
+from drivebus.checks import UNITS
 from drivebus.drive import Drive
 from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
@@ -136,7 +137,7 @@ class Bus(BusFace, Requests):
         self.close()
 
     def scan(
-        self, units: Iterable[int] = range(1, 248), timeout: float | None = None, *, protocol: str = "auto"
+        self, units: Iterable[int] = UNITS, timeout: float | None = None, *, protocol: str = "auto"
     ) -> Iterator[Found]:
         """Asks each of *units* for its family, with the line's own settings, and yields those that answer at once.
 
@@ -216,7 +217,8 @@ class Bus(BusFace, Requests):
             NotAllowed: No such profile or variant; or what the drive tells is not sure enough: give a profile.
             NoAnswer, BadAnswer: The drive did not tell; only if *profile* is None.
         """
-        unit = self._opening.known.addresses.unit(unit, changes=True)
+        # Over a bus that is for reading only nothing is written to whoever it is.
+        unit = self._opening.known.addresses.unit(unit, changes=not self.read_only)
         check_trust(profile, trust_profile)
         known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified, urgent))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)

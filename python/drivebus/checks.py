@@ -15,6 +15,7 @@ from drivebus import places
 from drivebus.errors import NotAllowed
 
 __all__ = [
+    "UNITS",
     "address",
     "closest",
     "digits",
@@ -29,6 +30,9 @@ __all__ = [
     "unread",
     "whole",
 ]
+
+UNITS = range(1, 248)
+"""The addresses that the specification gives to units. Which others a line has, `drivebus.line.addresses` knows."""
 
 _MOST_DIGITS = 20
 """Digits of the largest number that anything here can be: 2 ** 64 - 1."""
@@ -51,13 +55,13 @@ def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = 
 
 def unit(value: object) -> int:
     """A unit address, 1..247. Broadcast has a method of its own."""
-    if type(value) is int and 0 < value <= 247:
+    if type(value) is int and value in UNITS:
         return value
     if value == 0 and not isinstance(value, bool):
         raise NotAllowed(
             "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()"
         )
-    return whole("unit", value, 1, 247)
+    return whole("unit", value, UNITS[0], UNITS[-1])
 
 
 def address(value: object) -> int:

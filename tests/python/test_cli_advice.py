@@ -22,11 +22,9 @@ OF_PROGRAMS = (
     "to_pandas()",
     "prepare_control(setpoint=",
     "poll() takes",
-    "or use broadcast()",
     "resume=False",
     "read() needs",
     "with_variants()",
-    "reserved=True",
 )
 
 

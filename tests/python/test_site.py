@@ -97,7 +97,8 @@ def test_drives_are_chosen_by_name_and_by_group_each_once(tmp_path: Path) -> Non
             '[lines.hall]\nprot = "a"',
             [
                 "1: lines.hall has no port",
-                '2: "prot" is not known here; did you mean "port"?; allowed is "port", "baud", "format", "rs485"',
+                '2: "prot" is not known here; did you mean "port"?; allowed is "port", "baud", "format", "rs485", '
+                '"reserved"',
             ],
         ),
         ('[drives.pump1]\nline = "hall"\nunit = 1', ['2: there is no line "hall"; there are none']),

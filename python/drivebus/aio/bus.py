@@ -16,6 +16,7 @@ from drivebus.aio.poll import Poll
 from drivebus.aio.requests import AwaitedRequests
 from drivebus.attributes import known_only
 from drivebus.bus import Bus as BlockingFace
+from drivebus.checks import UNITS
 from drivebus.errors import PortError
 from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
@@ -218,7 +219,7 @@ class Bus(BusFace):
         return await self._asked().link(unit)
 
     def scan(
-        self, units: Iterable[int] = range(1, 248), timeout: float | None = None, *, protocol: str = "auto"
+        self, units: Iterable[int] = UNITS, timeout: float | None = None, *, protocol: str = "auto"
     ) -> AsyncIterator[Found]:
         """As `drivebus.Bus.scan`, for `async for`."""
         limit = scan.time_for(timeout, self.timeout)
@@ -258,7 +259,8 @@ class Bus(BusFace):
         urgent: bool = False,
     ) -> Drive:
         """The drive at *unit*. Arguments and errors as in `drivebus.Bus.drive`."""
-        unit = self._opening.known.addresses.unit(unit, changes=True)
+        # Over a bus that is for reading only nothing is written to whoever it is.
+        unit = self._opening.known.addresses.unit(unit, changes=not self.read_only)
         check_trust(profile, trust_profile)
         known, code = await profile_of(self, unit, profile, variants, unverified, urgent)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)

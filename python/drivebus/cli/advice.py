@@ -12,6 +12,9 @@ _WHOLE = {
     "prepare_control() (`drivebus prepare`)": "`drivebus prepare`",
     ", or for terminals and the special control word their own methods": "",
     "; line.unplug() pulls out any port": "",
+    "give reserved=True to the bus": "give --reserved",
+    "; or use broadcast()": "",
+    ", or use broadcast()": "",
     "Write it by a drive without variants=…": "Write it without `--variant`",
 }
 """Advice that reads otherwise here as a whole."""

@@ -15,7 +15,7 @@ import click
 
 import drivebus
 from drivebus.cli.anywhere import in_front
-from drivebus.cli.choose import chosen, complete_drive, complete_port, parse_unit_list
+from drivebus.cli.choose import chosen, complete_drive, complete_port
 from drivebus.cli.commands import GROUPS, Commands
 from drivebus.cli.listing import first_sentence
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
@@ -28,7 +28,8 @@ __all__ = ["cli", "main"]
 
 # Each variable is named by hand: with click's own prefix, DRIVEBUS_RUN_YES would answer the question before a motor
 # starts, and DRIVEBUS_WRITE_STORE would wear EEPROM, without a word on the command line. --trust-profile has none: set
-# for one drive, it would be believed of the next.
+# for one drive, it would be believed of the next. Nor has --reserved: what it lets be written may reach all behind a
+# gateway.
 
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:
@@ -161,8 +162,12 @@ class _Program(click.Group):
     default="1",
     show_default=True,
     envvar="DRIVEBUS_UNIT",
-    callback=parse_unit_list,
     help="Unit address, or several: 1-4,7.",
+)
+@click.option(
+    "--reserved",
+    is_flag=True,
+    help="The line has units that the specification reserves: 248 to 254, and over tcp:// a device at 0 to write to.",
 )
 @click.option(
     "--drive",
@@ -235,7 +240,8 @@ def cli(
     baud: int,
     line_format: tuple[str, str, str],
     rs485: str | None,
-    units: list[int],
+    units: str,
+    reserved: bool,
     drives: tuple[str, ...],
     config: str | None,
     profile: str | None,
@@ -264,7 +270,7 @@ def cli(
         port,
         baud,
         line_format,
-        units[0],
+        1,
         profile,
         out,
         rs485,
@@ -272,6 +278,7 @@ def cli(
         variants,
         trust_profile,
         read_only,
+        reserved=reserved,
         capture=capture,
     )
     context.obj = chosen(context, base, drives, units, config)

@@ -12,13 +12,13 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 import drivebus
-from drivebus.cli.names import parse_units
+from drivebus.cli.names import EVERYBODY, parse_units
 from drivebus.cli.session import Session
 
 if TYPE_CHECKING:
     from drivebus.site import Site, SiteDrive, SiteLine
 
-__all__ = ["chosen", "complete_drive", "complete_port", "find_site", "of_drive", "parse_unit_list"]
+__all__ = ["chosen", "complete_drive", "complete_port", "find_site", "of_drive"]
 
 _NOT_WITH_NAMES = {
     "port": "--port",
@@ -30,14 +30,12 @@ _NOT_WITH_NAMES = {
 """What `drivebus.toml` says of a drive."""
 
 
-def chosen(
-    context: click.Context, base: Session, names: Sequence[str], units: Sequence[int], file: str | None
-) -> Session:
+def chosen(context: click.Context, base: Session, names: Sequence[str], units: str, file: str | None) -> Session:
     """The session for what was named: *base* for one drive, with one of each in `several` where there are more.
 
     Raises:
         NotAllowed: `drivebus.toml` has a mistake, or no such drive.
-        click.UsageError: A drive is named, and where it is as well.
+        click.UsageError: A drive is named, and where it is as well; or a unit that the line has not.
     """
     if names:
         for parameter, option in _NOT_WITH_NAMES.items():
@@ -49,8 +47,14 @@ def chosen(
         line = _line_called(base.port, file)
         if line is not None:
             base = _on(base, line, context)
-        sessions = [replace(base, unit=unit) for unit in units]
-    return sessions[0] if len(sessions) == 1 else replace(base, several=tuple(sessions))
+        # Where no port is given, a command may have one of its own.
+        addresses = EVERYBODY if base.port is None else base.addresses
+        sessions = [replace(base, unit=unit) for unit in dict.fromkeys(parse_units(units, addresses))]
+    if len(sessions) == 1:
+        return sessions[0]
+    looked_at = {one.port for one in sessions if one.may_only_look and not one.read_only}
+    several = tuple(replace(one, beside_unit_0=one.port in looked_at) for one in sessions)
+    return replace(base, several=several)
 
 
 def find_site(file: str | None, needed: bool = False) -> Site:
@@ -100,6 +104,7 @@ def of_drive(base: Session, drive: SiteDrive) -> Session:
         variants={**drive.variants, **base.variants},
         unverified=base.unverified or drive.unverified,
         read_only=base.read_only or drive.read_only,
+        reserved=base.reserved or drive.line.reserved,
     )
 
 
@@ -116,17 +121,13 @@ def _on(base: Session, line: SiteLine, context: click.Context) -> Session:
         baud=base.baud if typed("baud") else baud,
         line_format=base.line_format if typed("line_format") else line_format,
         rs485=base.rs485 if typed("rs485") else line.rs485,
+        reserved=base.reserved or line.reserved,
     )
 
 
 def _characters(base: Session, line: SiteLine) -> tuple[int, tuple[str, str, str]]:
     bits = base.line_format if line.format is None else (line.format[0], line.format[1], line.format[2])
     return base.baud if line.baud is None else line.baud, bits
-
-
-def parse_unit_list(_context: click.Context, _parameter: click.Parameter, text: str) -> list[int]:
-    """Units of a text such as `1`, `1-4` or `1,3`, each once."""
-    return list(dict.fromkeys(parse_units(text)))
 
 
 def complete_drive(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -25,7 +25,7 @@ _STYLES = {"ok": "green", "note": "", "warning": "bold yellow", "fault": "bold r
 
 @click.command()
 @click.argument("port", required=False)
-@click.option("--unit", "-u", type=Whole(1, 247), help="Only this one.  [default: whoever answers]")
+@click.option("--unit", "-u", type=Whole(0, 255), help="Only this one.  [default: whoever answers]")
 @click.option("--baud", "-b", type=Whole(1), help="Bits per second it should be.  [default: 19200]")
 @click.option(
     "--format",
@@ -80,6 +80,7 @@ def doctor(
             rs485=session.direction,
             profile=session.profile,
             unverified=session.unverified,
+            reserved=session.reserved,
             tell=(lambda text: status.update(show(text))) if status is not None else None,
         )
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.

@@ -16,7 +16,7 @@ def opened_lines(
     """Each line with its drives, and what was said of each. *opened* closes the lines."""
     lines: dict[str, tuple[drivebus.Bus, list[tuple[Session, drivebus.Drive]]]] = {}
     for one in session.several or (session,):
-        key = repr((one.port, one.baud, one.line_format, one.rs485, one.read_only))
+        key = one.line_key
         if key not in lines:
             lines[key] = opened.enter_context(one.bus()), []
         bus, drives = lines[key]

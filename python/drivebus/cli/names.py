@@ -8,9 +8,12 @@ import click
 from click.shell_completion import CompletionItem
 
 import drivebus
+from drivebus.cli.advice import in_commands
 from drivebus.cli.types import with_a_point
+from drivebus.line.addresses import Addresses
 
 __all__ = [
+    "EVERYBODY",
     "complete_assignment",
     "complete_group",
     "complete_name",
@@ -27,6 +30,9 @@ __all__ = [
     "resolve",
     "without_unit",
 ]
+
+EVERYBODY = Addresses(tcp=True, reserved=True)
+"""The addresses that a frame can carry, where the line is not known."""
 
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 
@@ -101,18 +107,22 @@ def parse_hex(parts: tuple[str, ...]) -> bytes:
         ) from None
 
 
-def parse_units(text: str) -> list[int]:
-    """Units of a text such as `1-31,40`."""
+def parse_units(text: str, addresses: Addresses = EVERYBODY) -> list[int]:
+    """Units of a text such as `1-31,40`, if the line has such *addresses*; which those are may not be known yet."""
     units: list[int] = []
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,20})\s*(?:-\s*(\d{1,20})\s*)?", part)
         if match is None:
             raise click.UsageError(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
         first, last = int(match[1]), int(match[2] or match[1])
-        if not (1 <= first <= 247 and 1 <= last <= 247):
+        # What a line has is without a gap.
+        why = addresses.why_not(first) or addresses.why_not(last)
+        if why:
             which = "unit" if match[2] is None else "units"
             are = "is" if match[2] is None else "are"
-            raise click.UsageError(f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247')
+            raise click.UsageError(
+                f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247; {in_commands(why)}'
+            )
         if first > last:
             raise click.UsageError(f'units "{part.strip()}": the first is above the last; write {last}-{first}')
         units.extend(range(first, last + 1))

@@ -73,7 +73,8 @@ def scan(
         return
     if full:
         raise click.UsageError("--full is for --search: give that too")
-    wanted = names.parse_units(units)
+    session.one_port()
+    wanted = names.parse_units(units, session.addresses)
     # On the console that the lines go to, so that they stand above the bar.
     bar = Progress(console=session.out.console, transient=True, disable=not session.out.live)
     with session.bus() as bus, bar as progress:

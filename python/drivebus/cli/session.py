@@ -18,6 +18,7 @@ from drivebus.cli.advice import in_commands
 from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import Output, remark
 from drivebus.cli.types import Seconds
+from drivebus.line.addresses import Addresses
 from drivebus.site import forget, known_family, remember
 
 if TYPE_CHECKING:
@@ -84,8 +85,10 @@ class Session:
         variants: What parameters of the drive make of its registers, by name.
         trust_profile: Whether the profile is meant, whatever the drive says of itself.
         read_only: Whether nothing may be written to a drive.
+        reserved: Whether the line has units that the specification reserves, as `drivebus.Bus` takes it.
         capture: The file that gets each frame on the line; None: no file.
         name: What the drive is called in `drivebus.toml`; empty where it was not chosen by name.
+        beside_unit_0: Whether one of those on the same line, chosen as well, is a unit 0 that may only be looked at.
         several: One session for each drive, where several were chosen.
         crew: The others that work beside this one, where several drives were chosen.
     """
@@ -101,10 +104,13 @@ class Session:
     variants: Mapping[str, str] = field(default_factory=dict)
     trust_profile: bool = False
     read_only: bool = False
+    reserved: bool = False
     capture: str | None = None
     name: str = ""
+    beside_unit_0: bool = False
     several: tuple[Session, ...] = ()
     crew: Crew | None = None
+    _writes: bool = field(default=False, init=False)
 
     @property
     def called(self) -> str:
@@ -130,6 +136,33 @@ class Session:
         return self.port
 
     @property
+    def addresses(self) -> Addresses:
+        """Which units the line may have."""
+        return Addresses.of(self.port, reserved=self.reserved)
+
+    @property
+    def may_only_look(self) -> bool:
+        """Whether nothing may be written to the unit: it was said so, or what is written to it may be for others."""
+        try:
+            self.addresses.unit(self.unit, changes=True)
+        except drivebus.NotAllowed:
+            return True
+        return self.read_only
+
+    @property
+    def opens_read_only(self) -> bool:
+        """Whether its bus is for reading only.
+
+        Who has not said that it writes shares the bus of one that may not: many a gateway has one connection.
+        """
+        return self.may_only_look or (self.beside_unit_0 and not self._writes)
+
+    @property
+    def line_key(self) -> str:
+        """What is the same for all drives that can be asked over one bus."""
+        return repr((self.port, self.baud, self.line_format, self.rs485, self.reserved, self.opens_read_only))
+
+    @property
     def serial_format(self) -> drivebus.SerialFormat:
         """How characters look on the line that the options name."""
         bits, parity, stop = self.line_format
@@ -147,7 +180,8 @@ class Session:
             "stopbits": int(stop),
             "rs485": self.direction,
             "trace": self.capture,
-            "read_only": self.read_only,
+            "read_only": self.opens_read_only,
+            "reserved": self.reserved,
             **options,
         }
         if self.crew is not None:
@@ -236,8 +270,13 @@ class Session:
             remember(str(self.port), found.unit, family)
 
     def will_write(self) -> None:
-        """Refuses a command that writes where only looking was asked for, before anything is opened."""
+        """Refuses a command that writes where only looking was asked for, before anything is opened.
+
+        So it does where the unit is 0 over `tcp://`, and nobody said that it is a device.
+        """
         if not self.read_only:
+            self.addresses.unit(self.unit, changes=True)
+            self._writes = True
             return
         context = click.get_current_context()
         name, group = context.info_name, context.parent
@@ -289,6 +328,8 @@ class Session:
             words.append(f"--format {''.join(self.line_format)}")
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
+        if self.reserved:
+            words.append("--reserved")
         return words
 
     def doctor(self, unit: int | None = None) -> str:
@@ -300,6 +341,8 @@ class Session:
             words.append(f"--baud {self.baud}")
         if self.line_format != DEFAULT_FORMAT:
             words.append(f"--format {''.join(self.line_format)}")
+        if self.reserved:
+            words.append("--reserved")
         return " ".join(words)
 
     def ask_if_running(self, drive: drivebus.Drive, what: str, yes: bool) -> None:

@@ -66,7 +66,9 @@ def _lines(context: click.Context, session: Session) -> list[tuple[Session, dict
         drives.setdefault(drive.unit, one)
     for port, (line, drives) in lines.items():
         for unit in families_on(port):
-            drives.setdefault(unit, replace(line, name="", unit=unit))
+            # A reserved one was asked for by name when it was kept.
+            reserved = line.reserved or bool(line.addresses.why_not(unit))
+            drives.setdefault(unit, replace(line, name="", unit=unit, reserved=reserved))
     if not lines:
         session.one_port()
     return list(lines.values())
@@ -87,7 +89,8 @@ def _stop_line(line: Session, drives: dict[int, Session], within: float, done: _
         except drivebus.NotAllowed as error:
             failures[unit] = error
     allowed = {unit: one for unit, one in drives.items() if unit not in failures}
-    with line.bus() as bus:
+    has_reserved = any(one.reserved for one in allowed.values())
+    with line.bus(read_only=line.read_only, reserved=has_reserved) as bus:
         families = families_on(str(line.port))
         known = {
             unit: bus.drive(

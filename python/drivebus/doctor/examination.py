@@ -22,6 +22,7 @@ from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard, overheard
 from drivebus.doctor.unit import UnitExamination
 from drivebus.errors import PortError
 from drivebus.identify.results import Found
+from drivebus.line.addresses import Addresses
 from drivebus.profile import Profile
 from drivebus.searching.order import candidates
 from drivebus.searching.settings import Settings, can_be_changed
@@ -55,6 +56,7 @@ def examine(
     rs485: Mapping[str, object] | None = None,
     profile: str | os.PathLike[str] | Profile | None = None,
     unverified: bool = False,
+    reserved: bool = False,
     tell: Callable[[str], None] | None = None,
     open: Callable[..., Bus] = Bus,  # noqa: A002 - what it is
 ) -> Generator[Finding, None, None]:
@@ -65,7 +67,7 @@ def examine(
 
     Args:
         port: As for `Bus`.
-        unit: 1..247.
+        unit: 1..247, or another that the line has: see *reserved*.
         baudrate: Bits per second that the line is expected to be set to.
         parity: The same for `"N"`, `"E"` or `"O"`.
         stopbits: The same for 1 or 2.
@@ -76,6 +78,7 @@ def examine(
         rs485: As for `Bus`.
         profile: What those units are that do not say it themselves; as for `Bus.drive`.
         unverified: Whether what no document of a family proves is read too.
+        reserved: Whether the line has units that the specification reserves, as for `Bus`.
         tell: Is called with what is being done, for whoever watches.
         open: What opens a bus; called as `Bus` is, for each of the settings tried.
 
@@ -83,8 +86,9 @@ def examine(
         NotAllowed: An argument is wrong.
         PortError: The port was lost meanwhile.
     """
+    checks.flag("reserved", reserved)
     if unit is not None:
-        checks.unit(unit)
+        Addresses.of(port, reserved=reserved).unit(unit)
     listen = checks.number("listen", listen, 0.0, 3600.0)
     echoes = checks.whole("echoes", echoes, 1, 100_000) * (10 if full else 1)
     named = None if profile is None else Profile.find(profile)
@@ -100,6 +104,7 @@ def examine(
         rs485=rs485,
         named=named,
         unverified=unverified,
+        reserved=reserved,
         tell=tell or (lambda _: None),
         open=open,
     )
@@ -120,6 +125,7 @@ class Examination:
         rs485: As for `Bus`.
         named: What those units are that do not say it themselves.
         unverified: Whether what no document of a family proves is read too.
+        reserved: Whether the line has units that the specification reserves.
         tell: Is called with what is being done.
         open: What opens a bus.
         found: Who answers.
@@ -137,6 +143,7 @@ class Examination:
     rs485: Mapping[str, object] | None
     named: Profile | None
     unverified: bool
+    reserved: bool
     tell: Callable[[str], None]
     open: Callable[..., Bus]
     found: list[Found] = field(init=False, default_factory=list)
@@ -278,7 +285,8 @@ class Examination:
 
     def _opened(self, settings: Settings) -> Bus:
         """The line at *settings*, for reading only, and to itself: its figures tell of nobody else's requests."""
-        return self.open(self.port, **vars(settings), rs485=self.rs485, read_only=True, share="never")
+        how = {"rs485": self.rs485, "read_only": True, "share": "never", "reserved": self.reserved}
+        return self.open(self.port, **vars(settings), **how)
 
     def _count_noise(self, bus: Bus) -> None:
         self.noise += int(bus.stats()["noise_bytes"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from drivebus.bus import Bus
+from drivebus.checks import UNITS
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify.results import Found
@@ -21,7 +22,7 @@ def units_to_ask(unit: int | None, full: bool, elsewhere: bool = False) -> Seque
     if unit is not None:
         return [unit]
     if full:
-        return range(1, 33) if elsewhere else range(1, 248)
+        return range(1, 33) if elsewhere else UNITS
     return range(1, 4) if elsewhere else range(1, 33)
 
 

@@ -14,6 +14,9 @@ __all__ = ["Addresses", "only_reads"]
 _READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x11, 0x2B})
 """Functions that change nothing in whoever hears them."""
 
+_HIGHEST = 255
+"""The highest address that a frame can carry."""
+
 
 class Addresses:
     """The units of one line.
@@ -29,29 +32,43 @@ class Addresses:
         self._tcp = tcp
         self._reserved = reserved
 
+    @classmethod
+    def of(cls, port: object, *, reserved: bool = False) -> Addresses:
+        """Those of the line at *port*, as a bus takes it."""
+        return cls(tcp=isinstance(port, str) and port.lower().startswith("tcp://"), reserved=reserved)
+
     def unit(self, value: object, *, changes: bool = False) -> int:
         """*value*, if it may be asked here; with *changes*, by what may change something in whoever hears it."""
-        if type(value) is int and 0 < value <= 247:
+        if type(value) is int and value in checks.UNITS:
             return value
-        if isinstance(value, bool) or not isinstance(value, int) or not (value == 0 or 247 < value <= 255):
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _HIGHEST:
             return checks.unit(value)
-        if self._tcp:
-            if value == 0 and changes and not self._reserved:
-                raise NotAllowed(
-                    "unit 0 over tcp:// may be a device by itself, and a gateway hands on what is written to it to "
-                    "every unit behind it: if it is a device, give reserved=True to the bus; or use broadcast()"
-                )
-            return int(value)
-        if value == 0:
+        why = self.why_not(value)
+        if why and value:
+            allowed = f"{checks.UNITS[0]} to {checks.UNITS[-1]}"
+            raise NotAllowed(f"unit {value} is out of range; allowed is {allowed}; {why}")
+        if why:
             return checks.unit(value)
-        if value == 255:
-            raise NotAllowed("unit 255 is out of range; allowed is 1 to 247; 255 is a gateway itself, over tcp:// only")
-        if not self._reserved:
+        if value == 0 and changes and not self._reserved:
             raise NotAllowed(
-                f"unit {value} is out of range; allowed is 1 to 247; the specification reserves it: give reserved=True "
-                "to the bus if a unit has it all the same"
+                "unit 0 over tcp:// may be a device by itself, and a gateway hands on what is written to it to every "
+                "unit behind it: if it is a device, give reserved=True to the bus; or use broadcast()"
             )
         return int(value)
+
+    def why_not(self, unit: int) -> str:
+        """Why nobody is asked by *unit* here, and what to do; empty where it may at least be read."""
+        if unit in checks.UNITS or (self._tcp and 0 <= unit <= _HIGHEST):
+            return ""
+        if not 0 <= unit <= _HIGHEST:
+            return f"no frame can carry {unit}"
+        if unit == 0:
+            return "0 is the broadcast address, which nobody answers"
+        if unit == _HIGHEST:
+            return f"{_HIGHEST} is a gateway itself, over tcp:// only"
+        if self._reserved:
+            return ""
+        return "the specification reserves it: give reserved=True to the bus if a unit has it all the same"
 
 
 def only_reads(pdu: bytes) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from drivebus import rtu
 from drivebus._native import crc16
+from drivebus.checks import UNITS
 from drivebus.line import huanyang
 
 __all__ = ["frames_in", "in_words", "is_frame", "may_be_of"]
@@ -35,7 +36,7 @@ def frames_in(data: bytes) -> list[bytes]:
 def _lengths(data: bytes, at: int) -> Iterator[int]:
     """How long a frame that begins at *at* may be, by its function: request or answer."""
     head = data[at : at + 7]
-    if len(head) < 4 or head[0] > 247:
+    if len(head) < 4 or head[0] > UNITS[-1]:
         return
     function = head[1]
     if function & 0x80:

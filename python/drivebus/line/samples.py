@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
 
 from drivebus import _native, checks
 from drivebus.errors import DrivebusError, NotAllowed, Refused
+from drivebus.line.addresses import Addresses
+from drivebus.line.units import units_of
 from drivebus.profile import Profile
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Value
@@ -253,7 +255,7 @@ class Polling(Generic[Key]):
             interval = checks.number("interval", interval, 0.0, _LONGEST_INTERVAL, above=True)
         self.size = checks.whole("size", size, 1, MOST_SAMPLES)
         self.interval = interval
-        self._targets = _targets(bus, targets)
+        self._targets = _targets(bus, units_of(native).addresses, targets)
         asked = [(target.unit, target.asked) for target in self._targets]
         self._native = _native.Poller(native, asked, interval, self.size)
         self.shortest = self._native.shortest
@@ -309,12 +311,12 @@ def seconds(timeout: float | None) -> float | None:
     return None if timeout is None else checks.number("timeout", timeout, 0.0)
 
 
-def _targets(bus: object, wanted: object) -> tuple[Target, ...]:
+def _targets(bus: object, addresses: Addresses, wanted: object) -> tuple[Target, ...]:
     if not isinstance(wanted, Mapping):
         raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}, and not {checks.shown(wanted)}")
     if not wanted:
         raise NotAllowed("nothing to poll: give {drive: names, …}, such as {drive: None}")
-    targets = tuple(_target(bus, key, names) for key, names in wanted.items())
+    targets = tuple(_target(bus, addresses, key, names) for key, names in wanted.items())
     units = [target.unit for target in targets]
     twice = next((unit for unit in units if units.count(unit) > 1), None)
     if twice is not None:
@@ -322,9 +324,9 @@ def _targets(bus: object, wanted: object) -> tuple[Target, ...]:
     return targets
 
 
-def _target(bus: object, key: Any, names: object) -> Target:
+def _target(bus: object, addresses: Addresses, key: Any, names: object) -> Target:
     if not all(hasattr(key, name) for name in ("bus", "unit", "profile")):
-        return _raw_target(checks.unit(key), names)
+        return _raw_target(addresses.unit(key), names)
     drive: PolledDrive = key
     unit, profile = drive.unit, drive.profile
     if drive.bus is not bus:

@@ -79,8 +79,7 @@ class Opening:
         if isinstance(target, Simulator):
             target = core_of(target) if target.transport == "process" else lasting_port(target)
         self.target = target
-        tcp = isinstance(target, str) and target.lower().startswith("tcp://")
-        self.known = Units(Addresses(tcp=tcp, reserved=checks.flag("reserved", reserved)))
+        self.known = Units(Addresses.of(target, reserved=checks.flag("reserved", reserved)))
         self.shown = str(port)
         self.trace = Trace(self.known, None if trace is None else _wire_file(trace, self.shown, self.format))
 

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 from drivebus.profile import Profile, profiles
 from drivebus.searching.settings import Settings
 
-__all__ = ["EVERY_UNIT", "LIKELY_UNITS", "candidates", "factory", "longest_delay"]
-
-EVERY_UNIT = range(1, 248)
+__all__ = ["LIKELY_UNITS", "candidates", "factory", "longest_delay"]
 
 LIKELY_UNITS = range(1, 17)
 """Addresses that lines of drives have: 1 from the factory, then counted up."""

@@ -10,7 +10,8 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from drivebus.searching.order import EVERY_UNIT, LIKELY_UNITS, candidates, factory
+from drivebus.checks import UNITS
+from drivebus.searching.order import LIKELY_UNITS, candidates, factory
 from drivebus.searching.settings import Settings
 
 __all__ = ["Plan"]
@@ -50,12 +51,12 @@ class Plan:
         self._behind: float | None = None
         self._fixed = fixed
         if fixed:
-            self._steps = deque([_Step(first, deque(EVERY_UNIT))])
+            self._steps = deque([_Step(first, deque(UNITS))])
             return
         order = [first, *candidates(first, full)]
         whole = order if full else factory()
         self._steps = deque(_Step(settings, deque(LIKELY_UNITS)) for settings in order)
-        self._steps.extend(_Step(settings, deque(EVERY_UNIT)) for settings in whole)
+        self._steps.extend(_Step(settings, deque(UNITS)) for settings in whole)
 
     def settings(self) -> Settings | None:
         """The settings at which somebody is to be asked next; None when the plan is done."""
@@ -89,7 +90,7 @@ class Plan:
         """
         step = self._steps[0]
         self._known.setdefault(step.settings.baudrate, set()).add(unit)
-        step.units.extend(unit for unit in EVERY_UNIT if unit not in step.units)
+        step.units.extend(unit for unit in UNITS if unit not in step.units)
         self._behind = None
 
     def damaged(self) -> None:
@@ -148,7 +149,7 @@ class Plan:
         """Addresses that were not asked, those of several settings together."""
         alike: dict[str, list[Settings]] = {}
         for settings, asked in self._asked.items():
-            rest = [unit for unit in EVERY_UNIT if unit not in asked and self._is_open(settings, unit)]
+            rest = [unit for unit in UNITS if unit not in asked and self._is_open(settings, unit)]
             if rest:
                 alike.setdefault(f"{rest[0]} to {rest[-1]}", []).append(settings)
         return [

@@ -28,6 +28,7 @@ from typing import Any
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
+from drivebus.line.addresses import Addresses
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -54,6 +55,7 @@ class SiteLine:
         baud: Bits per second.
         format: Data bits, parity and stop bits, such as `"8E1"`.
         rs485: Who switches the direction: `"kernel"`, `"rts"` or `"auto"`.
+        reserved: Whether it has units that the specification reserves, as `drivebus.Bus` takes it.
     """
 
     name: str
@@ -61,6 +63,12 @@ class SiteLine:
     baud: int | None = None
     format: str | None = None
     rs485: str | None = None
+    reserved: bool = False
+
+    @property
+    def addresses(self) -> Addresses:
+        """Which units it may have."""
+        return Addresses.of(self.port, reserved=self.reserved)
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ class SiteDrive:
     Attributes:
         name: What it is called.
         line: The line it hangs on.
-        unit: Its address, 1..247.
+        unit: Its address, 1..247, or another that its line has.
         profile: Its family, or the folder of a profile; None asks the drive.
         variants: What parameters of the drive decide, by name.
         unverified: Whether what no document of its family proves may be used.
@@ -191,18 +199,21 @@ class _Reader:
 
     def _line(self, name: str, table: dict[str, Any]) -> SiteLine | None:
         where = ("lines", name)
-        self._check_keys(table, ("port", "baud", "format", "rs485"), where)
+        self._check_keys(table, ("port", "baud", "format", "rs485", "reserved"), where)
         port = self._value(where, table, "port", _text, needed=True)
         baud = self._value(where, table, "baud", _whole(1, 100_000_000))
         characters = self._value(where, table, "format", _format)
         rs485 = self._value(where, table, "rs485", _one_of("kernel", "rts", "auto"))
-        return None if port is None else SiteLine(name, port, baud, characters, rs485)
+        reserved = self._value(where, table, "reserved", _flag) or False
+        return None if port is None else SiteLine(name, port, baud, characters, rs485, reserved)
 
     def _drive(self, name: str, table: dict[str, Any], lines: Mapping[str, SiteLine]) -> SiteDrive | None:
         where = ("drives", name)
         self._check_keys(table, ("line", "unit", "profile", "variants", "unverified", "read_only"), where)
         line = self._value(where, table, "line", _text, needed=True)
-        unit = self._value(where, table, "unit", _whole(1, 247), needed=True)
+        unit = self._value(
+            where, table, "unit", _unit_of(lines.get(line) if isinstance(line, str) else None), needed=True
+        )
         profile = self._value(where, table, "profile", _text)
         variants = self._value(where, table, "variants", _texts) or {}
         unverified = self._value(where, table, "unverified", _flag) or False
@@ -306,6 +317,23 @@ def _whole(low: int, high: int) -> Callable[[Any], int]:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise _Wrong(f"not a whole number from {low} to {high}")
         return value
+
+    return read
+
+
+def _unit_of(line: SiteLine | None) -> Callable[[Any], int]:
+    """The address of a unit on *line*; None is one that is not there, or is wrong itself."""
+    addresses = Addresses() if line is None else line.addresses
+
+    def read(value: Any) -> int:
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        why = addresses.why_not(value) if is_whole else ""
+        if is_whole and not why:
+            return int(value)
+        told = f"not a whole number from {checks.UNITS[0]} to {checks.UNITS[-1]}"
+        if line is not None and why:
+            told += f"; {why.replace('give reserved=True to the bus', f'say reserved = true in [lines.{line.name}]')}"
+        raise _Wrong(told)
 
     return read
 

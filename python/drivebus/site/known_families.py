@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 
+from drivebus.line.addresses import Addresses
 from drivebus.site.state_folder import state_file
 
 __all__ = ["families_on", "forget", "known_family", "remember"]
@@ -21,6 +22,8 @@ _MOST = 1000
 """Units that are kept; then those that were known longest give way."""
 _LONGEST = 1000
 """Characters of a line; nothing that was kept here has as many."""
+_DIGITS = 3
+"""Of an address."""
 
 
 def known_family(port: str, unit: int) -> str | None:
@@ -30,13 +33,18 @@ def known_family(port: str, unit: int) -> str | None:
 
 
 def families_on(port: str) -> dict[int, str]:
-    """The families of the units on *port* that were surely known last."""
+    """The families of the units on *port* that were surely known last; reserved ones were asked by name then.
+
+    Not of 0, which may be all units behind a gateway.
+    """
     key = _key(port, 0)
     if key is None:
         return {}
     line = key.removesuffix("0")
     kept = {place.removeprefix(line): family for place, family in _read().items() if place.startswith(line)}
-    return {int(unit): family for unit, family in kept.items() if unit.isdecimal() and 1 <= int(unit) <= 247}
+    known = {unit: family for unit, family in kept.items() if unit.isdecimal() and len(unit) <= _DIGITS}
+    allowed = Addresses.of(port, reserved=True)
+    return {int(unit): family for unit, family in known.items() if int(unit) and not allowed.why_not(int(unit))}
 
 
 def remember(port: str, unit: int, family: str) -> None:

@@ -10,7 +10,7 @@ from typing import TypedDict
 from drivebus._native import SerialFormat, Sniffer, exception_means, judge, misses
 from drivebus.capture import Captured, answers
 from drivebus.capture.frame import framed
-from drivebus.checks import counted
+from drivebus.checks import UNITS, counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.inside import wrong_inside
 from drivebus.profile import Profile
@@ -21,8 +21,6 @@ from drivebus.sniffer.foreign import Foreign
 __all__ = ["Pairing", "exchanges_in"]
 
 _Piece = tuple[str, bytes, float, float, "float | None", float, "float | None", "str | None"]
-
-_LAST_UNIT = 247
 
 _GIVEN_UP = 5.0
 """Seconds after which a request is told as unanswered, although nothing was asked since."""
@@ -279,7 +277,7 @@ def _answers(request: bytes, answer: Captured) -> bool:
 
 def _of_a_line(frame: bytes) -> bytes:
     """*frame* as if it were of a unit that a serial line can have."""
-    if 1 <= frame[0] <= _LAST_UNIT:
+    if frame[0] in UNITS:
         return frame
     return framed(bytes([1]) + frame[1:-2])
 

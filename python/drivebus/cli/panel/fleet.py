@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 import drivebus
@@ -315,8 +316,10 @@ def opened(session: Session, journal: Journal, watchdog: float | None) -> Iterat
     lines: dict[str, Line] = {}
     members = []
     with ExitStack() as stack:
-        for one in session.several or (session,):
-            key = repr((one.port, one.baud, one.line_format, one.rs485, one.read_only))
+        for named in session.several or (session,):
+            # Whoever may be commanded is, whatever is beside it.
+            one = replace(named, beside_unit_0=False)
+            key = one.line_key
             if key not in lines:
                 lines[key] = Line(stack.enter_context(one.bus()), one.one_port())
             member = Member(one, lines[key], journal, watchdog)

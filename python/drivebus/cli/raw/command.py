@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import click
 
@@ -58,10 +59,10 @@ def raw(
     if interval is not None and count is None:
         raise click.UsageError("--interval is the time from one of --count times to the next; give --count too")
     if data:
-        request = request_of(data, force)
+        request = request_of(data, force, session.addresses)
         if not request.only_looks:
-            session.will_write()
-        with session.bus() as bus:
+            replace(session, unit=request.unit).will_write()
+        with session.bus(read_only=session.read_only) as bus:
             _send(session, bus, lambda _: [Send("", (request,))], count or 1, interval, keep_going, force, yes)
         return
     if script is None and sys.stdin is not None and sys.stdin.isatty():
@@ -71,14 +72,14 @@ def raw(
             )
         from drivebus.cli.raw.prompt import prompt
 
-        with session.bus() as bus:
+        with session.bus(read_only=session.read_only) as bus:
             prompt(session, bus, force, yes)
         return
     name = "standard input" if script in (None, "-") else str(script)
-    typed = list(typed_in(_lines(script), name, session.unit, force))
+    typed = list(typed_in(_lines(script), name, session.unit, force, session.addresses))
     if not any(line.verb in ("hex", "read", "write") for line in typed):
         raise click.UsageError(f"{name} has no request; nothing was sent")
-    with session.bus() as bus:
+    with session.bus(read_only=session.read_only) as bus:
         _send(
             session,
             bus,

@@ -50,7 +50,7 @@ class Families:
     def check(self, request: Request, force: bool) -> None:
         """Raises `NotAllowed` where *request* may not be sent: a write under --read-only, a command that is none."""
         if not request.only_looks:
-            self._session.will_write()
+            replace(self._session, unit=request.unit).will_write()
         if force:
             return
         profile, write = self.known(request.unit), drivebus.rtu.written(request.pdu)

@@ -47,17 +47,17 @@ def prompt(session: Session, bus: drivebus.Bus, force: bool, yes: bool) -> None:
             if line.strip().lower() in ("help", "?"):
                 remark(_HELP)
                 continue
-            unit = _done(line, unit, sender, families, session.unverified, force)
+            unit = _done(line, unit, sender, families, session, force)
     sender.remind()
 
 
-def _done(line: str, unit: int, sender: Sender, families: Families, unverified: bool, force: bool) -> int:
+def _done(line: str, unit: int, sender: Sender, families: Families, session: Session, force: bool) -> int:
     """Does what *line* says, and returns the unit whose names are meant from then on. No error ends the prompt."""
     total = 0
     try:
-        for typed in typed_in([line], "", unit, force):
+        for typed in typed_in([line], "", unit, force, session.addresses):
             unit = typed.unit
-            step = requests_of(typed, families.find, unverified)
+            step = requests_of(typed, families.find, session.unverified)
             if step is None:
                 continue
             sender.prepare([step])

@@ -9,7 +9,9 @@ import click
 import drivebus
 from drivebus import places
 from drivebus.cli import names
+from drivebus.cli.advice import in_commands
 from drivebus.cli.frames import framed
+from drivebus.line.addresses import Addresses, only_reads
 from drivebus.line.trace import meaning
 
 __all__ = ["Request", "check_commands", "request_of"]
@@ -26,7 +28,7 @@ class Request:
     """What is asked of one unit.
 
     Attributes:
-        unit: Its address, 1..247.
+        unit: Its address.
         pdu: Function code and data, 1..253 bytes.
     """
 
@@ -58,11 +60,12 @@ class Request:
         return meaning(framed(self.body), True, None, profile).partition(": ")[2]
 
 
-def request_of(parts: tuple[str, ...], force: bool) -> Request:
+def request_of(parts: tuple[str, ...], force: bool, addresses: Addresses) -> Request:
     """The request in hexadecimal *parts*. With *force*, the last two bytes may look like its CRC.
 
     Raises:
-        click.UsageError: It is no request.
+        click.UsageError: It is no request, or the line has other *addresses*.
+        NotAllowed: It may change something in all units behind a gateway.
     """
     body = names.parse_hex(parts)
     if not 2 <= len(body) <= 254:
@@ -70,8 +73,12 @@ def request_of(parts: tuple[str, ...], force: bool) -> Request:
             f"{len(body)} {'byte is' if len(body) == 1 else 'bytes are'} not a request; give the unit, then 1 to 253 "
             "bytes of PDU, and no CRC"
         )
-    if not 1 <= body[0] <= 247:
-        raise click.UsageError(f"no unit {body[0]:02X} answers; the first byte is the unit, 01 to F7")
+    why = addresses.why_not(body[0])
+    if why:
+        raise click.UsageError(
+            f"no unit {body[0]:02X} answers; the first byte is the unit, 01 to F7. Unit {body[0]}: {in_commands(why)}"
+        )
+    addresses.unit(body[0], changes=not only_reads(body[1:]))
     if not force and len(body) > 4 and framed(body[:-2]) == body:
         asked = body[:-2].hex(" ").upper()
         raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added; give {asked}")

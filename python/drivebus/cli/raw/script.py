@@ -17,11 +17,15 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.raw.request import Request, request_of
 from drivebus.cli.types import with_a_point
+from drivebus.line.addresses import Addresses
 
 __all__ = ["VERBS", "Send", "Step", "Typed", "Wait", "located", "requests_of", "typed_in"]
 
 VERBS = ("read", "write", "unit", "wait")
 """What a line can begin with that is no request in hex."""
+
+SERIAL = Addresses()
+"""The units of a serial line of which nothing else is said."""
 
 _MOST_TIMES = 1_000_000
 _LONGEST_WAIT = 86_400.0
@@ -36,7 +40,7 @@ class Typed:
         where: The file and the number of the line; empty at the prompt and on the command line.
         verb: One of `VERBS`, or `"hex"`.
         words: What follows the verb, or the bytes.
-        unit: Whose names are meant, 1..247.
+        unit: Whose names are meant.
         times: How often it is sent.
         every: Seconds from one time to the next; None as fast as the line allows.
         seconds: How long is waited; 0 unless the verb is `"wait"`.
@@ -84,7 +88,7 @@ def located(where: str) -> Iterator[None]:
         raise drivebus.NotAllowed(f"{where}: {error}") from None
 
 
-def typed_in(lines: Iterable[str], name: str, unit: int, force: bool) -> Iterator[Typed]:
+def typed_in(lines: Iterable[str], name: str, unit: int, force: bool, addresses: Addresses = SERIAL) -> Iterator[Typed]:
     """The lines of a script, without those that are empty.
 
     Args:
@@ -92,9 +96,10 @@ def typed_in(lines: Iterable[str], name: str, unit: int, force: bool) -> Iterato
         name: The file, for errors; empty at the prompt.
         unit: Whose names are meant, until a line says otherwise.
         force: Whether a request may end with what looks like its own CRC.
+        addresses: Which units the line may have.
 
     Raises:
-        click.UsageError: A line is wrong; the message says which and why.
+        click.UsageError, NotAllowed: A line is wrong; the message says which and why.
     """
     for number, line in enumerate(lines, 1):
         where = f"{name}, line {number}" if name else ""
@@ -102,17 +107,17 @@ def typed_in(lines: Iterable[str], name: str, unit: int, force: bool) -> Iterato
         if not words:
             continue
         with located(where):
-            typed = _typed(words, where, unit, force)
+            typed = _typed(words, where, unit, force, addresses)
         unit = typed.unit
         yield typed
 
 
-def _typed(words: tuple[str, ...], where: str, unit: int, force: bool) -> Typed:
+def _typed(words: tuple[str, ...], where: str, unit: int, force: bool, addresses: Addresses) -> Typed:
     verb = words[0].lower()
     if verb == "wait":
         return Typed(where, verb, (), unit, seconds=_seconds(_only(words, "wait 0.5"), "wait"))
     if verb == "unit":
-        units = names.parse_units(_only(words, "unit 2"))
+        units = names.parse_units(_only(words, "unit 2"), addresses)
         if len(units) > 1:
             raise click.UsageError(f'"{words[1]}" is several units; a request goes to one')
         return Typed(where, verb, (), units[0])
@@ -132,7 +137,7 @@ def _typed(words: tuple[str, ...], where: str, unit: int, force: bool) -> Typed:
             f'"{(words or ("x",))[0]}" begins no line; give unit and PDU in hex, such as 01 03 2100 0001, or '
             f"{', '.join(VERBS[:-1])} or {VERBS[-1]}"
         )
-    request_of(words, force)
+    request_of(words, force, addresses)
     return Typed(where, "hex", words, unit, times, every)
 
 
@@ -193,7 +198,7 @@ def requests_of(typed: Typed, family: Callable[[int], drivebus.Profile], unverif
             case "write":
                 requests = tuple(_write(typed.unit, word, family(typed.unit), unverified) for word in typed.words)
             case _:
-                requests = (request_of(typed.words, True),)
+                requests = (request_of(typed.words, True, names.EVERYBODY),)  # who may be asked was looked at
         return Send(typed.where, requests, typed.times, typed.every)
 
 
