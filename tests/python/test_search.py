@@ -97,7 +97,7 @@ def test_four_families_at_two_settings_in_less_than_a_third_of_the_time() -> Non
     assert places(found) == {unit: settings for unit, (_, settings) in FOUR.items()}
     assert {located.unit: located.profile for located in found} == {1: "gd350", 3: None, 12: "vfd500", 140: None}
     assert wire.seconds < in_turn() / 3
-    assert (wire.functions, wire.written) == ({0x03}, 0), "only reads"
+    assert (wire.functions, wire.written) == ({0x03, 0x04}, 0), "reads, and until somebody answers one of nothing"
     # What is left at first is right if nobody answers; the last question is all that is left at the end.
     assert left[0] == pytest.approx(wire.seconds - 12.5, abs=2.5)
     assert left[-1] < 0.1
@@ -145,7 +145,7 @@ def test_what_was_not_tried_is_said_and_full_tries_it() -> None:
     assert "20 ms" in slow
     search = drivebus.search(PORT, open=Wire(hidden).open, full=True)
     assert [located.unit for located in search] == [77]
-    assert search.untried == [slow]
+    assert search.untried == [slow.replace("another address than 1", "an address above 16")]
 
 
 def test_damage_at_a_speed_brings_its_other_formats_forward_and_is_not_told_where_one_is_right() -> None:
@@ -304,6 +304,7 @@ class TestTheCommand:
             "candidates": ["gd350"],
             "identification": "0x01a0",
             "problem": None,
+            "protocol": "modbus",
         }
 
     def test_a_dead_line_is_one_line_and_code_3(self, monkeypatch: pytest.MonkeyPatch) -> None:

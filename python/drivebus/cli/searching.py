@@ -51,8 +51,10 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
                 out.rows(["unit", "settings", "family", "certainty", "problem"], [_row(each) for each in found])
                 for line in _meanings(found):
                     out.say(line)
-                out.say(f"{counted(len(found), 'unit')}. Talk to the first: {_how(found[0], port)}")
-                for located in found[1:]:
+                known = [each for each in found if each.protocol == "modbus"]
+                talk = f" Talk to the first: {_how(known[0], port)}" if known else ""
+                out.say(f"{counted(len(found), 'unit')}.{talk}")
+                for located in known[1:]:
                     if _named(located) is not None:
                         out.say(f"Unit {located.unit} has to be named: {_how(located, port)}")
         left_out = "; ".join(searching.untried)
@@ -106,7 +108,7 @@ def _row(located: drivebus.Located) -> list[Any]:
     """What is shown of *located*."""
     known = located.identification
     may_be = " or ".join(known.candidates) if known is not None else ""
-    family = located.profile or may_be or "unknown family"
+    family = located.profile or may_be or ("unknown family" if located.protocol == "modbus" else "no Modbus")
     return [located.unit, str(located.settings), family, located.certainty, located.problem]
 
 
@@ -122,6 +124,7 @@ def _record(located: drivebus.Located) -> dict[str, Any]:
         "candidates": () if known is None else known.candidates,
         "identification": None if known is None or known.code is None else f"{known.code:#06x}",
         "problem": located.problem,
+        "protocol": located.protocol,
     }
 
 

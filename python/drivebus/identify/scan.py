@@ -22,7 +22,9 @@ from drivebus.line.addresses import Addresses
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.scan_order import PROTOCOLS
 
-__all__ = ["look_for", "look_for_huanyang", "protocol_of", "time_for", "units"]
+__all__ = ["look_for", "look_for_huanyang", "protocol_of", "speaks_otherwise", "time_for", "units"]
+
+_OTHERWISE = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
 
 _TIMEOUT = 0.1
 """Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
@@ -67,9 +69,13 @@ async def look_for_huanyang(
     return None
 
 
+def speaks_otherwise(unit: int, error: NoAnswer | BadAnswer) -> str | None:
+    """That what came of *unit*, which was asked in Modbus, is of Huanyang's own protocol; None where it is not."""
+    return _OTHERWISE if any(frame[0] == unit and huanyang.is_sure(frame) for frame in frames_in(error.raw)) else None
+
+
 def _foreign(unit: int, took: float) -> Found:
-    said = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
-    return Found(unit, None, None, took, said, protocol="huanyang")
+    return Found(unit, None, None, took, _OTHERWISE, protocol="huanyang")
 
 
 async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | None:
@@ -86,7 +92,7 @@ async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | N
     try:
         found = await identify(timed, unit)
     except (NoAnswer, BadAnswer) as error:
-        if any(frame[0] == unit and huanyang.is_sure(frame) for frame in frames_in(error.raw)):
+        if speaks_otherwise(unit, error) is not None:
             return _foreign(unit, took[0])
         if isinstance(error, NoAnswer) or not may_be_of(unit, error.raw):
             return None  # silence, noise, or somebody else's

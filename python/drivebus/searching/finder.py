@@ -14,7 +14,8 @@ from types import TracebackType
 from drivebus import checks
 from drivebus.bus import Bus
 from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
-from drivebus.line import ports
+from drivebus.identify.scan import speaks_otherwise
+from drivebus.line import huanyang, ports
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.stats import noisy
 from drivebus.searching.located import Located, Progress
@@ -55,8 +56,9 @@ def search(
 ) -> Search:
     """Searches the line at *port* for drives whose baud rate, format and address nobody knows, and yields them.
 
-    Sends reads of one word and nothing else. The likely addresses (1 to 16) are asked at the likely settings, those of
-    factories first; every address where anybody answers, and at the settings of factories. That takes about a minute.
+    Sends reads of one word. The likely addresses (1 to 16) are asked at the likely settings, those of factories first;
+    every address where anybody answers, and at the settings of factories. That takes about a minute. Until anybody
+    answers, unit 1 is also asked in Huanyang's own protocol: a question that a unit of Modbus refuses.
     Each drive is yielded when it is found. `Search.untried` has what was left out.
 
     A port whose settings are not ours, such as a serial server, a gateway or a simulated line, is asked at those it
@@ -121,6 +123,7 @@ class Search(Iterator[Located]):
         self._fixed = not can_be_changed(port)
         self._plan = Plan(first, self._fixed, full, self._patience, _LISTEN)
         self._damaged: dict[tuple[int, int], Located] = {}
+        self._otherwise: set[tuple[int, int]] = set()
         self._has_opened = self._has_listened = False
         self._going = self._run()
 
@@ -149,7 +152,8 @@ class Search(Iterator[Located]):
         if self._fixed:
             told.insert(0, "other baud rates and formats, which this port has from elsewhere")
         slow = f"{self._delay * 1e3:g} ms" if self._timeout is None else f"{self._timeout:g} s in all"
-        return [*told, f"drives that take longer than {slow} to answer"]
+        other = f"that speak {huanyang.NAME} and have {self._plan.untried_otherwise()}"
+        return [*told, f"drives that take longer than {slow} to answer, or {other}"]
 
     def _run(self) -> Generator[Located, None, None]:
         while (settings := self._plan.settings()) is not None:
@@ -172,12 +176,30 @@ class Search(Iterator[Located]):
             if located is None:
                 continue
             key = settings.baudrate, unit
-            if located.problem is None:
+            if located.protocol != "modbus":
+                yield from self._told_once(located)
+            elif located.problem is None:
                 self._plan.answered(unit)
                 self._damaged.pop(key, None)
                 yield located
             else:
                 self._damaged.setdefault(key, located)
+        yield from self._ask_otherwise(bus, settings)
+
+    def _ask_otherwise(self, bus: Bus, settings: Settings) -> Iterator[Located]:
+        """Asks in Huanyang's own protocol, where nobody has answered in Modbus."""
+        for unit in self._plan.otherwise():
+            self._tell(settings, unit)
+            for found in bus.scan([unit], protocol="huanyang"):
+                yield from self._told_once(Located(settings, unit, None, found.problem, found.protocol))
+
+    def _told_once(self, located: Located) -> Iterator[Located]:
+        """*located*, which answers in another protocol, unless it was told at this speed already."""
+        self._plan.answered_otherwise()
+        key = located.settings.baudrate, located.unit
+        if key not in self._otherwise:
+            self._otherwise.add(key)
+            yield located
 
     def _asked(self, bus: Bus, settings: Settings, unit: int) -> Located | None:
         """What *unit* says that it is, or how its answers are damaged; None if it is silent."""
@@ -185,10 +207,11 @@ class Search(Iterator[Located]):
         for _ in range(_TIMES):
             try:
                 return Located(settings, unit, bus.identify(unit))
-            except NoAnswer:
-                break
-            except BadAnswer as error:
-                if not may_be_of(unit, error.raw):
+            except (NoAnswer, BadAnswer) as error:
+                foreign = speaks_otherwise(unit, error)
+                if foreign is not None:
+                    return Located(settings, unit, None, foreign, "huanyang")
+                if isinstance(error, NoAnswer) or not may_be_of(unit, error.raw):
                     break
                 located = Located(settings, unit, None, str(error))
         return located

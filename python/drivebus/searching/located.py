@@ -19,13 +19,15 @@ class Located:
         settings: At which it did: `drivebus.Bus(port, **vars(located.settings))` opens the line so.
         unit: Its address, 1..247.
         identification: What it says that it is; None if no answer of it was whole.
-        problem: What was wrong with its answers, if none was whole; else None.
+        problem: What was wrong with its answers, if none was whole; that it speaks another protocol; else None.
+        protocol: In what it answered: `"modbus"`, or `"huanyang"`: the maker's own, for which drivebus has no commands.
     """
 
     settings: Settings
     unit: int
     identification: Identification | None
     problem: str | None = None
+    protocol: str = "modbus"
 
     @property
     def profile(self) -> str | None:

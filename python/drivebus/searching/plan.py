@@ -7,7 +7,7 @@ goes on: drives of one line are mostly set alike. At the settings of factories e
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from drivebus.checks import UNITS
@@ -50,6 +50,9 @@ class Plan:
         self._suspected: set[int] = set()
         self._behind: float | None = None
         self._fixed = fixed
+        self._otherwise = LIKELY_UNITS if fixed or full else LIKELY_UNITS[:1]
+        self._asked_otherwise: dict[Settings, list[int]] = {}
+        self._answered_otherwise: Settings | None = None
         if fixed:
             self._steps = deque([_Step(first, deque(UNITS))])
             return
@@ -93,6 +96,31 @@ class Plan:
         step.units.extend(unit for unit in UNITS if unit not in step.units)
         self._behind = None
 
+    def otherwise(self) -> Iterator[int]:
+        """Who is asked at the present settings in another protocol: nobody where anybody has answered in the usual one.
+
+        A drive has the first address from the factory, and each question costs a time-out at each setting.
+        """
+        here = self._steps[0].settings
+        asked = self._asked_otherwise.setdefault(here, [])
+        while (unit := next(iter(self._left_otherwise(here)), None)) is not None:
+            asked.append(unit)
+            self._behind = None
+            yield unit
+
+    def answered_otherwise(self) -> None:
+        """Somebody did at the present settings: now those that are likely are asked there, and nowhere else."""
+        self._answered_otherwise = self._steps[0].settings
+        self._otherwise = LIKELY_UNITS
+        self._behind = None
+
+    def _left_otherwise(self, settings: Settings) -> list[int]:
+        """Those who are still to be asked at *settings* in another protocol."""
+        if self._known or self._answered_otherwise not in (None, settings):
+            return []
+        asked = self._asked_otherwise.get(settings, ())
+        return [unit for unit in self._otherwise if unit not in asked]
+
     def damaged(self) -> None:
         """Something came that is no answer: the speed may be right, so its other formats are next."""
         present, *rest = self._steps
@@ -132,7 +160,14 @@ class Plan:
         """Seconds that those of *step* take who are still to be asked, and are not *counted* already."""
         here = step.settings
         count = sum((here, unit) not in counted and self._is_open(here, unit) for unit in step.units)
+        if here not in {settings for settings, _ in counted}:
+            count += len(self._left_otherwise(here))
         return count * (_REQUEST * here.timing.char_time + self._patience(here))
+
+    def untried_otherwise(self) -> str:
+        """Who was not asked in another protocol, in words."""
+        last = self._otherwise[-1]
+        return "another address than 1" if last == 1 else f"an address above {last}"
 
     def untried(self) -> list[str]:
         """What was not tried, in words: settings, and addresses at those that were."""
