@@ -391,6 +391,19 @@ def test_the_doctor_refuses_what_a_serial_line_has_not(unit: int) -> None:
         examine("/dev/null", reserved=1)  # type: ignore[arg-type]  # that is what is tried
 
 
+@pytest.mark.parametrize("unit", [247, 248, 254, 255])
+def test_a_log_in_which_they_answer_is_told_as_one_of_others(unit: int, tmp_path: Path) -> None:
+    log = tmp_path / "log.txt"
+    read, answer = (framed(f"{unit:02X} {pdu}").hex(" ") for pdu in ("03 21 00 00 02", "03 04 00 03 00 00"))
+    log.write_text(f"{read}\n{answer}\n", encoding="utf-8")
+    done = run("decode", str(log))
+    told = " ".join(done.stdout.split())
+    assert (done.exit_code, told) == (0, f"unit {unit}: read 2 words at 2100H -> 2100H = 3, 2101H = 0"), done.output
+    other = framed(f"{unit - 1:02X} 03 04 00 03 00 00").hex(" ")
+    log.write_text(f"{read}\n{other}\n", encoding="utf-8")
+    assert "2100H = 3" not in run("decode", str(log)).stdout
+
+
 def test_what_is_advised_has_the_switch() -> None:
     with line("terminal") as (port, _):
         silent: Callable[[bytes], bytes] = lambda _: b""  # noqa: E731

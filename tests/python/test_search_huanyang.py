@@ -37,7 +37,7 @@ class Foreign(Wire):
         self.place = None if own is None else (own, unit)
         self.asked: list[tuple[Settings, int]] = []
 
-    def open(self, port: object, **options: Any) -> Bus:
+    def open(self, port: object, **options: Any) -> Bus:  # type: ignore[override]  # as it is called
         bus = super().open(port, **options)
         settings, scan = self.tried[-1], bus.scan
 

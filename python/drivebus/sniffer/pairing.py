@@ -271,8 +271,12 @@ def _pieces(frames: Sequence[Captured], line: SerialFormat) -> Iterator[_Piece]:
 def _answers(request: bytes, answer: Captured) -> bool:
     if answer.asks:
         return False
-    # A gateway of Modbus TCP has units that a serial line has not, which answer as any.
-    return answers(*map(_of_a_line, (request, answer.data))) if answer.at_once else answers(request, answer.data)
+    # A gateway of Modbus TCP has units that a serial line has not, which answer as any; so do those that the
+    # specification reserves, where a line has them.
+    is_reserved = request[0] > UNITS[-1] and request[0] == answer.data[0]
+    if answer.at_once or is_reserved:
+        return answers(*map(_of_a_line, (request, answer.data)))
+    return answers(request, answer.data)
 
 
 def _of_a_line(frame: bytes) -> bytes:
