@@ -399,6 +399,8 @@ def test_a_log_in_which_they_answer_is_told_as_one_of_others(unit: int, tmp_path
     done = run("decode", str(log))
     told = " ".join(done.stdout.split())
     assert (done.exit_code, told) == (0, f"unit {unit}: read 2 words at 2100H -> 2100H = 3, 2101H = 0"), done.output
+    named = run("decode", "--profile", f"{unit}=gd350", str(log))
+    assert f"unit {unit}: read status_word_1" in " ".join(named.stdout.split()), named.output
     other = framed(f"{unit - 1:02X} 03 04 00 03 00 00").hex(" ")
     log.write_text(f"{read}\n{other}\n", encoding="utf-8")
     assert "2100H = 3" not in run("decode", str(log)).stdout

@@ -290,3 +290,25 @@ impl LastWill {
         Self { silence, ..self }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_for_reading_only_keeps_what_is_no_read_and_any_other_keeps_nothing() {
+        let both = BusOptions::new(SerialFormat::DEFAULT);
+        let looks = both.read_only(true);
+        for (pdu, kept) in [
+            (&[0x03, 0, 0, 0, 1][..], None),
+            (&[0x03, 1, 1], Some(Failure::NotARead { function: 3 })),
+            (&[0x02, 3, 5, 0, 17], Some(Failure::NotARead { function: 2 })),
+            (&[0x06, 0x20, 0, 0, 5], Some(Failure::ReadOnly { function: 6 })),
+            (&[0x41], Some(Failure::ReadOnly { function: 0x41 })),
+        ] {
+            let request = Request::raw(pdu, None).unwrap();
+            assert_eq!(looks.kept_from(&request), kept, "{pdu:02X?}");
+            assert_eq!(both.kept_from(&request), None, "{pdu:02X?}");
+        }
+    }
+}

@@ -12,8 +12,9 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 import drivebus
-from drivebus.cli.names import EVERYBODY, parse_units
+from drivebus.cli.names import parse_units
 from drivebus.cli.session import Session
+from drivebus.line.addresses import EVERYBODY
 
 if TYPE_CHECKING:
     from drivebus.site import Site, SiteDrive, SiteLine

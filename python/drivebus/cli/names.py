@@ -10,10 +10,9 @@ from click.shell_completion import CompletionItem
 import drivebus
 from drivebus.cli.advice import in_commands
 from drivebus.cli.types import with_a_point
-from drivebus.line.addresses import Addresses
+from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = [
-    "EVERYBODY",
     "complete_assignment",
     "complete_group",
     "complete_name",
@@ -30,9 +29,6 @@ __all__ = [
     "resolve",
     "without_unit",
 ]
-
-EVERYBODY = Addresses(tcp=True, reserved=True)
-"""The addresses that a frame can carry, where the line is not known."""
 
 _ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
 

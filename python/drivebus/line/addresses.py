@@ -9,7 +9,7 @@ from __future__ import annotations
 from drivebus import checks
 from drivebus.errors import NotAllowed
 
-__all__ = ["Addresses", "only_reads"]
+__all__ = ["EVERYBODY", "Addresses", "only_reads"]
 
 _READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x11, 0x2B})
 """Functions that change nothing in whoever hears them."""
@@ -69,6 +69,10 @@ class Addresses:
         if self._reserved:
             return ""
         return "the specification reserves it: give reserved=True to the bus if a unit has it all the same"
+
+
+EVERYBODY = Addresses(tcp=True, reserved=True)
+"""The addresses that a frame can carry, where the line is not known, or not ours."""
 
 
 def only_reads(pdu: bytes) -> bool:

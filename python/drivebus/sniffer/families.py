@@ -9,6 +9,7 @@ from drivebus import checks
 from drivebus.errors import DrivebusError
 from drivebus.identify.codes import listed_at
 from drivebus.identify.families import shipped
+from drivebus.line.addresses import EVERYBODY
 from drivebus.profile import Profile, profiles
 from drivebus.sniffer.frames import carried, place_of, written_by
 from drivebus.values import Value
@@ -48,7 +49,7 @@ class Families:
 
     def __init__(self, given: Given = None) -> None:
         if isinstance(given, Mapping):
-            self._given = {checks.unit(unit): Profile.find(profile) for unit, profile in given.items()}
+            self._given = {_unit(unit): Profile.find(profile) for unit, profile in given.items()}
             self._all: Profile | None = None
         else:
             self._given = {}
@@ -231,3 +232,8 @@ def _meant(profile: Profile, addresses: Iterable[int]) -> tuple[object, ...]:
     """What *profile* means by each of *addresses*: name, unit, and what a word of 1000 is; None where it has none."""
     names = [profile.name_at(profile.plain_address(address)) for address in sorted(addresses)]
     return tuple(name and (name, profile.describe(name).unit, profile.decode(name, 1000)) for name in names)
+
+
+def _unit(value: object) -> int:
+    """An address that has a family, on whatever line it was heard; to 0 nobody answers on most."""
+    return checks.unit(value) if value == 0 else EVERYBODY.unit(value)

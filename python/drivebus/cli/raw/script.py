@@ -17,7 +17,7 @@ import drivebus
 from drivebus.cli import names
 from drivebus.cli.raw.request import Request, request_of
 from drivebus.cli.types import with_a_point
-from drivebus.line.addresses import Addresses
+from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = ["VERBS", "Send", "Step", "Typed", "Wait", "located", "requests_of", "typed_in"]
 
@@ -198,7 +198,7 @@ def requests_of(typed: Typed, family: Callable[[int], drivebus.Profile], unverif
             case "write":
                 requests = tuple(_write(typed.unit, word, family(typed.unit), unverified) for word in typed.words)
             case _:
-                requests = (request_of(typed.words, True, names.EVERYBODY),)  # who may be asked was looked at
+                requests = (request_of(typed.words, True, EVERYBODY),)  # who may be asked was looked at
         return Send(typed.where, requests, typed.times, typed.every)
 
 
