@@ -322,6 +322,20 @@ def test_stop_all_reaches_one_that_is_remembered(tmp_path: Path, monkeypatch: py
         assert bytes.fromhex("FA 06 20 00 00 05") in asked
 
 
+def test_stop_all_asks_nothing_of_the_unit_that_the_environment_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from drivebus.site import remember
+
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with line("tcp") as (port, heard):
+        remember(port[1], 3, "gd350")
+        words = [*port, "stop", "--all", "--within", "0"]
+        done = CliRunner(env={"DRIVEBUS_PORT": None, "DRIVEBUS_UNIT": "0"}).invoke(cli, words, prog_name="drivebus")
+        assert heard.units == {3}, done.output
+        assert BEHIND not in told(done)
+
+
 class TestThePoll:
     def asked(self, url: str, unit: int, **how: bool) -> list[int]:
         with Bus(url, parity="N", timeout=5.0, retries=0, **how) as bus:  # type: ignore[arg-type]  # flags

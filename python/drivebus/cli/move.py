@@ -80,7 +80,7 @@ def stop(context: click.Context, session: Session, wait: float | None, every: bo
     if every:
         from drivebus.cli.stop_all import stop_all
 
-        session.will_write()
+        session.check_read_only()
         stop_all(context, session, within, lambda one, drive: _stopped(one, drive, wait))
     else:
         _stop_named(wait, within)

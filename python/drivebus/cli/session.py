@@ -270,13 +270,14 @@ class Session:
             remember(str(self.port), found.unit, family)
 
     def will_write(self) -> None:
-        """Refuses a command that writes where only looking was asked for, before anything is opened.
+        """As `check_read_only`; also where the unit is 0 over `tcp://`, and nobody said that it is a device."""
+        self.check_read_only()
+        self.addresses.unit(self.unit, changes=True)
+        self._writes = True
 
-        So it does where the unit is 0 over `tcp://`, and nobody said that it is a device.
-        """
+    def check_read_only(self) -> None:
+        """Refuses a command that writes where only looking was asked for, before anything is opened."""
         if not self.read_only:
-            self.addresses.unit(self.unit, changes=True)
-            self._writes = True
             return
         context = click.get_current_context()
         name, group = context.info_name, context.parent
