@@ -79,12 +79,11 @@ impl BusOptions {
 
     /// Why `request` is not sent over a bus that is for reading only; `None` of one that is.
     pub(crate) fn kept_from(&self, request: &Request<'_>) -> Option<Failure> {
-        let function = request.function();
-        match (self.read_only, request.is_write(), request.only_reads()) {
-            (false, _, _) | (true, false, true) => None,
-            (true, true, _) => Some(Failure::ReadOnly { function }),
-            (true, false, false) => Some(Failure::NotARead { function }),
+        if !self.read_only || request.only_reads() {
+            return None;
         }
+        let function = request.function();
+        Some(if request.is_write() { Failure::ReadOnly { function } } else { Failure::NotARead { function } })
     }
 
     /// Sets [`echo`](Self#structfield.echo).
