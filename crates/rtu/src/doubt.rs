@@ -331,11 +331,17 @@ impl Doubts {
         self.possible(now, unit).any(|open| !open.again && open.expected.judge_frame(unit, frame).is_ok())
     }
 
+    /// Whether `frame`, which came whole at `now`, [is new](Self::is_new). It is the last that came from now on.
+    pub(crate) fn hear(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
+        let is_new = self.is_new(now, frame, at_once);
+        self.heard = Some((frame.address(), frame.crc(), now));
+        is_new
+    }
+
     /// Whether `frame`, which came whole at `now`, is another one than the last since a request went out, or came later than
     /// `at_once` after it.
-    pub(crate) fn hear(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
-        let before = self.heard.replace((frame.address(), frame.crc(), now));
-        before.is_none_or(|(unit, crc, then)| {
+    fn is_new(&self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
+        self.heard.is_none_or(|(unit, crc, then)| {
             unit != frame.address() || crc != frame.crc() || now.saturating_duration_since(then) >= at_once
         })
     }

@@ -3,6 +3,8 @@
 //! One such answer is enough, for good. Where it comes in its turn, or beside, nothing is mistaken; the first of them that comes
 //! late and in the place of another read's answer is taken for that ([`Assumption::AnswersWhole`](crate::Assumption)).
 
+use core::time::Duration;
+
 use super::{Doubts, Open};
 use crate::answer::{Answer, AnswerError};
 use crate::expected::Expected;
@@ -11,11 +13,20 @@ use crate::{Instant, UnitAddress};
 
 impl Doubts {
     /// `frame` came at `now` in the place of the answer of `unit` to `expected`. Where it has another number of words, and is none
-    /// that is open, the lengths of this unit prove nothing from now on: only what it sends back does, and time.
+    /// that is open, nor one again that came within `at_once`, the lengths of this unit prove nothing from now on: only what it
+    /// sends back does, and time.
     #[cold]
-    pub(crate) fn learn_length(&mut self, now: Instant, (unit, expected): (UnitAddress, Expected), frame: &Frame<'_>) {
+    pub(crate) fn learn_length(
+        &mut self,
+        now: Instant,
+        (unit, expected): (UnitAddress, Expected),
+        frame: &Frame<'_>,
+        at_once: Duration,
+    ) {
         let judged = expected.judge_frame(unit, frame);
-        if matches!(judged, Err(AnswerError::Count { .. } | AnswerError::Bytes { .. })) && !self.owes(now, unit, frame)
+        if matches!(judged, Err(AnswerError::Count { .. } | AnswerError::Bytes { .. }))
+            && !self.owes(now, unit, frame)
+            && self.is_new(now, frame, at_once)
         {
             self.is_of_another_length(now, unit);
         }
@@ -23,9 +34,15 @@ impl Doubts {
 
     /// `frame` came at `now` from `unit`, and answers nothing in flight. Where reads are open, and it has the length of none, it is
     /// one of those nevertheless: see [`learn_length`](Self::learn_length).
-    pub(crate) fn learn_length_beside(&mut self, now: Instant, unit: UnitAddress, frame: &Frame<'_>) {
+    pub(crate) fn learn_length_beside(
+        &mut self,
+        now: Instant,
+        unit: UnitAddress,
+        frame: &Frame<'_>,
+        at_once: Duration,
+    ) {
         let reads = || self.possible(now, unit).filter(|open| is_read_by(open, frame));
-        if reads().next().is_some() && !self.owes(now, unit, frame) {
+        if reads().next().is_some() && !self.owes(now, unit, frame) && self.is_new(now, frame, at_once) {
             self.is_of_another_length(now, unit);
         }
     }

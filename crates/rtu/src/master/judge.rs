@@ -52,7 +52,8 @@ impl Master {
                     let doubted = self.in_quarantine(now, unit);
                     let apart = self.doubts.sorts_out(now, unit, expected);
                     if judged.is_err() && !self.others.may_be() {
-                        self.doubts.learn_length(now, (unit, expected), &frame);
+                        let at_once = self.at_once(range.len());
+                        self.doubts.learn_length(now, (unit, expected), &frame, at_once);
                     }
                     match judged {
                         // Nobody was asked for it, and it stands amid other bytes: it has a right CRC by chance.
@@ -341,7 +342,7 @@ impl Master {
         if !self.others.may_be()
             && let Ok(unit) = UnitAddress::new(frame.address())
         {
-            self.doubts.learn_length_beside(now, unit, &frame);
+            self.doubts.learn_length_beside(now, unit, &frame, at_once);
         }
         if self.doubts.seen(now, &frame, at_once) && self.others.may_be() && frame.as_bytes() != self.request.as_bytes()
         {

@@ -94,6 +94,28 @@ fn a_frame_whose_bytes_are_not_as_many_as_it_says_teaches_nothing() {
     }
 }
 
+/// The first closed what it answers; the second is the line's doing.
+#[test]
+fn an_answer_that_comes_twice_at_once_teaches_nothing() {
+    let mut asker = Asker::of_a_unit_that_echoes();
+    asker.leaves_open(1_000, unit(1), &read(1));
+    asker.sends(1_100, unit(1), &read(2), TIMEOUT);
+    let late = words(unit(1), 1, 7);
+    assert_eq!(asker.hears(1_110, &late), Came::Nothing);
+    assert_ne!(asker.hears(1_110, &late), Came::Answer);
+    asker.master.abort(ms(1_200));
+    asker.echoes(6_000, unit(1));
+    assert!(prove(&asker, 6_000));
+    // While another unit is asked.
+    asker.leaves_open(11_000, unit(1), &read(1));
+    asker.leaves_open(11_000, unit(1), &read(3));
+    asker.sends(11_100, unit(2), &WRITE, TIMEOUT);
+    assert_eq!((asker.hears(11_110, &late), asker.hears(11_110, &late)), (Came::Nothing, Came::Nothing));
+    asker.master.abort(ms(11_200));
+    asker.echoes(16_000, unit(1));
+    assert!(prove(&asker, 16_000));
+}
+
 /// Which of those that are open it is, nothing tells.
 #[test]
 fn none_that_is_seen_ends_a_doubt_about_it() {
