@@ -311,9 +311,8 @@ impl<'r> Conversation<'r> {
         let why = Unanswered::CutShort(why);
         match self.state {
             State::InFlight(flight) => self.give_up(now, known, flight, why),
-            State::Over(flight, Err(slip)) if !slip.why.is_refused() => {
-                self.state = State::Over(flight, Err(Slip { why, ..slip }));
-            }
+            // It was cut short before, or given up.
+            State::Over(flight, Err(slip)) => self.state = State::Over(flight, Err(Slip { why, ..slip })),
             State::Heard(flight, Err(slip)) if !slip.why.is_refused() => {
                 self.state = State::Heard(flight, Err(Slip { why, ..slip }));
             }

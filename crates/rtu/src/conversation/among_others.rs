@@ -81,10 +81,13 @@ impl<const U: usize, const P: usize> Known<U, P> {
         let (watched, has_others) = (self.watched(unit), self.master.has_others(now, unit));
         let is_watched = has_others || !watched.has_met();
         let is_behind = watched.may_be_behind(now, shape(&ask.request));
-        if theirs.is_none() && !(is_watched && apart) {
-            let parts = is_behind && !in_quarantine;
-            if !apart || !is_behind {
+        if theirs.is_none() {
+            if !apart {
+                let parts = is_behind && !in_quarantine;
                 return parts.then(|| self.parts(now, unit, &ask.request)).flatten();
+            }
+            if !is_watched && !is_behind {
+                return None;
             }
         }
         let mut free = Lengths::NONE;

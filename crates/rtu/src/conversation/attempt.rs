@@ -187,7 +187,7 @@ impl<'r> Conversation<'r> {
         let asked = ask.destination.unit().map(|unit| known.asked(unit));
         if self.course.hearing.as_ref().is_none_or(|hearing| hearing.known != asked) {
             let agreement = Agreement::new(attribution, 1 + u8::from(twice));
-            let is_repeated = asked.is_some() && !agreement.is_immediate();
+            let is_repeated = !agreement.is_immediate();
             if let Attribution::Repeat { words, .. } = attribution {
                 self.course.takes_more(u32::from(words) - 1, ask.timeout);
             }

@@ -8,7 +8,7 @@ use super::known::{Ask, Known};
 use super::outcome::{Slip, Times, Unanswered};
 use super::probes::Probe;
 use super::{Conversation, OwnEcho, State, Urgency};
-use crate::{Adu, Answer, Instant, Request};
+use crate::{Answer, Instant, Request};
 
 impl<'r> Conversation<'r> {
     /// `flight` has come to `result`, and that was told: learns from it, and goes on.
@@ -90,8 +90,8 @@ impl<'r> Conversation<'r> {
             {
                 match known.look(now, &ask, false) {
                     Some(request) => {
-                        let look = Ask { request, in_doubt: true, ..ask };
-                        self.send(now, known, look, Purpose::LookAfter { times });
+                        // It goes out in doubt, as what it stands behind did.
+                        self.send(now, known, Ask { request, ..ask }, Purpose::LookAfter { times });
                     }
                     None => self.looked_after(now, known, times),
                 }
@@ -243,15 +243,8 @@ impl<'r> Conversation<'r> {
         times: Times,
     ) {
         let is_ours = ask.destination.unit().is_none_or(|unit| known.proves(now, unit, &ask.request));
-        let result = if is_ours {
-            Ok(times)
-        } else {
-            match (ask.destination.unit(), self.answer.whole()) {
-                (Some(unit), Some(answer)) => self.came.set(Adu::answer(unit, &answer).as_bytes()),
-                _ => self.came.clear(),
-            }
-            Err(Slip { why: Unanswered::OthersAsk, sent: Some(times.sent), ended: times.ended })
-        };
+        let result =
+            if is_ours { Ok(times) } else { Err(self.slip(Unanswered::OthersAsk, Some(times.sent), times.ended)) };
         self.apart_came_to(now, known, &ask, count, result);
     }
 

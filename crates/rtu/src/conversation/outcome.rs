@@ -252,12 +252,7 @@ impl Kept {
 
     /// With as many words as were asked for.
     pub(super) fn answer(&self) -> Option<Answer<'_>> {
-        self.whole().map(|answer| answer.shortened(self.asked))
-    }
-
-    /// As it came.
-    pub(super) fn whole(&self) -> Option<Answer<'_>> {
-        self.expected?.parse(&self.pdu[..self.len]).ok()
+        Some(self.expected?.parse(&self.pdu[..self.len]).ok()?.shortened(self.asked))
     }
 
     /// The words that it carries.

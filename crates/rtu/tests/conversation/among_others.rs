@@ -294,7 +294,9 @@ fn more_words_that_were_refused_are_not_asked_for_again_where_reads_follow_close
     let mut rig = rig();
     rig.most = 1;
     assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1), read(9, 2)]);
-    assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1)]);
+    for _ in 0..2 {
+        assert_eq!(rig.run(ask(9, 1)).sent, [read(9, 1)]);
+    }
 }
 
 #[test]

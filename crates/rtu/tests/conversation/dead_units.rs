@@ -84,6 +84,32 @@ fn damage_shows_that_a_unit_is_there() {
 }
 
 #[test]
+fn a_call_that_was_cut_short_shows_no_unit() {
+    let mut rig = Rig::settled();
+    assert_eq!(rig.run(ask_other()).end, End::Words(vec![7]));
+    rig.then = Nothing;
+    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    let fresh = FreshWords::beginning_at(1);
+    let mut call = Conversation::new(ask(7, 1).in_doubt(true), &fresh);
+    loop {
+        match call.next(rig.now, &mut rig.known) {
+            Step::Send(_) => break,
+            Step::Listen(until) => {
+                rig.now = rig.now.max(until);
+                call.heard(rig.now, &mut rig.known, &[]).unwrap();
+            }
+            Step::Done(outcome) => panic!("{outcome:?}"),
+            _ => {}
+        }
+    }
+    call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
+    assert!(rig.carry_out(&mut call).last_sent.is_some());
+    assert_eq!(rig.run(ask(7, 1).in_doubt(true)).end, silence(1));
+    let told = rig.run(ask(7, 1));
+    assert!(matches!(told.end, End::Failed(Unanswered::NotAsked { .. })), "two silences in a row: {told:?}");
+}
+
+#[test]
 fn a_line_that_is_closed_holds_nobody_back() {
     let mut rig = rig();
     rig.known.closed();

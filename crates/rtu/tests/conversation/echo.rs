@@ -158,6 +158,9 @@ fn a_broadcast_shows_an_adapter_that_echoes_and_none_that_does_not() {
         let mut rig = unknown(echoes);
         assert_eq!(rig.run(to_all(1)).end, End::Done);
         assert_eq!(rig.known.echo(), found, "nobody answers a broadcast: that nothing came says nothing");
+        let many = Request::write_many(9, &[1, 2]).unwrap();
+        assert_eq!(rig.run(Question::new(Destination::Broadcast, many, TIMEOUT)).end, End::Done);
+        assert_eq!(rig.known.echo(), found, "whatever is sent");
     }
 }
 

@@ -172,3 +172,43 @@ fn what_only_shows_whose_answer_it_is_is_never_the_answer() {
     rig.next([Says(words(&[0x111])), Says(words(&[0x222, 0x222])), Says(words(&[5, 6, 7]))]);
     assert_eq!(rig.run(stop(1)).end, End::Words(vec![5]));
 }
+
+#[test]
+fn that_a_read_was_refused_as_it_was_asked_says_only_that_no_more_is_given_there() {
+    let mut rig = rig();
+    rig.next([Refuses(2)]);
+    assert_eq!(rig.run(stop(2)).sent[0], read(9, 2));
+    rig.now = rig.now + ms(10_000);
+    rig.next([Nothing]);
+    assert_eq!(rig.run(ask(0x100, 1).in_doubt(true)).end, silence(1));
+    let told = rig.run(ask(9, 2));
+    assert_eq!((told.end, told.sent), (End::Words(vec![9, 10]), vec![read(9, 2)]), "one word is not taken for two");
+}
+
+#[test]
+fn a_port_that_cannot_be_used_behind_an_input_register_ends_the_call() {
+    let (mut rig, fresh) = (rig(), FreshWords::beginning_at(1));
+    rig.most = 1;
+    assert_eq!(rig.run(stop(1).in_doubt(true)).sent, [read(9, 1)]);
+    let mut call = Conversation::new(stop(1), &fresh);
+    let mut refusal = Vec::new();
+    loop {
+        match call.next(rig.now, &mut rig.known) {
+            Step::Send(frame) if frame[1] == 4 => break,
+            Step::Send(frame) => {
+                refusal = sealed(&[UNIT.get(), frame[1] | 0x80, 3]);
+                call.sent(&mut rig.known, rig.now).unwrap();
+            }
+            Step::Listen(until) => {
+                let bytes = std::mem::take(&mut refusal);
+                rig.now = if bytes.is_empty() { rig.now.max(until) } else { rig.now };
+                call.heard(rig.now, &mut rig.known, &bytes).unwrap();
+            }
+            Step::Done(outcome) => panic!("{outcome:?}"),
+            _ => {}
+        }
+    }
+    call.cut_short(rig.now, &mut rig.known, Cut::Unusable);
+    let told = rig.carry_out(&mut call);
+    assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::Unusable)), 0));
+}

@@ -3,11 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 mod among_others;
+mod among_others_in_doubt;
 mod anything;
+mod coming_in;
 mod dead_units;
 mod echo;
 mod first_contact;
 mod longer_reads;
+mod looks;
 mod misuse;
 mod port;
 mod probes;

@@ -276,3 +276,21 @@ fn the_later_of_two_cuts_counts_and_a_refusal_stays_one() {
     let refused = Unanswered::Refused { function: 3, code: ExceptionCode(2) };
     assert_eq!(rig.carry_out(&mut call).end, End::Failed(refused), "the unit has said what it does");
 }
+
+#[test]
+fn a_call_that_is_misused_while_its_answer_is_proved_says_when_it_asked() {
+    let fresh = FreshWords::beginning_at(1);
+    let mut rig = Rig::opened(Opened::new().may_echo(false).may_have_others(true), OwnEcho::Absent);
+    rig.now = at(5_000);
+    let mut call = Conversation::new(ask(9, 1), &fresh);
+    until_sent(&mut rig, &mut call, 2, &[words(&[9])]);
+    while !matches!(call.next(rig.now, &mut rig.known), Step::Heard(_)) {
+        call.heard(rig.now, &mut rig.known, &words(&[9, 10])).unwrap();
+    }
+    assert!(matches!(call.next(rig.now, &mut rig.known), Step::Listen(_)));
+    assert!(rig.now > at(5_000), "what proves it went out later");
+    rig.now = at(1);
+    let told = rig.carry_out(&mut call);
+    is_misused(&told);
+    assert_eq!(told.last_sent, Some(at(5_000)));
+}

@@ -118,6 +118,8 @@ pub(crate) struct Rig {
     pub(crate) echoes: bool,
     /// What happens when others may go first, in order.
     pub(crate) passes: VecDeque<Cut>,
+    /// What other calls ask then, in order; `None`: this time nobody does.
+    pub(crate) meanwhile: VecDeque<Option<Question<'static>>>,
     /// What it said last.
     before: Vec<u8>,
     /// What is on its way.
@@ -140,6 +142,7 @@ impl Rig {
             registers: BTreeMap::new(),
             echoes: false,
             passes: VecDeque::new(),
+            meanwhile: VecDeque::new(),
             before: Vec::new(),
             wire: VecDeque::new(),
         }
@@ -206,6 +209,11 @@ impl Rig {
                 Step::LetPass => {
                     if let Some(cut) = self.passes.pop_front() {
                         call.cut_short(self.now, &mut self.known, cut);
+                    }
+                    if let Some(other) = self.meanwhile.pop_front().flatten() {
+                        let rest = std::mem::take(&mut self.meanwhile);
+                        self.run(other);
+                        self.meanwhile = rest;
                     }
                 }
                 Step::StandBy(until) => {
