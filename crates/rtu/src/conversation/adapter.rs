@@ -7,8 +7,8 @@ use crate::{Destination, Tally};
 
 impl<const U: usize, const P: usize> Known<U, P> {
     /// Keeps what an exchange has shown about the adapter and the line: why `ask` was not answered, if it was not, so many
-    /// `bytes` that came in the place of the answer, and what was seen beside it.
-    pub(super) fn learn(&mut self, ask: &Ask<'_>, failure: Option<Unanswered>, bytes: usize, tally: Tally) {
+    /// bytes that `begun` an answer which did not end, and what was seen beside it.
+    pub(super) fn learn(&mut self, ask: &Ask<'_>, failure: Option<Unanswered>, begun: usize, tally: Tally) {
         if self.given_echo != OwnEcho::Unknown {
             return;
         }
@@ -28,7 +28,7 @@ impl<const U: usize, const P: usize> Known<U, P> {
         let clean = tally.own_remnant == 0
             && match failure {
                 None | Some(Unanswered::Refused { .. } | Unanswered::Unreached) => true,
-                Some(Unanswered::NoAnswer { .. }) => silent && bytes == 0,
+                Some(Unanswered::NoAnswer { .. }) => silent && begun == 0,
                 Some(_) => false,
             };
         match self.echo {

@@ -37,13 +37,10 @@ pub(super) enum Purpose<'r> {
 }
 
 impl Purpose<'_> {
-    /// Whether what comes is, or may become, the answer that the caller gets.
+    /// Whether what comes is, or may become, the answer that the caller gets. What only prepares a question at first contact gives
+    /// way to what comes behind it.
     fn keeps_the_answer(self) -> bool {
-        match self {
-            Self::FirstContact { put, .. } => matches!(put, Put::Plain | Put::Apart(_)),
-            Self::Proof { .. } | Self::Probe(_) | Self::Look | Self::LookAfter { .. } => false,
-            _ => true,
-        }
+        !matches!(self, Self::Proof { .. } | Self::Probe(_) | Self::Look | Self::LookAfter { .. })
     }
 }
 
@@ -246,12 +243,7 @@ impl<'r> Conversation<'r> {
             Ok(times) => (None, times.ended, true),
             Err(slip) => (Some(slip.why), slip.ended, slip.sent.is_some()),
         };
-        let bytes = match failure {
-            None => 0,
-            Some(why) if why.is_silence() => flight.begun,
-            Some(_) => self.came.as_slice().len(),
-        };
-        known.learn(ask, failure, bytes, flight.tally);
+        known.learn(ask, failure, flight.begun, flight.tally);
         let Some(unit) = unit else { return };
         let refused = failure.is_some_and(Unanswered::is_refused);
         let others = known.others;

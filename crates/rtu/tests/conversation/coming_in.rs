@@ -2,7 +2,6 @@
 
 use drivebus_rtu::*;
 
-use crate::rig::Does::Late;
 use crate::rig::*;
 
 /// A line on which another master's answers come here, too, with nothing in doubt.
@@ -50,24 +49,4 @@ fn a_frame_whose_rest_never_comes_is_waited_for_no_longer_than_the_silence_that_
     assert_eq!((told.end, told.sent[0].clone()), (End::Words(vec![9]), read(9, 1)));
     assert!(told.last_sent.is_some_and(|sent| sent < began + ms(20)), "{:?}", told.last_sent);
     assert_eq!(rig.known.take_strays().noise, 4);
-}
-
-/// A unit whose answers come so much too late, as it has shown once.
-fn late_by(late: Duration) -> Rig {
-    let mut rig = Rig::settled().does([Late(TIMEOUT + ms(5) + late)]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
-    rig.now = rig.now + late;
-    rig.known.stray(rig.now, &words(&[7]));
-    rig.now = rig.now + ms(300);
-    rig
-}
-
-#[test]
-fn a_late_answer_that_came_while_others_had_the_line_leaves_nothing_in_doubt() {
-    let mut rig = late_by(ms(10));
-    rig.next([Late(TIMEOUT + ms(15))]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
-    let told = rig.run(ask(9, 1));
-    assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![read(9, 1)]), "nobody had to be echoed");
-    assert!(!told.stood_by.is_empty());
 }

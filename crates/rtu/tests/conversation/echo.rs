@@ -184,3 +184,17 @@ fn silence_does_not_show_that_an_adapter_echoes_no_more() {
     assert_eq!(rig.run(ask(9, 1)).end, silence(1));
     assert_eq!(rig.known.echo(), OwnEcho::Present, "its cable may be out");
 }
+
+#[test]
+fn a_write_that_comes_back_as_it_went_out_is_the_adapters_unless_that_is_known_not_to_echo() {
+    let many = Request::write_many(9, &[1, 2]).unwrap();
+    let question = Question::new(UNIT.into(), many, TIMEOUT).in_doubt(true);
+    let back = sealed(&[UNIT.get(), 16, 0, 9, 0, 2, 4, 0, 1, 0, 2]);
+    for (known, is_units) in [(OwnEcho::Absent, true), (OwnEcho::Unknown, false), (OwnEcho::Present, false)] {
+        let mut rig = Rig::opened(Opened::new(), known);
+        rig.now = at(5_000);
+        rig.next([Says(back.clone())]);
+        let end = rig.run(question).end;
+        assert_eq!(matches!(end, End::Failed(Unanswered::Wrong(_))), is_units, "{known:?}: {end:?}");
+    }
+}

@@ -212,3 +212,14 @@ fn a_port_that_cannot_be_used_behind_an_input_register_ends_the_call() {
     let told = rig.carry_out(&mut call);
     assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::Unusable)), 0));
 }
+
+#[test]
+fn one_echo_that_was_refused_is_one_answer() {
+    let mut rig = Rig::opened(Opened::new(), OwnEcho::Absent).always(8, Refuses(1));
+    let stale = Question::new(UNIT.into(), Request::echo(1), TIMEOUT);
+    let told = rig.run(stale);
+    assert!(matches!(told.end, End::Failed(Unanswered::Refused { .. })), "{told:?}");
+    assert_eq!(told.sent.len(), 2, "what made sure of the unit, and the question");
+    let told = rig.run(stop(1));
+    assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![read(9, 1), read(9, 2)]));
+}

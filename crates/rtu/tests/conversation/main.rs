@@ -17,4 +17,5 @@ mod probes;
 mod retries;
 mod rig;
 mod verified;
+mod watching;
 mod write_back;

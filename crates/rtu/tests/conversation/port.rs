@@ -196,3 +196,27 @@ fn a_call_goes_only_over_the_connection_that_it_was_meant_for() {
     let told = rig.run(ask(7, 1).connection(Some(2)).retries(3));
     assert_eq!((told.end, told.sent.len(), told.last_sent), (End::Failed(Unanswered::Reopened), 0, None));
 }
+
+#[test]
+fn a_call_that_is_given_up_while_its_unit_or_the_adapter_is_looked_at_sends_nothing_more() {
+    for echo in [OwnEcho::Unknown, OwnEcho::Absent] {
+        let mut rig = Rig::opened(Opened::new(), echo);
+        let fresh = FreshWords::beginning_at(1);
+        let mut call = Conversation::new(set(9, 1).retries(3), &fresh);
+        loop {
+            match call.next(rig.now, &mut rig.known) {
+                Step::Send(_) => break,
+                Step::Listen(until) => {
+                    rig.now = rig.now.max(until);
+                    call.heard(rig.now, &mut rig.known, &[]).unwrap();
+                }
+                Step::Done(outcome) => panic!("{outcome:?}"),
+                _ => {}
+            }
+        }
+        call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
+        let told = rig.carry_out(&mut call);
+        assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::GivenUp)), 0), "{echo:?}");
+        assert_eq!(told.last_sent, None, "the write was not sent");
+    }
+}

@@ -94,7 +94,7 @@ fn no_attempt_begins_when_the_time_of_all_of_them_is_over() {
     }
     let told = rig.run(ask(7, 1).gap(ms(50)).retries(1));
     assert_eq!(told.end, End::Failed(Unanswered::Busy { timeout: TIMEOUT }));
-    assert_eq!((told.sent.len(), told.last_sent), (0, None));
+    assert_eq!((told.sent.len(), told.last_sent, told.before), (0, None, false));
     assert_eq!(rig.now, at(5_300), "two attempts, each for the time-out and the silence that is asked for");
 }
 

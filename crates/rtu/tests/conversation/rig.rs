@@ -81,6 +81,8 @@ use Does::{And, AndBefore, Damaged, DoneUnsaid, Late, Nothing, Refuses, Right, S
 pub(crate) struct Told {
     /// What went out, without the words of echoes.
     pub(crate) sent: Vec<Vec<u8>>,
+    /// When each of them did.
+    pub(crate) sent_at: Vec<Instant>,
     pub(crate) stood_by: Vec<Instant>,
     pub(crate) exchanges: Vec<Option<Unanswered>>,
     pub(crate) counts: Counts,
@@ -116,8 +118,9 @@ pub(crate) struct Rig {
     pub(crate) registers: BTreeMap<u16, u16>,
     /// The adapter sends our own bytes back.
     pub(crate) echoes: bool,
-    /// What happens when others may go first, in order.
+    /// What happens when others may go first, in order; before that nothing, so many times.
     pub(crate) passes: VecDeque<Cut>,
+    pub(crate) undisturbed: usize,
     /// What other calls ask then, in order; `None`: this time nobody does.
     pub(crate) meanwhile: VecDeque<Option<Question<'static>>>,
     /// What it said last.
@@ -142,6 +145,7 @@ impl Rig {
             registers: BTreeMap::new(),
             echoes: false,
             passes: VecDeque::new(),
+            undisturbed: 0,
             meanwhile: VecDeque::new(),
             before: Vec::new(),
             wire: VecDeque::new(),
@@ -203,11 +207,14 @@ impl Rig {
     }
 
     pub(crate) fn carry_out(&mut self, call: &mut Conversation<'_>) -> Told {
-        let (mut sent, mut stood_by, mut exchanges) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut sent, mut sent_at) = (Vec::new(), Vec::new());
+        let (mut stood_by, mut exchanges) = (Vec::new(), Vec::new());
         for _ in 0..MANY {
             match call.next(self.now, &mut self.known) {
                 Step::LetPass => {
-                    if let Some(cut) = self.passes.pop_front() {
+                    if self.undisturbed > 0 {
+                        self.undisturbed -= 1;
+                    } else if let Some(cut) = self.passes.pop_front() {
                         call.cut_short(self.now, &mut self.known, cut);
                     }
                     if let Some(other) = self.meanwhile.pop_front().flatten() {
@@ -223,6 +230,7 @@ impl Rig {
                 Step::Send(frame) => {
                     let frame = frame.to_vec();
                     let end = self.now + SENDING;
+                    sent_at.push(self.now);
                     call.sent(&mut self.known, end).unwrap();
                     self.goes_out(end, &frame);
                     sent.push(if frame[1] == 8 { vec![UNIT.get(), 8] } else { frame });
@@ -240,6 +248,7 @@ impl Rig {
                 Step::Done(outcome) => {
                     let mut told = Told {
                         sent,
+                        sent_at,
                         stood_by,
                         exchanges,
                         counts: Counts::default(),

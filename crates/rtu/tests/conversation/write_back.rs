@@ -205,3 +205,24 @@ fn all_of_it_happens_over_one_connection() {
     let told = rig.carry_out(&mut call);
     assert_eq!((told.end, told.sent.len()), (silence(1), 0), "behind it another unit may answer");
 }
+
+#[test]
+fn where_the_words_only_come_damaged_that_is_told_and_when_the_write_went_out() {
+    let mut rig = Rig::settled();
+    rig.next([Nothing]);
+    assert_eq!(rig.run(set(9, 5)).end, silence(1), "its confirmation is still to come");
+    rig.always.insert(3, Damaged);
+    let told = rig.run(put(5));
+    assert!(matches!(told.end, End::Failed(Unanswered::Corrupt(_))), "{told:?}");
+    assert_eq!(told.sent[..3], [echo(), write(9, 5), read(9, 1)]);
+    assert_eq!((told.last_sent, told.raw.len()), (Some(told.sent_at[1]), 7));
+}
+
+#[test]
+fn a_write_that_is_given_up_before_it_goes_out_once_more_went_out_before() {
+    let mut rig = Rig::settled().does([Nothing, Right, Right]);
+    (rig.undisturbed, rig.passes) = (3, [Cut::GivenUp].into());
+    let told = rig.run(put(5).retries(1));
+    assert_eq!(told.sent, [write(9, 5), echo(), read(9, 1)]);
+    assert_eq!((told.end, told.last_sent), (End::Failed(Unanswered::CutShort(Cut::GivenUp)), Some(at(5_000))));
+}
