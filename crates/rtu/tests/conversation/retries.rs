@@ -153,3 +153,11 @@ fn each_request_is_told_when_it_is_over_and_before_the_call_goes_on() {
     let damage = Unanswered::Corrupt(FrameError::TooShort { len: 1 });
     assert_eq!(kinds, [Some(std::mem::discriminant(&silence)), Some(std::mem::discriminant(&damage)), None]);
 }
+
+#[test]
+fn who_prints_a_call_sees_the_bytes_of_its_answer() {
+    let fresh = FreshWords::beginning_at(1);
+    let mut call = Conversation::new(ask(7, 1), &fresh);
+    assert_eq!(Rig::settled().carry_out(&mut call).end, End::Words(vec![7]));
+    assert!(format!("{call:?}").contains("Kept([03, 02, 00, 07])"), "{call:?}");
+}
