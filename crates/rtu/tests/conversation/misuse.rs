@@ -208,6 +208,19 @@ fn of_more_units_than_there_is_room_for_nothing_is_sent() {
     assert!(matches!(Conversation::new(all, &fresh).next(at(5_000), &mut known), Step::LetPass));
 }
 
+#[test]
+fn where_there_is_room_for_few_units_it_is_for_any() {
+    let mut known: Known<2, 1> = Known::new(SerialFormat::DEFAULT, OwnEcho::Absent, 7);
+    let fresh = FreshWords::beginning_at(1);
+    for (unit, is_room) in [(247, true), (100, true), (1, false), (247, true)] {
+        let unit = UnitAddress::new(unit).unwrap();
+        let question = Question::new(unit.into(), Request::read(7, 1).unwrap(), TIMEOUT);
+        let mut call = Conversation::new(question, &fresh);
+        let step = call.next(at(5_000), &mut known);
+        assert_eq!(matches!(step, Step::LetPass), is_room, "{unit:?}: {step:?}");
+    }
+}
+
 /// Goes on with `call` until its request number `requests` is on the wire.
 fn until_sent(rig: &mut Rig, call: &mut Conversation<'_>, requests: usize, came: &[Vec<u8>]) {
     let (mut sent, mut came) = (0, came.iter());
