@@ -10,14 +10,14 @@ fn others() -> Opened {
 }
 
 /// Such a line, with nothing in doubt.
-fn rig() -> Rig {
+pub(crate) fn rig() -> Rig {
     let mut rig = Rig::opened(others(), OwnEcho::Absent);
     rig.now = at(5_000);
     rig
 }
 
 /// Another master has this answered now, and nobody here has asked.
-fn theirs(rig: &mut Rig, frame: &[u8]) {
+pub(crate) fn theirs(rig: &mut Rig, frame: &[u8]) {
     rig.now = rig.now + ms(50);
     rig.known.stray(rig.now, frame);
     rig.now = rig.now + ms(50);

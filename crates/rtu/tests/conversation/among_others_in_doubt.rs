@@ -3,22 +3,9 @@
 
 use drivebus_rtu::*;
 
+use crate::among_others::{rig, theirs};
 use crate::rig::Does::Nothing;
 use crate::rig::*;
-
-/// Such a line, with nothing in doubt.
-fn rig() -> Rig {
-    let mut rig = Rig::opened(Opened::new().may_echo(false).may_have_others(true), OwnEcho::Absent);
-    rig.now = at(5_000);
-    rig
-}
-
-/// Another master has this answered now, and nobody here has asked.
-fn theirs(rig: &mut Rig, frame: &[u8]) {
-    rig.now = rig.now + ms(50);
-    rig.known.stray(rig.now, frame);
-    rig.now = rig.now + ms(50);
-}
 
 #[test]
 fn what_is_verified_is_asked_as_it_is_and_parted_from_what_is_asked_closely_before() {

@@ -2,14 +2,8 @@
 
 use drivebus_rtu::*;
 
+use crate::among_others::rig;
 use crate::rig::*;
-
-/// A line on which another master's answers come here, too, with nothing in doubt.
-fn rig() -> Rig {
-    let mut rig = Rig::opened(Opened::new().may_echo(false).may_have_others(true), OwnEcho::Absent);
-    rig.now = at(5_000);
-    rig
-}
 
 #[test]
 fn what_is_there_when_a_call_begins_is_taken_down_before_it_is_chosen_how_to_ask() {

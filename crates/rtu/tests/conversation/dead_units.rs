@@ -2,6 +2,7 @@
 
 use drivebus_rtu::*;
 
+use crate::misuse::handed_out;
 use crate::rig::Does::{Damaged, Nothing, Right};
 use crate::rig::*;
 
@@ -90,18 +91,7 @@ fn a_call_that_was_cut_short_shows_no_unit() {
     rig.then = Nothing;
     assert_eq!(rig.run(ask(7, 1)).end, silence(1));
     let fresh = FreshWords::beginning_at(1);
-    let mut call = Conversation::new(ask(7, 1).in_doubt(true), &fresh);
-    loop {
-        match call.next(rig.now, &mut rig.known) {
-            Step::Send(_) => break,
-            Step::Listen(until) => {
-                rig.now = rig.now.max(until);
-                call.heard(rig.now, &mut rig.known, &[]).unwrap();
-            }
-            Step::Done(outcome) => panic!("{outcome:?}"),
-            _ => {}
-        }
-    }
+    let mut call = handed_out(&mut rig, ask(7, 1).in_doubt(true), &fresh);
     call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
     assert!(rig.carry_out(&mut call).last_sent.is_some());
     assert_eq!(rig.run(ask(7, 1).in_doubt(true)).end, silence(1));

@@ -5,7 +5,7 @@ use drivebus_rtu::*;
 use crate::rig::*;
 
 /// A call whose request is handed out, and not yet said to be on its way.
-fn handed_out<'r>(rig: &mut Rig, question: Question<'r>, fresh: &'r FreshWords) -> Conversation<'r> {
+pub(crate) fn handed_out<'r>(rig: &mut Rig, question: Question<'r>, fresh: &'r FreshWords) -> Conversation<'r> {
     let mut call = Conversation::new(question, fresh);
     loop {
         match call.next(rig.now, &mut rig.known) {

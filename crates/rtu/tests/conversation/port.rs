@@ -2,6 +2,7 @@
 
 use drivebus_rtu::*;
 
+use crate::misuse::handed_out;
 use crate::rig::Does::{Nothing, Right};
 use crate::rig::*;
 
@@ -202,18 +203,7 @@ fn a_call_that_is_given_up_while_its_unit_or_the_adapter_is_looked_at_sends_noth
     for echo in [OwnEcho::Unknown, OwnEcho::Absent] {
         let mut rig = Rig::opened(Opened::new(), echo);
         let fresh = FreshWords::beginning_at(1);
-        let mut call = Conversation::new(set(9, 1).retries(3), &fresh);
-        loop {
-            match call.next(rig.now, &mut rig.known) {
-                Step::Send(_) => break,
-                Step::Listen(until) => {
-                    rig.now = rig.now.max(until);
-                    call.heard(rig.now, &mut rig.known, &[]).unwrap();
-                }
-                Step::Done(outcome) => panic!("{outcome:?}"),
-                _ => {}
-            }
-        }
+        let mut call = handed_out(&mut rig, set(9, 1).retries(3), &fresh);
         call.cut_short(rig.now, &mut rig.known, Cut::GivenUp);
         let told = rig.carry_out(&mut call);
         assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::CutShort(Cut::GivenUp)), 0), "{echo:?}");
