@@ -168,6 +168,12 @@ impl<'r> Conversation<'r> {
                 }
             }
             self.attempt.tried.failure = Some((slip, self.came));
+        } else if let (Some(unit), Some(hearing)) = (self.unit(), &mut self.course.hearing) {
+            // What only the probe came between goes on being heard: its answer is there, and is no rival.
+            let (asked, openings) = known.asked(unit);
+            if hearing.known == Some((asked.wrapping_sub(1), openings)) {
+                hearing.known = Some((asked, openings));
+            }
         }
         // Who polls comes again: the others wait for one time-out at a time.
         let is_poll = self.question.urgency == Urgency::Poll;

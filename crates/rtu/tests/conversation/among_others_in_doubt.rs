@@ -19,6 +19,19 @@ fn what_is_verified_is_asked_as_it_is_and_parted_from_what_is_asked_closely_befo
 }
 
 #[test]
+fn what_is_verified_agrees_though_other_reads_part_what_is_asked() {
+    let told = rig().run(ask(9, 2).verify(true));
+    assert_eq!((told.end, told.sent), (End::Words(vec![9, 10]), vec![read(9, 2), read(9, 1), read(9, 2)]));
+    assert_eq!(told.counts.verified, 1);
+    // What another call asked in between may be open, and what was heard before counts no more.
+    let mut rig = rig();
+    rig.meanwhile = [None, Some(ask(9, 2).in_doubt(true))].into();
+    let told = rig.run(ask(9, 2).verify(true));
+    assert_eq!(told.end, End::Words(vec![9, 10]));
+    assert_eq!(told.sent.iter().filter(|sent| **sent == read(9, 2)).count(), 3, "{:02X?}", told.sent);
+}
+
+#[test]
 fn a_unit_in_doubt_is_echoed_before_anything_else_is_asked_of_it() {
     // Whether it was read before or not, closely behind or not, and whether the question may have another length.
     for (met, pause, verify) in
