@@ -92,6 +92,7 @@ layers: $(VENV)/.created
 	$(BIN)/python tools/check_rings.py
 	$(BIN)/python tools/check_rings.py --self-test
 	$(BIN)/python tools/check_links.py
+	$(BIN)/python tools/check_model.py --texts
 
 rust-lint: $(VENV)/.created
 	$(CARGO) fmt --check

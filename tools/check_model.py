@@ -4,7 +4,8 @@
 matters, and prints the shortest run that shows what the rule is for, or what is never seen without it. A rule that can
 be broken unnoticed is a finding: the exit code is 1 then, or where the text that a break replaces is no longer there.
 Where something is replaced beside the rule, that everything holds with this alone is searched too; so it is where a
-rule only holds back what is assumed. `check_model.py NAME …` takes those whose names hold one of these words.
+rule only holds back what is assumed. `check_model.py NAME …` takes those whose names hold one of these words; with
+`--texts` it only looks whether what they replace is still there.
 """
 
 from __future__ import annotations
@@ -388,16 +389,23 @@ BREAKS = [
         "other-lengths --requests 3",
     ),
     Break(
+        "not when the line brings the same frame twice",
+        LENGTHS,
+        "&& self.is_new(now, frame, at_once)\n        {",
+        "{",
+        "stop-reads --deep",
+    ),
+    Break(
         "one that comes in its turn shows it",
         JUDGE,
-        "self.doubts.learn_length(now, (unit, expected), &frame);",
+        "self.doubts.learn_length(now, (unit, expected), &frame, at_once);",
         "",
         "other-lengths --requests 3",
     ),
     Break(
         "so does one that comes beside",
         JUDGE,
-        "self.doubts.learn_length_beside(now, unit, &frame);",
+        "self.doubts.learn_length_beside(now, unit, &frame, at_once);",
         "",
         "other-lengths --requests 3",
     ),
@@ -639,6 +647,12 @@ def build(place: Path) -> Path:
     return place / "target/release/drivebus-model"
 
 
+def look_up(text: str, file: str, old: str) -> None:
+    """What is to be replaced in *file* stands there once."""
+    if text.count(old) != 1:
+        raise SystemExit(f"check_model: out of date: {file} holds {text.count(old)} times {old!r}")
+
+
 @contextmanager
 def changed(place: Path, changes: list[Change]) -> Iterator[None]:
     """Replaces in *place* what *changes* say, and puts it back at the end."""
@@ -646,8 +660,7 @@ def changed(place: Path, changes: list[Change]) -> Iterator[None]:
     try:
         for file, old, new in changes:
             text = (place / file).read_text(encoding="utf-8")
-            if text.count(old) != 1:
-                raise SystemExit(f"check_model: out of date: {file} holds {text.count(old)} times {old!r}")
+            look_up(text, file, old)
             (place / file).write_text(text.replace(old, new), encoding="utf-8")
         yield
     finally:
@@ -700,10 +713,16 @@ def main() -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="only breaks whose names hold one of these")
+    parser.add_argument("--texts", action="store_true", help="only look whether what is replaced is still there")
     parser.add_argument("--threads", type=int, default=2, help="so many searches at a time (default: %(default)s)")
     arguments = parser.parse_args()
     names: list[str] = arguments.names
     chosen = [broken for broken in BREAKS if not names or any(name in broken.name for name in names)]
+    if arguments.texts:
+        for broken in chosen:
+            for file, old, _ in filter(None, [(broken.file, broken.old, broken.new), broken.beside]):
+                look_up((ROOT / file).read_text(encoding="utf-8"), file, old)
+        return 0
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
     began, searches = time.monotonic(), Searches(target / "model")
     results = []

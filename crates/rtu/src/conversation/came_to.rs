@@ -90,7 +90,7 @@ impl<'r> Conversation<'r> {
             {
                 match known.look(now, &ask, false) {
                     Some(request) => {
-                        // It goes out in doubt, as what it stands behind did.
+                        // As what it stands behind did, it goes out in doubt, or to a unit that is in none.
                         self.send(now, known, Ask { request, ..ask }, Purpose::LookAfter { times });
                     }
                     None => self.looked_after(now, known, times),
