@@ -96,6 +96,9 @@ BEGUN = (
 # Open requests of one kind share one time, as five of them do; the search leaves fewer open.
 ONE_TIME = (DOUBT, "const APART: usize = 4;", "const APART: usize = 1;")
 
+# What an open answer could pass for is asked while that may come, as a stop does.
+UNWATCHED = (KNOWN, "if waits\n            && (in_quarantine", "if false\n            && (in_quarantine")
+
 BREAKS = [
     # --- first contact
     Break(
@@ -376,8 +379,8 @@ BREAKS = [
     Break(
         "nor when the adapter may have sent it",
         DOUBT,
-        "self.closes(now, answers, |open| !open.expected.may_repeat_request());",
-        "self.closes(now, answers, |_| true);",
+        "self.closes(now, answers, |open| !open.expected.may_repeat_request(), false);",
+        "self.closes(now, answers, |_| true, false);",
         "adapter-echoes --requests 4 --retries 0",
     ),
     # --- other lengths
@@ -518,7 +521,8 @@ BREAKS = [
         DOUBT,
         "open.window = open.window.max(window(timeout));",
         "",
-        "damaged-again",
+        "damaged-again --requests 4 --faults 1",
+        beside=UNWATCHED,
     ),
     # --- the agreement
     Break(

@@ -304,7 +304,7 @@ impl Doubts {
             open.unit == unit
                 && matches!(open.expected.judge(frame.pdu()), Ok(answer) if !matches!(answer, Answer::Exception { .. }))
         };
-        self.closes(now, answers, |open| !open.expected.may_repeat_request());
+        self.closes(now, answers, |open| !open.expected.may_repeat_request(), false);
         is_nobodys
     }
 

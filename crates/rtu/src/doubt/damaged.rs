@@ -7,18 +7,25 @@ use crate::{Instant, UnitAddress};
 
 impl Doubts {
     /// What came at `now` could be the answers that it `fits`: if these are alike, and it `is_it`, one of them is not open any
-    /// more. Of several that is the one whose time ends first. Returns whether one was closed.
-    pub(super) fn closes(&mut self, now: Instant, fits: impl Fn(&Open) -> bool, is_it: impl Fn(&Open) -> bool) -> bool {
+    /// more, unless it `stays`. Of several that is the one whose time ends first. Returns which one it is.
+    pub(super) fn closes(
+        &mut self,
+        now: Instant,
+        fits: impl Fn(&Open) -> bool,
+        is_it: impl Fn(&Open) -> bool,
+        stays: bool,
+    ) -> Option<(UnitAddress, Expected)> {
         let ends = |open: &Open| if self.open.contains(open.unit) { None } else { Some(open.last + open.window) };
         let still = |open: &&Open| fits(open) && ends(open).is_none_or(|end| now < end);
-        let Some(first) = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window) else {
-            return false;
-        };
+        let first = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window)?;
         let (unit, expected, given_up) = (first.unit, first.expected, first.given_up);
         let (end, count) = (first.last + first.window, first.count);
         let others = self.ledger.iter().flatten().filter(still);
         if !is_it(first) || others.clone().any(|open| (open.unit, open.expected) != (unit, expected)) {
-            return false;
+            return None;
+        }
+        if stays {
+            return Some((unit, expected));
         }
         let is_only = others.count() == 1 && count == 1 && !first.again && now < end;
         let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
@@ -34,25 +41,32 @@ impl Doubts {
             self.lateness.came(now, unit, given_up);
         }
         self.ends_unless_open(now, unit);
-        true
+        Some((unit, expected))
     }
 
     /// Something came damaged at `now` that answers nothing in flight. Where it is beyond doubt one that is open, and could be
-    /// no other, that one is not any more. Returns whether it is.
-    pub(crate) fn seen_damaged(&mut self, now: Instant, bytes: &[u8], is_idle: bool) -> bool {
+    /// no other, that one is not any more, unless it `comes_again`. Returns which one it is.
+    pub(crate) fn seen_damaged(
+        &mut self,
+        now: Instant,
+        bytes: &[u8],
+        is_idle: bool,
+        comes_again: bool,
+    ) -> Option<(UnitAddress, Expected)> {
         if now < self.forgotten_until {
-            return false;
+            return None;
         }
         let (strangers, until, any_length) = (self.strangers, self.strangers_until, self.any_length);
         let strange = |unit| now < until && strangers.contains(unit);
         let could_be = |open: &Open| !open.again && could_be_left_of(open.unit, open.expected, bytes, HEAD - 1);
-        self.closes(now, could_be, |open| {
+        let is_it = |open: &Open| {
             !open.expected.may_repeat_request()
                 && !any_length.contains(open.unit)
                 && !strange(open.unit)
                 && is_left_of(open.unit, open.expected, bytes)
                 && (is_idle || is_surely_left_of(open.unit, open.expected, bytes))
-        })
+        };
+        self.closes(now, could_be, is_it, comes_again)
     }
 
     /// Whether `bytes`, which came in the place of the answer of `unit` to `expected`, could be left of another open one.

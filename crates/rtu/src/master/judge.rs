@@ -257,7 +257,7 @@ impl Master {
             && !self.doubts.could_be_another(now, unit, expected, came)
     }
 
-    /// Whether what came at `range` is a late answer, damaged, and not the one that is waited for; then it is open no more.
+    /// Whether what came at `range` is a late answer, damaged, and not the one that is waited for.
     fn is_late_and_damaged(
         &mut self,
         now: Instant,
@@ -265,11 +265,21 @@ impl Master {
         expected: Expected,
         range: &Range<usize>,
     ) -> bool {
-        let bytes = self.framer.held(range.clone());
         !self.others.may_be()
             && self.beside.in_a_row().is_empty()
-            && !could_be_left_of(unit, expected, bytes, HEAD - 1)
-            && self.doubts.seen_damaged(now, bytes, false)
+            && !could_be_left_of(unit, expected, self.framer.held(range.clone()), HEAD - 1)
+            && self.sees_damaged(now, range.clone(), false)
+    }
+
+    /// Whether what came at `range` is beyond doubt a late answer, damaged. It is open no more where the line has shown that such
+    /// do not come again.
+    fn sees_damaged(&mut self, now: Instant, range: Range<usize>, is_idle: bool) -> bool {
+        let comes_again = !self.torn.none_comes_again(now, Duration::MAX);
+        let late = self.doubts.seen_damaged(now, self.framer.held(range), is_idle, comes_again);
+        late.is_some_and(|late| {
+            self.torn.notes(now, late);
+            true
+        })
     }
 
     /// Whether `frame` is the answer to something that its unit left open.
@@ -453,7 +463,7 @@ impl Master {
     /// What came at `range` while nothing was waited for is no frame: it may be left of one.
     pub(super) fn skip_stray(&mut self, now: Instant, range: Range<usize>) {
         if !self.others.may_be() {
-            self.doubts.seen_damaged(now, self.framer.held(range.clone()), true);
+            self.sees_damaged(now, range.clone(), true);
         }
         self.tally.add_noise(self.framer.held(range));
     }

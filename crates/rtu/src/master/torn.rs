@@ -78,12 +78,17 @@ impl Torn {
         if self.rest.is_some_and(|(until, rest)| now < until && len <= rest) {
             return Open::Long;
         }
+        self.notes(now, (unit, expected));
+        if self.none_comes_again(now, timeout) { Open::No } else { Open::For(again(timeout)) }
+    }
+
+    /// The answer to `damaged` came damaged at `now`, in its place or late.
+    pub(super) fn notes(&mut self, now: Instant, damaged: (UnitAddress, Expected)) {
         self.latest.rotate_left(1);
-        self.latest[ALONE - 1] = Some((unit, expected));
+        self.latest[ALONE - 1] = Some(damaged);
         if self.latest[0].is_some() {
             self.enough.get_or_insert(now);
         }
-        if self.none_comes_again(now, timeout) { Open::No } else { Open::For(again(timeout)) }
     }
 
     /// Whether the line has shown by `now` that what came damaged does not come again.

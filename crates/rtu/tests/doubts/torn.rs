@@ -121,6 +121,17 @@ fn soon_after_something_broke_off_nothing_is_believed_that_may_be_its_rest() {
     assert_eq!(comes_damaged(&mut asker, 3_099, 4), 0);
 }
 
+#[test]
+fn a_late_answer_that_comes_damaged_is_owed_no_more_where_none_comes_again() {
+    for (mut asker, is_owed) in [(patient(), true), (known(), false)] {
+        asker.leaves_open_for(5_000, unit(4), &read(2), Duration::from_millis(500));
+        asker.master.receive(ms(6_000), &damaged(4));
+        let _ = asker.master.poll(ms(6_000 + PAUSE));
+        asker.sends(6_100, unit(9), &read(6), TIMEOUT);
+        assert_eq!(asker.master.attribution(ms(6_100), unit(4), &read(2)).may_be_mistaken(), is_owed);
+    }
+}
+
 /// An answer of which more bytes came than it has is all there.
 #[test]
 fn what_is_longer_than_an_open_answer_leaves_none_of_that_to_come() {
