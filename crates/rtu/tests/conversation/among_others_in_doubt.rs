@@ -4,7 +4,6 @@
 use drivebus_rtu::*;
 
 use crate::among_others::{rig, theirs};
-use crate::rig::Does::Nothing;
 use crate::rig::*;
 
 #[test]
@@ -42,8 +41,7 @@ fn a_unit_in_doubt_is_echoed_before_anything_else_is_asked_of_it() {
             assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]));
             rig.now = rig.now + ms(200);
         }
-        rig.next([Nothing]);
-        assert_eq!(rig.run(ask(9, 16).in_doubt(true)).end, silence(1));
+        rig.is_silent_on(ask(9, 16).in_doubt(true));
         rig.now = rig.now + ms(pause);
         let told = rig.run(ask(9, 16).verify(verify));
         assert_eq!(told.sent[0], echo(), "{met} {pause} {verify}: {:02X?}", told.sent);
@@ -73,8 +71,7 @@ fn where_no_other_length_is_given_a_read_of_fewer_words_parts_two_that_follow_ea
 #[test]
 fn a_read_that_never_went_out_ends_no_doubt_about_the_unit() {
     let mut rig = of_three();
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(0x100, 1).in_doubt(true)).end, silence(1));
+    rig.is_silent_on(ask(0x100, 1).in_doubt(true));
     // The line is never silent for as long as the caller wants.
     rig.known.stray(rig.now, &[0xFF]);
     for millis in 6..120 {

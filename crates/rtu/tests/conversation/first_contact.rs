@@ -179,8 +179,7 @@ fn that_a_read_was_refused_as_it_was_asked_says_only_that_no_more_is_given_there
     rig.next([Refuses(2)]);
     assert_eq!(rig.run(stop(2)).sent[0], read(9, 2));
     rig.now = rig.now + ms(10_000);
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(0x100, 1).in_doubt(true)).end, silence(1));
+    rig.is_silent_on(ask(0x100, 1).in_doubt(true));
     let told = rig.run(ask(9, 2));
     assert_eq!((told.end, told.sent), (End::Words(vec![9, 10]), vec![read(9, 2)]), "one word is not taken for two");
 }

@@ -49,8 +49,7 @@ fn looks_that_only_come_damaged_are_told_when_the_call_may_send_no_more() {
 fn an_echo_that_came_damaged_is_not_one_that_the_unit_does_not_know() {
     let mut rig = Rig::settled();
     assert_eq!(rig.run(ask(7, 1)).end, End::Words(vec![7]), "it lives, and 7 can be read");
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    rig.is_silent_on(ask(7, 1));
     rig.always.insert(8, Damaged);
     let told = rig.run(set(9, 1));
     assert!(told.sent.len() > 1 && told.sent.iter().all(|sent| *sent == echo()), "{:02X?}", told.sent);
@@ -59,8 +58,7 @@ fn an_echo_that_came_damaged_is_not_one_that_the_unit_does_not_know() {
 #[test]
 fn longer_reads_that_came_damaged_are_asked_for_again() {
     let mut rig = Rig::settled().always(8, Right);
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(0x100, 1).in_doubt(true)).end, silence(1));
+    rig.is_silent_on(ask(0x100, 1).in_doubt(true));
     rig.next([Damaged, Damaged, Damaged]);
     let told = rig.run(ask(9, 1).retries(1));
     assert!(matches!(told.end, End::Failed(Unanswered::Corrupt(_))), "{:?}", told.end);
@@ -73,8 +71,7 @@ fn answers_that_have_to_agree_and_do_not_are_told_when_the_call_may_send_no_more
     let mut rig = Rig::settled();
     rig.most = 1;
     for _ in 0..3 {
-        rig.next([Nothing]);
-        assert_eq!(rig.run(ask(7, 1).in_doubt(true)).end, silence(1));
+        rig.is_silent_on(ask(7, 1).in_doubt(true));
     }
     let differ = |count: u16| (1..=count).map(|word| Says(words(&[word])));
     let three = rig.known.clone();
@@ -97,8 +94,7 @@ fn answers_that_have_to_agree_and_do_not_are_told_when_the_call_may_send_no_more
 fn for_answers_that_have_to_agree_as_many_failures_more_are_granted_and_no_others() {
     let mut rig = Rig::settled();
     rig.most = 1;
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    rig.is_silent_on(ask(7, 1));
     rig.next([Right, Refuses(3), Right, Damaged, Damaged, Damaged, Right, Right]);
     let told = rig.run(ask(9, 1));
     assert!(matches!(told.end, End::Failed(Unanswered::Corrupt(_))), "{told:?}");

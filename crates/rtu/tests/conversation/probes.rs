@@ -58,8 +58,7 @@ fn a_unit_that_knows_no_echo_is_asked_a_read_of_another_length() {
     let mut rig = Rig::settled();
     assert_eq!(rig.run(ask(7, 1)).end, End::Words(vec![7]), "it lives, and 7 can be read");
     rig.always.insert(8, Nothing);
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    rig.is_silent_on(ask(7, 1));
     let told = rig.run(set(9, 1));
     assert_eq!((told.end, told.sent), (End::Confirmed, vec![echo(), read(7, 2), write(9, 1)]));
 }
@@ -69,8 +68,7 @@ fn a_read_of_such_a_unit_is_put_apart_without_a_probe() {
     let mut rig = Rig::settled();
     assert_eq!(rig.run(ask(7, 1)).end, End::Words(vec![7]));
     rig.always.insert(8, Nothing);
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    rig.is_silent_on(ask(7, 1));
     let told = rig.run(ask(9, 1));
     assert_eq!((told.end, told.sent), (End::Words(vec![9]), vec![echo(), read(9, 2)]));
     assert_eq!(told.counts.resyncs, 2, "the echo, and the read that ends the quarantine");
@@ -82,8 +80,7 @@ fn who_polls_lets_others_go_first_after_each_probe_that_met_silence() {
     for (urgency, attempts) in [(Urgency::Call, 2), (Urgency::Poll, 4)] {
         let mut rig = owes();
         assert_eq!(rig.run(ask(9, 1)).end, End::Words(vec![9]), "it returns echoes");
-        rig.next([Nothing]);
-        assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+        rig.is_silent_on(ask(7, 1));
         rig.always.insert(8, Nothing);
         rig.then = Nothing;
         let told = rig.run(ask(9, 1).urgency(urgency).retries(3));
@@ -97,8 +94,7 @@ fn who_polls_lets_others_go_first_after_each_probe_that_met_silence() {
 fn who_waits_goes_on_after_a_silent_probe() {
     let mut rig = Rig::settled();
     assert_eq!(rig.run(ask(7, 1)).end, End::Words(vec![7]));
-    rig.next([Nothing]);
-    assert_eq!(rig.run(ask(7, 1)).end, silence(1));
+    rig.is_silent_on(ask(7, 1));
     rig.always.insert(8, Nothing);
     let told = rig.run(ask(9, 1));
     assert_eq!(told.end, End::Words(vec![9]));

@@ -170,6 +170,13 @@ impl Rig {
         self
     }
 
+    /// The unit leaves `question`, which is asked once, without an answer.
+    #[track_caller]
+    pub(crate) fn is_silent_on(&mut self, question: Question<'_>) {
+        self.next([Nothing]);
+        assert_eq!(self.run(question).end, silence(1));
+    }
+
     /// From the start, or for good, it does this with requests of `function`.
     pub(crate) fn always(mut self, function: u8, does: Does) -> Self {
         self.always.insert(function, does);

@@ -28,15 +28,18 @@ impl Careful {
     /// Lets pass what comes until there is silence.
     fn quiet(&mut self) {
         self.last = self.line.now();
+        self.keeps_silence();
+    }
+
+    /// The same, from the last character on.
+    fn keeps_silence(&mut self) {
         while self.line.next(self.last + self.format.t35()).is_some() {
             self.last = self.line.now();
         }
     }
 
     fn send(&mut self, request: &[u8]) -> Instant {
-        while self.line.next(self.last + self.format.t35()).is_some() {
-            self.last = self.line.now();
-        }
+        self.keeps_silence();
         self.line.send_now(request)
     }
 
