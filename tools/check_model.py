@@ -503,8 +503,7 @@ BREAKS = [
     Break(
         "a damaged answer may have been another's",
         JUDGE,
-        "Open::No => {\n                let follow = self.time_to_follow(expected);\n"
-        "                self.doubts.taken(now, unit, expected, timeout, false, follow);\n            }",
+        "Open::No => self.takes(now, unit, expected, timeout, false),",
         "Open::No => {}",
         "damaged-once --lingers 1",
         beside=(TORN, *BELIEVED),

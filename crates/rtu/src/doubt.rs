@@ -487,6 +487,11 @@ impl Doubts {
         self.of(unit).filter(move |open| !open.expected.is_echo() && (in_doubt || !open.is_past(now)))
     }
 
+    /// Whether the answer may still come: its unit is in quarantine, or it may overtake.
+    fn may_come(&self, now: Instant, open: &Open) -> bool {
+        self.open.contains(open.unit) || !open.is_past(now)
+    }
+
     fn of(&self, unit: UnitAddress) -> impl Iterator<Item = &Open> {
         let ledger = if self.listed.contains(unit) { &self.ledger[..] } else { &[] };
         ledger.iter().flatten().filter(move |open| open.unit == unit)

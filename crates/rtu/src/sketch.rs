@@ -54,11 +54,7 @@ impl Sketch {
 
     /// Whether no more than one character of the head is damaged in `bytes`, and few are missing.
     pub(crate) fn is_told_in(self, bytes: &[u8]) -> bool {
-        self.damaged_in(bytes) <= 1 && self.lost_in(bytes).is_some_and(|lost| lost <= self.may_lose())
-    }
-
-    const fn may_lose(self) -> usize {
-        may_lose(self.len)
+        self.damaged_in(bytes) <= 1 && self.lost_in(bytes).is_some_and(|lost| lost <= may_lose(self.len))
     }
 }
 
@@ -73,7 +69,8 @@ pub(crate) fn could_be_left_of(unit: UnitAddress, expected: Expected, bytes: &[u
     // Of an answer of unknown length anything.
     let Some(sketch) = Sketch::of(unit, expected) else { return true };
     bytes.starts_with(&sketch.head)
-        || (sketch.damaged_in(bytes) <= most && sketch.lost_in(bytes).is_some_and(|lost| lost <= 2 * sketch.may_lose()))
+        || (sketch.damaged_in(bytes) <= most
+            && sketch.lost_in(bytes).is_some_and(|lost| lost <= 2 * may_lose(sketch.len)))
 }
 
 /// Whether `bytes`, which came while nothing was in flight, are what is left of the answer of `unit` to `expected`.

@@ -280,9 +280,9 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         }
         if waits
             && (in_quarantine || attribution.may_be_mistaken())
-            && let Some(until) = self.master.worth_watching(now, unit, &ask.request, ask.timeout)
+            && let Some(until) = self.watches(now, unit, ask)
         {
-            return Next::Watch(self.looks_again(now, until, &ask.request));
+            return Next::Watch(until);
         }
         if self.echo == OwnEcho::Unknown && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;
@@ -321,13 +321,13 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         if self.longer.form(&self.master, now, unit, &ask.request).is_some() {
             return None;
         }
-        let until = self.master.worth_watching(now, unit, &ask.request, ask.timeout)?;
-        Some(self.looks_again(now, until, &ask.request))
+        self.watches(now, unit, ask)
     }
 
-    /// When to look again whether something has come that may by `until`.
-    fn looks_again(&self, now: Instant, until: Instant, request: &Request<'_>) -> Instant {
-        until.min(now + self.answer_time(request).max(LOOKS_APART))
+    /// When to look again whether what `unit` owes has come, where it is worth to wait for that before `ask`.
+    fn watches(&self, now: Instant, unit: UnitAddress, ask: &Ask<'_>) -> Option<Instant> {
+        let until = self.master.worth_watching(now, unit, &ask.request, ask.timeout)?;
+        Some(until.min(now + self.answer_time(&ask.request).max(LOOKS_APART)))
     }
 
     pub(super) fn knows_no_echo(&self, unit: UnitAddress) -> bool {

@@ -15,8 +15,7 @@ impl Doubts {
         is_it: impl Fn(&Open) -> bool,
         stays: bool,
     ) -> Option<(UnitAddress, Expected)> {
-        let ends = |open: &Open| if self.open.contains(open.unit) { None } else { Some(open.last + open.window) };
-        let still = |open: &&Open| fits(open) && ends(open).is_none_or(|end| now < end);
+        let still = |open: &&Open| fits(open) && self.may_come(now, open);
         let first = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window)?;
         let (unit, expected, given_up) = (first.unit, first.expected, first.given_up);
         let (end, count) = (first.last + first.window, first.count);
@@ -76,7 +75,7 @@ impl Doubts {
         let most = damaged_head(unit, expected, bytes);
         let is_other = |open: &Open| {
             (open.unit != unit || !open.expected.could_pass_for(expected))
-                && (self.open.contains(open.unit) || !open.is_past(now))
+                && self.may_come(now, open)
                 && could_be_left_of(open.unit, open.expected, bytes, most)
         };
         now < self.forgotten_until || self.gives_any_length(unit) || self.ledger.iter().flatten().any(is_other)
@@ -85,8 +84,8 @@ impl Doubts {
     /// How many bytes may follow `bytes`, which came in the place of the answer of `unit` to `expected` and cannot be told: of
     /// the longest among the answers that begin like them.
     pub(crate) fn rest(&self, now: Instant, unit: UnitAddress, expected: Expected, bytes: &[u8]) -> usize {
-        let is_open = |open: &&Open| self.open.contains(open.unit) || !open.is_past(now);
-        let open = self.ledger.iter().flatten().filter(is_open).map(|open| rest_of(open.unit, open.expected, bytes));
+        let open = self.ledger.iter().flatten().filter(|open| self.may_come(now, open));
+        let open = open.map(|open| rest_of(open.unit, open.expected, bytes));
         let own = rest_of(unit, expected, bytes);
         open.fold(
             own,

@@ -161,11 +161,14 @@ impl Master {
             (false, ..) => self.doubts.left_open(now, unit, expected, timeout),
             (true, true, true) => self.doubts.refused_echo(now, unit),
             (true, false, echo) if echo || apart => self.doubts.settle(now, unit, echo),
-            (true, refused, _) => {
-                let follow = self.time_to_follow(expected);
-                self.doubts.taken(now, unit, expected, timeout, refused, follow);
-            }
+            (true, refused, _) => self.takes(now, unit, expected, timeout, refused),
         }
+    }
+
+    /// What came of `unit`, or its refusal, is taken for the answer to `expected`.
+    fn takes(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration, refused: bool) {
+        let follow = self.time_to_follow(expected);
+        self.doubts.taken(now, unit, expected, timeout, refused, follow);
     }
 
     /// What came at `range` is no frame: noise, or `is_damaged`: it begins as the answer does.
@@ -209,17 +212,14 @@ impl Master {
         let is_refusal = |frame: Frame<'_>| matches!(expected.judge(frame.pdu()), Ok(Answer::Exception { .. }));
         if expected.is_read() && !doubted && passed.is_some_and(is_refusal) {
             // It counts as the own one; where it is not, that one is nobody's when it comes.
-            self.doubts.taken(now, unit, expected, timeout, true, Duration::ZERO);
+            self.takes(now, unit, expected, timeout, true);
             return match self.others.passed() {
                 Some(frame) => passed_over(expected, frame, doubted),
                 None => Event::NoAnswer { bytes: &[] },
             };
         }
         match self.is_still_open(now, unit, expected, timeout) {
-            Open::No => {
-                let follow = self.time_to_follow(expected);
-                self.doubts.taken(now, unit, expected, timeout, false, follow);
-            }
+            Open::No => self.takes(now, unit, expected, timeout, false),
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
             Open::Long => self.doubts.left_open(now, unit, expected, timeout),
         }
@@ -276,10 +276,9 @@ impl Master {
     fn sees_damaged(&mut self, now: Instant, range: Range<usize>, is_idle: bool) -> bool {
         let comes_again = !self.torn.none_comes_again(now, Duration::MAX);
         let late = self.doubts.seen_damaged(now, self.framer.held(range), is_idle, comes_again);
-        late.is_some_and(|late| {
-            self.torn.notes(now, late);
-            true
-        })
+        let Some(late) = late else { return false };
+        self.torn.notes(now, late);
+        true
     }
 
     /// Whether `frame` is the answer to something that its unit left open.
@@ -344,13 +343,13 @@ impl Master {
     /// A frame came that answers nothing in flight.
     pub(super) fn see(&mut self, now: Instant, range: Range<usize>) {
         let (at_once, frame) = (self.at_once(range.len()), self.framer.frame(range));
+        let unit = UnitAddress::new(frame.address()).ok();
         // Of what is late nothing is learned.
-        let is_late = UnitAddress::new(frame.address()).is_ok_and(|unit| self.doubts.awaits(now, unit, &frame));
-        if !is_late {
+        if !unit.is_some_and(|unit| self.doubts.awaits(now, unit, &frame)) {
             self.torn.see(&frame);
         }
         if !self.others.may_be()
-            && let Ok(unit) = UnitAddress::new(frame.address())
+            && let Some(unit) = unit
         {
             self.doubts.learn_length_beside(now, unit, &frame, at_once);
         }
