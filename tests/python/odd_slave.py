@@ -41,10 +41,16 @@ def good(request: bytes) -> bytes:
     return body + crc(body)
 
 
+def _ends(buffer: bytearray, start: int) -> range:
+    """Where a request may end that begins at *start*: the CRC of a part of an echo may be the word that it carries."""
+    last = len(buffer) + 1
+    return range(start + (8 if buffer[start + 1 : start + 2] == b"\x08" else 4), last)
+
+
 def _requests(buffer: bytearray) -> Iterator[bytes]:
     """The requests in *buffer*, which is left with what begins one; without their CRC, and what lies before."""
     while True:
-        places = ((start, end) for start in range(len(buffer)) for end in range(start + 4, len(buffer) + 1))
+        places = ((start, end) for start in range(len(buffer)) for end in _ends(buffer, start))
         found = ((start, end) for start, end in places if crc(bytes(buffer[start : end - 2])) == buffer[end - 2 : end])
         start, end = next(found, (0, 0))
         if not end:
