@@ -96,9 +96,6 @@ BEGUN = (
 # Open requests of one kind share one time, as five of them do; the search leaves fewer open.
 ONE_TIME = (DOUBT, "const APART: usize = 4;", "const APART: usize = 1;")
 
-# What an open answer could pass for is asked while that may come, as a stop does.
-UNWATCHED = (KNOWN, "if waits\n            && (in_quarantine", "if false\n            && (in_quarantine")
-
 BREAKS = [
     # --- first contact
     Break(
@@ -520,8 +517,7 @@ BREAKS = [
         DOUBT,
         "open.window = open.window.max(window(timeout));",
         "",
-        "damaged-again --requests 4 --faults 1",
-        beside=UNWATCHED,
+        "damaged-again-one --requests 5",
     ),
     # --- the agreement
     Break(

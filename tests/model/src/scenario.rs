@@ -414,4 +414,16 @@ pub const SCENARIOS: &[Scenario] = &[
         sights: &[Sight::ReadAtOnce, Sight::Late],
         ..LINE
     },
+    Scenario {
+        name: "damaged-again-one",
+        about: "the same, and the unit gives one word at a time, so that reads have to be repeated",
+        overtaking: true,
+        damage: Damage::Again,
+        longest: 1,
+        kinds: &[Kind::Watch],
+        small: Budget { faults: 1, retries: 0, ..Budget::requests(4) },
+        deep: Budget { faults: 1, retries: 0, ..Budget::requests(5) },
+        sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late],
+        ..LINE
+    },
 ];

@@ -44,6 +44,7 @@ lines! {
     unit_replaced: "replaced",
     damaged_once: "damaged-once",
     damaged_again: "damaged-again",
+    damaged_again_one_word_at_a_time: "damaged-again-one",
 }
 
 #[test]
