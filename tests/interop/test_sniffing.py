@@ -47,7 +47,9 @@ def test_pymodbus_to_pymodbus(lump: float, serve: Callable[..., str]) -> None:
         with ear(tap) as heard:
             ask_by_pymodbus(tap.master, COUNT)
         intact, paired, wrong = tap.score(heard)
-    assert (intact, paired, wrong) == (COUNT, COUNT, 0)
+    # On a busy machine it asks some of them again.
+    assert intact >= COUNT
+    assert (paired, wrong) == (intact, 0)
     read = next(each for each in heard if each.function == 3 and each.unit == 1)
     assert read.values == {address: address for address in read.values}, "register a holds a"
 
@@ -58,7 +60,9 @@ def test_libmodbus_to_libmodbus(lump: float, serve: Callable[..., str], libmodbu
         serve("libmodbus_server", tap.unit, libmodbus)
         with ear(tap) as heard:
             ask_by_libmodbus(tap.master, COUNT, libmodbus)
-        assert tap.score(heard) == (COUNT, COUNT, 0)
+        intact, paired, wrong = tap.score(heard)
+    assert intact >= COUNT
+    assert (paired, wrong) == (intact, 0)
 
 
 def test_mbpoll_to_a_simulated_drive(mbpoll: Callable[..., subprocess.CompletedProcess[str]]) -> None:

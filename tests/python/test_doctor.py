@@ -253,11 +253,14 @@ class Wire:
 
     baudrate, bytesize, parity, stopbits = 19200, 8, "E", 1
     timeout: float | None = None
-    in_waiting = 0
 
     def __init__(self, heard: bytes) -> None:
         self.heard = heard
         self.sent = b""
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self.heard)
 
     def read(self, size: int = 1) -> bytes:
         came, self.heard = self.heard[:size], self.heard[size:]
@@ -266,6 +269,10 @@ class Wire:
     def write(self, data: bytes) -> int:
         self.sent += data
         return len(data)
+
+
+# Seconds in which a busy machine reads what is there.
+LISTENS = 0.3
 
 
 class TestListening:
@@ -280,13 +287,13 @@ class TestListening:
         ],
     )
     def test_what_is_heard_before_asking_is_named(self, heard: bytes, expected: str) -> None:
-        found = examine(Wire(heard), 1, listen=0.05)
+        found = examine(Wire(heard), 1, listen=LISTENS)
         assert next(found).name == "port"
         assert next(found).name == expected
         found.close()
 
     def test_frames_of_another_master_are_taken_apart(self) -> None:
-        found = examine(Wire(READ), 1, listen=0.05)
+        found = examine(Wire(READ), 1, listen=LISTENS)
         next(found)
         text = next(found).text
         found.close()
@@ -296,7 +303,7 @@ class TestListening:
 
     def test_another_master_is_not_disturbed(self) -> None:
         wire = Wire(READ + ANSWER)
-        assert [finding.name for finding in examine(wire, listen=0.05)] == ["port", "other_master"]
+        assert [finding.name for finding in examine(wire, listen=LISTENS)] == ["port", "other_master"]
         assert wire.sent == b""
 
     def test_another_master_is_found_at_its_own_speed_before_anything_is_asked(self) -> None:
@@ -307,7 +314,7 @@ class TestListening:
             wires.append(Wire(READ + ANSWER if at_its_speed else bytes.fromhex("5A 93 41 E6 7C")))
             return Bus(wires[-1], read_only=True)
 
-        findings = list(examine("/dev/ttyX", listen=0.02, open=opened))
+        findings = list(examine("/dev/ttyX", listen=LISTENS, open=opened))
         assert [finding.name for finding in findings] == ["port", "unknown_traffic", "other_master"]
         assert findings[-1].values["frames"] == ["01 03 00 04 00 02 85 CA", "01 03 04 13 88 00 00 7E 9D"]
         assert {wire.sent for wire in wires} == {b""}
@@ -323,16 +330,16 @@ class TestListening:
     def test_listening_hears_pieces_with_their_moments(self) -> None:
         with Bus(Wire(READ)) as bus:
             start = bus.now()
-            pieces = bus.listen(0.05)
+            pieces = bus.listen(LISTENS)
             assert b"".join(piece for _, piece in pieces) == READ
             assert all(start <= moment <= bus.now() for moment, _ in pieces)
             assert bus.stats()["requests"] == 0
         with pytest.raises(PortError):
-            bus.listen(0.05)
+            bus.listen(LISTENS)
 
     def test_what_was_heard_is_counted_as_noise(self) -> None:
         with Bus(Wire(b"\x00\xff\x5a")) as bus:
-            bus.listen(0.05)
+            bus.listen(LISTENS)
             stats = bus.stats()
         assert (stats["noise_bytes"], stats["noise_idle"], stats["requests"]) == (3, 2, 0)
 

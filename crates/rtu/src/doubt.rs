@@ -430,20 +430,21 @@ impl Doubts {
     }
 
     /// Until when it is worth to wait whether an answer that `unit` owes is seen, before it is asked for `expected`: a little while,
-    /// where that is soon to come if it comes: no longer than `timeout` after it was given up. Nothing is asked then that would
-    /// meet it on the wire, or be taken for it.
+    /// where that is soon to come if it comes: no longer than `timeout` after it was given up, and less where the unit can be
+    /// asked `otherwise`. Nothing is asked then that would meet it on the wire, or be taken for it.
     pub(crate) fn worth_watching(
         &self,
         now: Instant,
         unit: UnitAddress,
         expected: Expected,
         timeout: Duration,
+        otherwise: bool,
     ) -> Option<Instant> {
         let is_open = |open: &&Open| !open.expected.is_echo() && !open.is_past(now);
         let until = self.of(unit).filter(is_open).map(|open| {
             let worth = match expected.is_read() && self.could_pass(open, expected) {
                 true if open.again => open.last + open.window,
-                true => open.given_up + self.lateness.worth(unit, timeout),
+                true => open.given_up + self.lateness.worth(unit, timeout, otherwise),
                 false => Instant::ZERO,
             };
             open.follows.map_or(worth, |follows| follows.max(worth))

@@ -428,16 +428,17 @@ impl Master {
         self.doubts.attribution(now, unit, expected)
     }
 
-    /// Until when it is worth to wait whether what `unit` owes is seen, before it is asked `request`; `None` where nothing is soon
-    /// to come.
+    /// Until when it is worth to wait whether what `unit` owes is seen, before it is asked `request`, if not `otherwise`;
+    /// `None` where nothing is soon to come.
     pub(crate) fn worth_watching(
         &self,
         now: Instant,
         unit: UnitAddress,
         request: &Request<'_>,
         timeout: Duration,
+        otherwise: bool,
     ) -> Option<Instant> {
-        self.doubts.worth_watching(now, unit, request.expected(), timeout)
+        self.doubts.worth_watching(now, unit, request.expected(), timeout, otherwise)
     }
 
     /// Whether an answer of `unit` that came damaged may come again, whole, and pass for that to `request`.

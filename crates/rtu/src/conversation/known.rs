@@ -280,7 +280,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         }
         if waits
             && (in_quarantine || attribution.may_be_mistaken())
-            && let Some(until) = self.watches(now, unit, ask)
+            && let Some(until) = self.watches(now, unit, ask, apart)
         {
             return Next::Watch(until);
         }
@@ -321,12 +321,14 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         if self.longer.form(&self.master, now, unit, &ask.request).is_some() {
             return None;
         }
-        self.watches(now, unit, ask)
+        self.watches(now, unit, ask, false)
     }
 
-    /// When to look again whether what `unit` owes has come, where it is worth to wait for that before `ask`.
-    fn watches(&self, now: Instant, unit: UnitAddress, ask: &Ask<'_>) -> Option<Instant> {
-        let until = self.master.worth_watching(now, unit, &ask.request, ask.timeout)?;
+    /// When to look again whether what `unit` owes has come, where it is worth to wait for that before `ask`: less long where a
+    /// longer read would be told `apart` from it.
+    fn watches(&self, now: Instant, unit: UnitAddress, ask: &Ask<'_>, apart: bool) -> Option<Instant> {
+        let otherwise = apart && self.longer.form(&self.master, now, unit, &ask.request).is_some();
+        let until = self.master.worth_watching(now, unit, &ask.request, ask.timeout, otherwise)?;
         Some(until.min(now + self.answer_time(&ask.request).max(LOOKS_APART)))
     }
 

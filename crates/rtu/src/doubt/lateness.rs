@@ -30,11 +30,15 @@ impl Lateness {
         self.0[..=place].rotate_right(1);
     }
 
-    /// How long it is worth to wait for an answer of `unit`, from when it was given up: no time at all where none was late yet,
-    /// nor where it takes more than `most`, in which it can be asked again.
-    pub(super) fn worth(&self, unit: UnitAddress, most: Duration) -> Duration {
-        let worth = self.of(unit).saturating_mul(WORTH);
-        if worth <= most { worth } else { Duration::ZERO }
+    /// How long it is worth to wait for an answer of `unit`, from when it was given up, `most` at most. No time at all where none
+    /// was late yet, or they take longer; nor, where the unit can be asked `otherwise`, if that may be all of it.
+    pub(super) fn worth(&self, unit: UnitAddress, most: Duration, otherwise: bool) -> Duration {
+        let late = self.of(unit);
+        match late.saturating_mul(WORTH) {
+            worth if worth <= most => worth,
+            _ if late <= most && !otherwise => most,
+            _ => Duration::ZERO,
+        }
     }
 
     fn of(&self, unit: UnitAddress) -> Duration {

@@ -3,6 +3,7 @@
 use drivebus_rtu::*;
 
 use crate::rig::Does::{Damaged, Late, Nothing, Right};
+use crate::rig::words as words_of;
 use crate::rig::*;
 
 /// So much too late the answers of the unit come.
@@ -45,6 +46,24 @@ fn one_that_does_not_come_is_waited_for_so_long_and_then_the_unit_is_made_sure_o
     let told = rig.run(ask(9, 1));
     assert_eq!((told.end, told.sent[0].clone()), (End::Words(vec![9]), echo()));
     assert_eq!(told.stood_by.last(), Some(&(began + WORTH)));
+}
+
+#[test]
+fn one_that_takes_most_of_a_time_out_is_waited_for_where_nothing_else_tells_it_apart() {
+    for (late, words) in [(ms(60), 1), (ms(60), 16), (TIMEOUT + ms(20), 16)] {
+        let mut rig = Rig::settled().does([Nothing]);
+        assert_eq!(rig.run(ask(7, words)).end, silence(1));
+        rig.now = rig.now + late;
+        let whole: Vec<_> = (7..7 + words).collect();
+        rig.known.stray(rig.now, &words_of(&whole));
+        rig.now = rig.now + ms(300);
+        rig.is_silent_on(ask(7, words));
+        let began = rig.now;
+        let told = rig.run(ask(9, words));
+        assert_eq!(told.end, End::Words((9..9 + words).collect()));
+        let is_waited_for = told.stood_by.contains(&(began + TIMEOUT));
+        assert_eq!(is_waited_for, words == 16 && late < TIMEOUT, "{late:?}, {words} words");
+    }
 }
 
 #[test]

