@@ -46,8 +46,8 @@ def test_the_slave_outlives_a_port_that_goes_just_before_it_is_watched(
 
     def goes_first(read: Sequence[int], write: Sequence[int], rare: Sequence[int], timeout: float | None) -> object:
         if len(read) > 1 and not gone.is_set():
-            gone.set()
             slave.vanish()
+            gone.set()
         return watch(read, write, rare, timeout)
 
     with Slave(tmp_path) as slave, monkeypatch.context() as patch:
