@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from drivebus.later import later
 
 if TYPE_CHECKING:
-    from drivebus import doctor, rtu, sim, trial
+    from drivebus import doctor, record, rtu, sim, trial
     from drivebus._native import SerialFormat, __version__, crc16
     from drivebus.backup import Backup, Diff, Difference, Restoration, Restored
     from drivebus.bus import Bus
@@ -111,6 +111,7 @@ __all__ = [
     "doctor",
     "ports",
     "profiles",
+    "record",
     "rtu",
     "search",
     "sim",
@@ -134,7 +135,6 @@ if not TYPE_CHECKING:
                 "DrivebusWarning",
                 "NoAnswer",
                 "NotAllowed",
-                "NotStopped",
                 "NotStopped",
                 "PortError",
                 "Refused",
@@ -164,7 +164,7 @@ if not TYPE_CHECKING:
                 "Status",
             ),
         },
-        modules=("doctor", "rtu", "sim", "trial"),
+        modules=("doctor", "record", "rtu", "sim", "trial"),
     )
 
 

@@ -18,7 +18,7 @@ import pytest
 
 import drivebus
 import drivebus.aio
-from drivebus import doctor, rtu, sim
+from drivebus import doctor, record, rtu, sim
 from drivebus.cli import cli
 
 FROZEN = Path(__file__).with_name("public_surface.txt")
@@ -36,7 +36,7 @@ NOT_MEANT = {
 def surface() -> Iterator[str]:
     """Each public name with its signature."""
     instances = _instances()
-    for module in (drivebus, drivebus.aio, doctor, rtu, sim):
+    for module in (drivebus, drivebus.aio, doctor, record, rtu, sim):
         for name in module.__all__:
             yield from _of(f"{module.__name__}.{name}", getattr(module, name), instances)
     yield from _commands("drivebus", cli)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import logging
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NAME = re.compile(r"\bdrivebus\.(?!toml|cli|hal\b|com\b)[a-z]+\.[A-Za-z]\w+")
 PORT = re.compile(r'"(?:sim://gd350|/dev/ttyUSB\d)"')
 
 
@@ -39,6 +42,18 @@ def test_python_blocks_run(block: str, capsys: pytest.CaptureFixture[str]) -> No
     finally:
         logging.getLogger("drivebus").setLevel(logging.NOTSET)
     assert capsys.readouterr().out, "a block shows something"
+
+
+def test_names_of_the_pages_are_there_after_a_plain_import() -> None:
+    """A page that names `drivebus.record.read` means it: nothing else has to be imported, but asyncio's face."""
+    pages = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    paths = sorted(path for path in set(NAME.findall(pages)) if not path.startswith("drivebus.aio"))
+    assert {"drivebus.record.read", "drivebus.doctor.examine", "drivebus.rtu.decode"} <= set(paths)
+    for path in paths:
+        asked = subprocess.run(
+            [sys.executable, "-c", f"import drivebus; {path}"], capture_output=True, text=True, check=False
+        )
+        assert asked.returncode == 0, f"{path}: {asked.stderr}"
 
 
 def test_the_readme_is_the_first_block() -> None:
