@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from errno import EIO
 from typing import Any
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "DrivebusWarning",
     "NoAnswer",
     "NotAllowed",
+    "NotReached",
     "NotStopped",
     "PortError",
     "Refused",
@@ -72,7 +74,21 @@ class PortError(DrivebusError, OSError):
     """The port is missing, busy, not permitted, or lost. The next call opens it again.
 
     Did the drive take it? If the port was lost after the request had left, it may have.
+
+    Attributes:
+        errno: Which of these, as the system's errors have it. ENOENT: there is no such port. EBUSY: another program has
+            it. EACCES: this user may not open it. ENODEV: it was open and is gone. EBADF: it is closed, or not open
+            yet. EINVAL: it cannot do what was asked of it. EIO: anything else.
     """
+
+    def __init__(self, message: str = "", *, errno: int | None = EIO, **details: Any) -> None:
+        super().__init__(message, **details)
+        self.errno = errno
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        rebuild, (kind, message, state) = super().__reduce__()
+        # It stands beside the other attributes, not among them.
+        return rebuild, (kind, message, {**state, "errno": self.errno})
 
 
 class NoAnswer(DrivebusError, TimeoutError):
@@ -147,6 +163,14 @@ class Unconfirmed(DrivebusError):
     """
 
 
+class NotReached(Unconfirmed, TimeoutError):
+    """A drive was waited for, and the time was up: its speed, or its standstill, was not seen.
+
+    Did the drive take it? Nothing was sent but reads. It goes on as it was; the message names the state that was seen
+    last.
+    """
+
+
 class NotStopped(Unconfirmed):
     """Several drives were told to stop, and some of them were not proved to: `Bus.stop_all`.
 
@@ -196,5 +220,6 @@ def level_of_the_program() -> int:
 
 def _rebuild(cls: type[DrivebusError], message: str, state: dict[str, Any]) -> DrivebusError:
     error = cls(message)
-    error.__dict__.update(state)
+    for name, value in state.items():
+        setattr(error, name, value)
     return error

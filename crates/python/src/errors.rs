@@ -71,7 +71,20 @@ pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
 
 /// `PortError`: the port cannot be opened or was lost.
 pub(crate) fn port_error(error: &PortError) -> PyErr {
-    Class::Port.raise(error.to_string(), |_| Ok(()))
+    Class::Port.raise(error.to_string(), |keywords| keywords.set_item("errno", number_of(error.kind)))
+}
+
+/// The number that errors of the system have for `kind`: `ENOENT` and the like, which are the same on all systems.
+const fn number_of(kind: PortErrorKind) -> i32 {
+    match kind {
+        PortErrorKind::NotFound => 2,
+        PortErrorKind::Busy => 16,
+        PortErrorKind::Denied => 13,
+        PortErrorKind::Lost => 19,
+        PortErrorKind::Closed => 9,
+        PortErrorKind::Unsupported => 22,
+        _ => 5,
+    }
 }
 
 /// What the system refused is the port's trouble, anything else was asked for wrongly.
@@ -137,8 +150,15 @@ pub(crate) fn call_error(error: &CallError, clock: UnixClock) -> PyErr {
         ErrorKind::NotAllowed => Class::NotAllowed,
         _ => Class::BadAnswer,
     };
-    match error.failure {
-        Failure::Refused { code, .. } => refused(&message, code, details),
-        _ => class.raise(message, details),
-    }
+    let kind = match &error.failure {
+        Failure::Refused { code, .. } => return refused(&message, *code, details),
+        Failure::Port(error) => error.kind,
+        Failure::Closed | Failure::Forked => PortErrorKind::Closed,
+        _ if matches!(class, Class::Port) => PortErrorKind::Lost,
+        _ => return class.raise(message, details),
+    };
+    class.raise(message, |keywords| {
+        details(keywords)?;
+        keywords.set_item("errno", number_of(kind))
+    })
 }

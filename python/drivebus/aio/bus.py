@@ -6,6 +6,7 @@ import functools
 import os
 from collections.abc import AsyncIterator, Generator, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from errno import EBADF
 from types import TracebackType
 from typing import Any, TypeVar, overload
 
@@ -90,7 +91,8 @@ class Bus(BusFace):
     def _core(self) -> _native.Bus:
         if self._native is None:
             shown = self._opening.shown
-            raise PortError(f"{shown} is not open yet; say `async with Bus(…) as bus:` or `await Bus.open(…)`")
+            how = "say `async with Bus(…) as bus:` or `await Bus.open(…)`"
+            raise PortError(f"{shown} is not open yet; {how}", errno=EBADF)
         return self._native
 
     def _asked(self) -> AwaitedRequests:

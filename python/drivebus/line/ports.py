@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from errno import EIO
 from typing import Any
 
 from drivebus import _native, checks
@@ -118,7 +119,8 @@ def _open_pyserial(url: str, line: SerialFormat) -> Any:
         )
     except Exception as error:
         # What somebody's module for a scheme makes of a URL that it does not understand, it says in its own way.
-        raise PortError(f"{url} could not be opened: {error}") from error
+        number = error.errno if isinstance(error, OSError) else None
+        raise PortError(f"{url} could not be opened: {error}", errno=number or EIO) from error
 
 
 def _simulator(arguments: Mapping[str, Any], line: SerialFormat) -> Simulator:

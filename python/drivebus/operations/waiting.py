@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drivebus import checks
-from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.errors import NotAllowed, NotReached, Unconfirmed
 from drivebus.operations import state
 from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.speed import STANDSTILL
@@ -28,8 +28,9 @@ async def wait_for_speed(
 
     Raises:
         NotAllowed: State or frequency of the family are not known, or not verified. Nothing was sent.
-        Unconfirmed: The drive tripped meanwhile, or the time was up; the message says where it stands. The drive
-            keeps running if it ran.
+        NotReached: The time was up; it is an `Unconfirmed` and a `TimeoutError`. The message says where the drive
+            stands. It keeps running if it ran.
+        Unconfirmed: The drive tripped meanwhile.
         NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
     """
     wanted = None if hz is None else checks.number("frequency", hz, 0.0)
@@ -69,7 +70,8 @@ async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: b
 
     Raises:
         NotAllowed: The state of the family is not known, or not verified. Nothing was sent.
-        Unconfirmed: The drive tripped meanwhile, or the time was up.
+        NotReached: The time was up; it is an `Unconfirmed` and a `TimeoutError`.
+        Unconfirmed: The drive tripped meanwhile.
         NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
     """
 
@@ -100,7 +102,7 @@ async def _wait(unit: Unit, reached: Callable[[Status], bool], otherwise: str, t
         if reached(status):
             return status
         if unit.bus.now() >= deadline:
-            raise Unconfirmed(
+            raise NotReached(
                 f"unit {unit.address}: {otherwise} within {timeout:g} s; it is {status}",
                 unit=unit.address,
             )

@@ -292,7 +292,8 @@ class Search(Iterator[Located]):
         path = self._port if isinstance(self._port, (str, os.PathLike)) else None
         if path is None or self._fixed or not ports.facts(path).holders:
             return error
-        return PortError(f"{error}. A search changes how the port is set, so it cannot go through another program")
+        why = "A search changes how the port is set, so it cannot go through another program"
+        return PortError(f"{error}. {why}", errno=error.errno)
 
     def _patience(self, settings: Settings) -> float:
         """Seconds that each is given at *settings*."""

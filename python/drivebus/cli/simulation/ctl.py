@@ -34,7 +34,8 @@ def _send(session: Session, **order: Any) -> None:
     try:
         now = ask(path, order)
     except OSError as error:
-        raise drivebus.PortError(f"the simulation does not answer ({error}); whether it obeyed is not known") from error
+        why = f"the simulation does not answer ({error}); whether it obeyed is not known"
+        raise drivebus.PortError(why, errno=error.errno) from error
     _show(session, now)
 
 
