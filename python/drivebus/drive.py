@@ -15,6 +15,7 @@ from drivebus import checks
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
 from drivebus.discovery import asking
+from drivebus.errors import NotAllowed
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
@@ -27,7 +28,7 @@ from drivebus.profile import Profile
 from drivebus.values import Value
 from drivebus.watchdog import Watchdog
 
-__all__ = ["Drive"]
+__all__ = ["Drive", "check_drive"]
 
 
 class _Setpoint:
@@ -289,3 +290,15 @@ class Drive(DriveFace):
             at_once(block.fail(reason))
             raise
         at_once(block.finish())
+
+
+def check_drive(drive: object, what: str) -> None:
+    """Raises `NotAllowed` if *drive* is no `Drive`, or one of asyncio, which *what* cannot do with."""
+    if isinstance(drive, Drive):
+        return
+    if isinstance(drive, DriveFace):
+        raise NotAllowed(
+            f"{what} takes a drive whose calls block, and {checks.shown(drive)} is one of asyncio: open the line with "
+            "drivebus.Bus, which may have the same port, and run it by asyncio.to_thread"
+        )
+    raise NotAllowed(f"{what} takes a drive, such as bus.drive(1), and was given {checks.shown(drive)}")

@@ -10,6 +10,7 @@ import asyncio
 import functools
 import inspect
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -182,3 +183,26 @@ def test_every_name_of_the_synchronous_faces_is_there() -> None:
                 expected = [(each.name, each.default) for each in inspect.signature(ours).parameters.values()]
                 given = [(each.name, each.default) for each in inspect.signature(theirs).parameters.values()]
                 assert given == expected, name
+
+
+def test_what_blocks_says_so_to_a_drive_of_asyncio(tmp_path: Path) -> None:
+    takers: list[Callable[[Any], object]] = [
+        lambda drive: drivebus.Recorder(tmp_path / "run.csv", {drive: None}),
+        lambda drive: drivebus.trial.step(drive, 10.0, 20.0, duration=5.0, max_current=None),
+        lambda drive: drivebus.trial.ramp(drive, 10.0, 20.0, duration=5.0, max_current=None),
+        lambda drive: drivebus.trial.sine(drive, 10.0, 20.0, period=2.0, duration=10.0, max_current=None),
+    ]
+
+    async def asked() -> None:
+        async with drivebus.aio.Bus(_line()) as bus:
+            drive = await bus.drive(1, "gd350", trust_profile=True)
+            before = bus.stats()["requests"]
+            for taker in takers:
+                with pytest.raises(drivebus.NotAllowed, match=r"one of asyncio: open the line with drivebus\.Bus"):
+                    taker(drive)
+                with pytest.raises(drivebus.NotAllowed, match="and was given 7"):
+                    taker(7)
+            assert bus.stats()["requests"] == before
+
+    asyncio.run(asked())
+    assert not list(tmp_path.iterdir())

@@ -15,7 +15,7 @@ from typing import Any
 from drivebus import _native, checks
 from drivebus.attributes import known_only
 from drivebus.bus import Bus
-from drivebus.drive import Drive
+from drivebus.drive import Drive, check_drive
 from drivebus.errors import DrivebusWarning, NotAllowed
 from drivebus.line.samples import Names, Sample
 from drivebus.poll import Poll, never_run
@@ -253,8 +253,10 @@ class Recorder:
 
 def _recorded(drives: Any, labels: Mapping[Drive, str], state: bool) -> dict[Drive, Recorded]:
     """What is recorded of each of *drives*."""
-    if not isinstance(drives, Mapping) or not drives or not all(isinstance(drive, Drive) for drive in drives):
+    if not isinstance(drives, Mapping) or not drives:
         raise NotAllowed(f"drives is {checks.shown(drives)}; give {{drive: names, …}}, such as {{drive: None}}")
+    for drive in drives:
+        check_drive(drive, "a Recorder")
     several = len({id(drive.bus) for drive in drives}) > 1
     found: dict[Drive, Recorded] = {}
     for drive, names in drives.items():

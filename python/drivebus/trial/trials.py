@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from drivebus import checks
-from drivebus.drive import Drive
+from drivebus.drive import Drive, check_drive
 from drivebus.errors import NotAllowed
 from drivebus.trial.courses import Change, Wave
 from drivebus.trial.figures import (
@@ -185,6 +185,7 @@ def _run(
     force: bool,
     told: _Told | None,
 ) -> Trial:
+    check_drive(drive, f"trial.{kind}")
     duration = checks.number("duration", duration, 0.1, 3600.0)
     settle = checks.number("settle", settle, 0.0, 3600.0)
     if max_current is not None:
