@@ -5,6 +5,7 @@ Each `type: ignore` stands where a checker has to complain: one that it does not
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,6 +17,7 @@ from typing_extensions import assert_type
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Poll
+from drivebus.line.settings import BusOptions
 
 
 @pytest.fixture
@@ -89,6 +91,17 @@ def test_a_poll_for_event_loops_takes_the_same() -> None:
         bus.poll({"x": 3})  # type: ignore[dict-item, type-var]
 
     assert main is not None
+
+
+def test_what_a_bus_is_opened_with_is_checked() -> None:
+    async def main() -> None:
+        await drivebus.aio.Bus.open("/dev/ttyUSB0", baudrate=9600, parity="N", trace=None)
+        await drivebus.aio.Bus.open("/dev/ttyUSB0", baudrate="9600")  # type: ignore[arg-type]
+        await drivebus.aio.Bus.open("/dev/ttyUSB0", paritty="N")  # type: ignore[call-arg]
+
+    assert main is not None
+    taken = list(inspect.signature(Bus).parameters)
+    assert taken == ["port", *BusOptions.__annotations__], "what is handed on, in the order of the class"
 
 
 def test_a_misspelt_attribute_is_seen_before_the_program_runs(bus: Bus) -> None:

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Generator, Iterable, Mapping, Sequenc
 from contextlib import AbstractContextManager
 from errno import EBADF
 from types import TracebackType
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from drivebus import _native
 from drivebus.aio.drive import Drive
@@ -28,7 +28,7 @@ from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads
 from drivebus.line.scan_order import asked
-from drivebus.line.settings import BusFace, Opening, check_trust
+from drivebus.line.settings import BusFace, BusOptions, Opening, check_trust
 from drivebus.line.stats import Link
 from drivebus.line.units import belongs
 from drivebus.operations.face import documented_by, views
@@ -36,6 +36,9 @@ from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.profile import Profile, native_of
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["Bus"]
 
@@ -67,9 +70,9 @@ class Bus(BusFace):
         self._requests: AwaitedRequests | None = None
 
     @classmethod
-    async def open(cls, port: object, **keywords: Any) -> Bus:
+    async def open(cls, port: object, **options: Unpack[BusOptions]) -> Bus:
         """Opens *port*; the keywords are those of the class."""
-        return await cls(port, **keywords)
+        return await cls(port, **options)
 
     def __await__(self) -> Generator[Any, None, Bus]:
         return self.__aenter__().__await__()

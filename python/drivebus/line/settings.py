@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
@@ -19,7 +19,7 @@ from drivebus.sim import Simulator, core_of, lasting_port
 if TYPE_CHECKING:
     from drivebus.line.wire_file import WireFile
 
-__all__ = ["BusFace", "Opening", "check_trust"]
+__all__ = ["BusFace", "BusOptions", "Opening", "check_trust"]
 
 
 class Opening:
@@ -107,6 +107,28 @@ def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
     named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
     name = named if isinstance(named, str) else None
     _native.check_port_options(name, keywords["rs485"] is not None, keywords["echo"])
+
+
+class BusOptions(TypedDict, total=False):
+    """What a bus is opened with besides its port: the keywords of `BusFace`, for calls that hand them on."""
+
+    baudrate: int
+    parity: str
+    stopbits: int
+    bytesize: int
+    silence: str | float
+    timeout: float
+    retries: int
+    read_only: bool
+    rs485: Mapping[str, object] | None
+    echo: str
+    turnaround: float
+    learn_timeout: bool
+    low_latency: bool
+    queue: int
+    share: str
+    reserved: bool
+    trace: str | os.PathLike[str] | None
 
 
 class _Native(Protocol):
