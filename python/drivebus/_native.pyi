@@ -49,6 +49,7 @@ __all__ = [
     "port_url",
     "read_sheet",
     "run_time_folder",
+    "touched",
 ]
 
 def crc16(data: Buffer, /) -> int:
@@ -89,6 +90,14 @@ def decode(frame: Buffer) -> dict[str, Any]:
 
     `kind` is `"read"`, `"write"`, `"write_many"`, `"echo"` (requests and answers that look alike),
     `"read_answer"`, `"write_many_answer"`, `"exception"`, `"other"`. Raises CrcError, BadAnswer.
+    """
+
+def touched(pdu: Buffer, /) -> tuple[int, int, list[int] | None] | None:
+    """What the request *pdu* reads or writes: the first place, how many, and the words that it writes.
+
+    Of a coil these are 0 or 1.
+
+    Also where its counts are wrong, which a unit may not look at. None: it is no read or write of registers or bits.
     """
 
 def frame_len(data: Buffer, /) -> int | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-from drivebus import _native, places
+from drivebus import _native
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
 
 __all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write", "written"]
@@ -88,18 +88,5 @@ def written(pdu: bytes) -> tuple[int, list[int]] | None:
     Also of a 10H request whose counts are wrong, in which `decode` sees none: a drive may not look at them. Of a coil
     (05H, 0FH) the address is its place, 0x1_0000 above it, and the words are 0 or 1.
     """
-    if pdu[:1] == b"\x05" and len(pdu) == 5:
-        return places.place("coil", _words(pdu[1:3])[0]), [int(pdu[3:5] != b"\x00\x00")]
-    if pdu[:1] == b"\x0f" and len(pdu) > 6:
-        bits = int.from_bytes(pdu[6:], "little")
-        count = min(_words(pdu[3:5])[0], 8 * len(pdu[6:]))
-        return places.place("coil", _words(pdu[1:3])[0]), [bits >> at & 1 for at in range(count)]
-    if pdu[:1] == b"\x06" and len(pdu) == 5:
-        return _words(pdu[1:3])[0], _words(pdu[3:5])
-    if pdu[:1] == b"\x10" and len(pdu) > 7:
-        return _words(pdu[1:3])[0], _words(pdu[6:])
-    return None
-
-
-def _words(data: bytes) -> list[int]:
-    return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data) - 1, 2)]
+    place, _, words = _native.touched(pdu) or (0, 0, None)
+    return None if words is None else (place, words)

@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 from drivebus import Bus, NotAllowed, Profile, Simulator, places
+from drivebus.rtu import written as written_to
+from drivebus.sniffer.frames import place_of, written_by
+
+from .odd_slave import framed
 
 MANIFEST = """
 name = "mill"
@@ -191,3 +195,24 @@ def test_what_is_wrong_is_named(tmp_path: Path, file: str, find: str, put: str, 
     with pytest.raises(NotAllowed) as caught:
         Profile.load(tmp_path)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("pdu", "place", "words"),
+    [
+        # Modbus Application Protocol V1.1b3: 6.1, 6.5, 6.6, 6.11, 6.12.
+        ("01 0013 0013", (0x1_0013, 0x13), None),
+        ("05 00AC FF00", (0x1_00AC, 1), [1]),
+        ("06 0001 0003", (1, 1), [3]),
+        ("0F 0013 000A 02 CD01", (0x1_0013, 10), [1, 0, 1, 1, 0, 0, 1, 1, 1, 0]),
+        ("10 0001 0002 04 000A 0102", (1, 2), [0x000A, 0x0102]),
+        ("08 0000 1234", None, None),
+    ],
+)
+def test_what_is_sent_and_what_is_heard_are_told_alike(
+    pdu: str, place: tuple[int, int] | None, words: list[int] | None
+) -> None:
+    body = bytes.fromhex(pdu)
+    heard = framed("01" + pdu)
+    assert (place_of(heard), written_by(heard)) == (place, words)
+    assert written_to(body) == (None if place is None or words is None else (place[0], words))

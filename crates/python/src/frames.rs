@@ -1,7 +1,7 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
 use drivebus_rtu::{
-    Adu, Answer, Destination, Frame, Request, Table, UnitAddress, crc16 as crc, frame_len as len_of, function,
+    Adu, Answer, Destination, Frame, Request, Table, Touched, UnitAddress, crc16 as crc, frame_len as len_of, function,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -25,6 +25,20 @@ pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
 #[pyo3(signature = (data, /))]
 pub(crate) fn frame_len(data: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     Ok(len_of(bytes_of(data)?.as_bytes()))
+}
+
+/// First place, how many, and the words that are written.
+type Places = (u32, u16, Option<Vec<u16>>);
+
+/// What the PDU of a request reads or writes.
+#[pyfunction]
+#[pyo3(signature = (pdu, /))]
+pub(crate) fn touched(pdu: &Bound<'_, PyAny>) -> PyResult<Option<Places>> {
+    let bytes = bytes_of(pdu)?;
+    Ok(Touched::by(bytes.as_bytes()).map(|touched| {
+        let table = if touched.table == Table::Holding { 0 } else { u32::from(touched.table.function()) };
+        (table << 16 | u32::from(touched.address), touched.count, touched.written().map(Iterator::collect))
+    }))
 }
 
 /// A whole 03H request frame.

@@ -44,6 +44,7 @@ mod _native {
     #[pymodule_export]
     use crate::frames::{
         crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, judge, misses,
+        touched,
     };
     #[pymodule_export]
     use crate::mailbox::Mailbox;

@@ -28,6 +28,7 @@ mod slave;
 mod sniffer;
 mod table;
 mod time;
+mod touched;
 mod unit_set;
 mod words;
 
@@ -58,6 +59,7 @@ pub use slave::{Slave, SlaveEvent};
 pub use sniffer::{Heard, Role, Sniffer, frame_len};
 pub use table::Table;
 pub use time::Instant;
+pub use touched::Touched;
 pub use words::Words;
 
 #[cfg(test)]

@@ -258,3 +258,67 @@ fn an_answer_longer_than_a_frame_is_none() {
         assert_eq!(Answer::parse(&pdu), Err(AnswerError::Length { len: pdu.len() }));
     }
 }
+
+/// *Modbus Application Protocol* V1.1b3: the requests of §6.1 to §6.6, §6.11, §6.12, and what a unit may make of spoilt ones.
+#[test]
+fn what_a_request_touches_is_told_by_its_bytes() {
+    let told = |pdu: &[u8]| {
+        Touched::by(pdu).map(|touched| {
+            (touched.table, touched.address, touched.count, touched.written().map(Iterator::collect::<Vec<_>>))
+        })
+    };
+    assert_eq!(told(&[0x01, 0x00, 0x13, 0x00, 0x13]), Some((Table::Coil, 0x13, 0x13, None)));
+    assert_eq!(told(&[0x02, 0x00, 0xC4, 0x00, 0x16]), Some((Table::Discrete, 0xC4, 0x16, None)));
+    assert_eq!(told(&[0x03, 0x00, 0x6B, 0x00, 0x03]), Some((Table::Holding, 0x6B, 3, None)));
+    assert_eq!(told(&[0x04, 0x00, 0x08, 0x00, 0x01]), Some((Table::Input, 8, 1, None)));
+    assert_eq!(told(&[0x05, 0x00, 0xAC, 0xFF, 0x00]), Some((Table::Coil, 0xAC, 1, Some(vec![1]))));
+    assert_eq!(told(&[0x05, 0x00, 0xAC, 0x00, 0x00]), Some((Table::Coil, 0xAC, 1, Some(vec![0]))));
+    assert_eq!(told(&[0x06, 0x00, 0x01, 0x00, 0x03]), Some((Table::Holding, 1, 1, Some(vec![3]))));
+    let coils = vec![1, 0, 1, 1, 0, 0, 1, 1, 1, 0];
+    assert_eq!(told(&[0x0F, 0, 0x13, 0, 0x0A, 2, 0xCD, 0x01]), Some((Table::Coil, 0x13, 10, Some(coils))));
+    let words = Some(vec![0x000A, 0x0102]);
+    assert_eq!(told(&[0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2]), Some((Table::Holding, 1, 2, words.clone())));
+    // Counts that are wrong, of words and of bytes, and one byte too many.
+    assert_eq!(told(&[0x10, 0, 1, 0, 1, 2, 0, 0x0A, 1, 2]), Some((Table::Holding, 1, 1, words.clone())));
+    assert_eq!(told(&[0x10, 0, 1, 0, 9, 9, 0, 0x0A, 1, 2, 3]), Some((Table::Holding, 1, 9, words)));
+    assert_eq!(told(&[0x0F, 0, 1, 0, 20, 1, 0xFF]), Some((Table::Coil, 1, 20, Some(vec![1; 8]))));
+    // Nothing to write yet, and what is no read or write.
+    for pdu in [&[0x10, 0, 1, 0, 1][..], &[0x0F, 0, 1, 0, 1, 1]] {
+        assert_eq!(told(pdu).and_then(|(.., words)| words), None);
+    }
+    for pdu in [
+        &[][..],
+        &[3],
+        &[3, 0, 0, 0],
+        &[6, 0, 1, 0, 3, 0],
+        &[5, 0, 1, 0xFF],
+        &[8, 0, 0, 1, 2],
+        &[0x83, 2],
+        &[0x2B, 14, 1, 0, 0],
+    ] {
+        assert_eq!(told(pdu), None, "{pdu:02X?}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn whole_requests_touch_what_they_ask_for(owned in requests()) {
+        let request = owned.borrow();
+        let adu = Adu::request(Destination::Broadcast, &request);
+        let touched = Touched::by(Frame::parse(adu.as_bytes()).unwrap().pdu());
+        let words = touched.and_then(|touched| Some(touched.written()?.collect::<Vec<_>>()));
+        match request {
+            Request::Read { table, address, count, .. } => {
+                let touched = touched.unwrap();
+                prop_assert_eq!((touched.table, touched.address, touched.count, words), (table, address, count, None));
+            }
+            Request::WriteSingle { address, value, .. } => {
+                prop_assert_eq!((touched.unwrap().address, words), (address, Some(vec![value])));
+            }
+            Request::WriteMultiple { address, words: written, .. } => {
+                prop_assert_eq!((touched.unwrap().address, words), (address, Some(written.iter().collect())));
+            }
+            _ => {}
+        }
+    }
+}
