@@ -95,9 +95,8 @@ def decode(frame: Buffer) -> dict[str, Any]:
 def touched(pdu: Buffer, /) -> tuple[int, int, list[int] | None] | None:
     """What the request *pdu* reads or writes: the first place, how many, and the words that it writes.
 
-    Of a coil these are 0 or 1.
-
-    Also where its counts are wrong, which a unit may not look at. None: it is no read or write of registers or bits.
+    Of a coil these are 0 or 1. Also where its counts are wrong, which a unit may not look at. None: it is no read or
+    write of registers or bits.
     """
 
 def frame_len(data: Buffer, /) -> int | None:
