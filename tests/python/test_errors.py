@@ -97,9 +97,9 @@ class TestNumbersOfTheSystem:
 def test_what_was_waited_for_in_vain_is_a_time_out() -> None:
     with drivebus.Bus("sim://gd350?clock=virtual") as bus:
         drive = bus.drive(1)
-        for wait in (lambda: drive.wait_for_speed(30.0, timeout=0.5), lambda: drive.wait_for_speed(30.0, timeout=0)):
+        for timeout in (0.5, 0.0):
             with pytest.raises(TimeoutError, match="within") as error:
-                wait()
+                drive.wait_for_speed(30.0, timeout=timeout)
             assert isinstance(error.value, drivebus.NotReached)
 
 
