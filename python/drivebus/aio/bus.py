@@ -70,9 +70,9 @@ class Bus(BusFace):
         self._requests: AwaitedRequests | None = None
 
     @classmethod
-    async def open(cls, port: object, **options: Unpack[BusOptions]) -> Bus:
+    async def open(cls, port: object, **keywords: Unpack[BusOptions]) -> Bus:
         """Opens *port*; the keywords are those of the class."""
-        return await cls(port, **options)
+        return await cls(port, **keywords)
 
     def __await__(self) -> Generator[Any, None, Bus]:
         return self.__aenter__().__await__()
