@@ -319,8 +319,8 @@ def test_bad_input_leaves_nothing_behind(bus: drivebus.Bus, tmp_path: Path, monk
     ]:
         with pytest.raises(NotAllowed, match=words):
             Recorder(path, {drive: None}, **options)  # type: ignore[arg-type]
-    for drives, words in [({}, "drives is"), (None, "drives is"), ({1: None}, r"takes a drive.* and was given 1")]:
-        with pytest.raises(NotAllowed, match=words):
+    for drives in ({}, None, {1: None}):
+        with pytest.raises(NotAllowed, match="drives is"):
             Recorder(tmp_path / "run.csv", drives)  # type: ignore[arg-type]
     monkeypatch.delitem(sys.modules, "drivebus.record.parquet", raising=False)
     monkeypatch.setitem(sys.modules, "pyarrow", None)

@@ -11,7 +11,7 @@ import pytest
 
 from drivebus import Bus, NotAllowed, Profile, Simulator, places
 from drivebus.rtu import written as written_to
-from drivebus.sniffer.frames import place_of, written_by
+from drivebus.sniffer.frames import carried, place_of, written_by
 
 from .odd_slave import framed
 
@@ -215,4 +215,8 @@ def test_what_is_sent_and_what_is_heard_are_told_alike(
     body = bytes.fromhex(pdu)
     heard = framed("01" + pdu)
     assert (place_of(heard), written_by(heard)) == (place, words)
+    if body[0] > 4:
+        # What confirms a write carries none of its words, nor where the request broke off before them.
+        for asked in (heard, framed("01" + pdu[:12])):
+            assert carried(framed("01" + pdu[:12]), asked) is None
     assert written_to(body) == (None if place is None or words is None else (place[0], words))

@@ -18,6 +18,7 @@ from drivebus.bus import Bus
 from drivebus.drive import Drive, check_drive
 from drivebus.errors import DrivebusWarning, NotAllowed
 from drivebus.line.samples import Names, Sample
+from drivebus.operations.face import DriveFace
 from drivebus.poll import Poll, never_run
 from drivebus.record.events import Witness
 from drivebus.record.files import format_of
@@ -253,7 +254,7 @@ class Recorder:
 
 def _recorded(drives: Any, labels: Mapping[Drive, str], state: bool) -> dict[Drive, Recorded]:
     """What is recorded of each of *drives*."""
-    if not isinstance(drives, Mapping) or not drives:
+    if not isinstance(drives, Mapping) or not drives or not all(isinstance(drive, DriveFace) for drive in drives):
         raise NotAllowed(f"drives is {checks.shown(drives)}; give {{drive: names, …}}, such as {{drive: None}}")
     for drive in drives:
         check_drive(drive, "a Recorder")

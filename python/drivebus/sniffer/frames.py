@@ -6,6 +6,8 @@ from drivebus import _native, places
 
 __all__ = ["carried", "place_of", "written_by"]
 
+_READS = range(0x01, 0x05)
+
 
 def place_of(request: bytes) -> tuple[int, int] | None:
     """The first place and how many of them *request* reads or writes; None of any other function."""
@@ -21,10 +23,11 @@ def written_by(request: bytes) -> list[int] | None:
 
 def carried(answer: bytes, request: bytes) -> list[int] | None:
     """The words, or bits, that *answer* carries, which answers the read *request*; None of any other."""
-    place, data = place_of(request), answer[3:-2]
-    if place is None or answer[1] != request[1] or written_by(request) is not None or not data:
+    asked, data = place_of(request), answer[3:-2]
+    if asked is None or answer[1] != request[1] or answer[1] not in _READS or not data:
         return None
-    if places.split(place[0])[0] not in places.BITS:
+    place, count = asked
+    if places.split(place)[0] not in places.BITS:
         return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data) - 1, 2)]
     bits = int.from_bytes(data, "little")
-    return [bits >> at & 1 for at in range(min(place[1], 8 * len(data)))]
+    return [bits >> at & 1 for at in range(min(count, 8 * len(data)))]
