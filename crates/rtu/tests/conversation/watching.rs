@@ -67,6 +67,19 @@ fn one_that_takes_most_of_a_time_out_is_waited_for_where_nothing_else_tells_it_a
 }
 
 #[test]
+fn one_that_came_damaged_is_waited_for_where_no_longer_read_tells_it_apart() {
+    for (words, waits) in [(1, Duration::ZERO), (16, TIMEOUT)] {
+        let mut rig = Rig::settled().does([Damaged]);
+        rig.known.be_patient(Some(Patience::new(ms(20), ms(50))));
+        assert!(matches!(rig.run(ask(7, words)).end, End::Failed(Unanswered::Corrupt(_))));
+        let began = rig.now;
+        let told = rig.run(ask(9, words));
+        assert_eq!(told.end, End::Words((9..9 + words).collect()));
+        assert_eq!(told.sent_at[0], began + waits, "{words} words");
+    }
+}
+
+#[test]
 fn a_stop_and_what_goes_out_in_doubt_wait_for_none() {
     for question in [ask(9, 1).urgency(Urgency::Stop), ask(9, 1).in_doubt(true)] {
         let told = owes().run(question);

@@ -148,6 +148,26 @@ fn what_is_longer_than_an_open_answer_leaves_none_of_that_to_come() {
     }
 }
 
+/// What broke off may be the beginning of any that may still come: until its time is over, and its unit has caught up.
+#[test]
+fn what_comes_no_more_leaves_nothing_to_come() {
+    for (caught_up, given_up, expected) in [(true, 5_499, 3_000), (true, 5_500, 0), (false, 5_500, 3_000)] {
+        let mut asker = known();
+        asker.echoes(2_400, unit(8));
+        asker.leaves_open(2_500, unit(8), &read(8));
+        if caught_up {
+            asker.echoes(2_600, unit(8));
+        }
+        asker.sends(given_up - 100, unit(9), &read(4), Duration::from_millis(100));
+        // Twelve of thirteen bytes, and two of the first three are damaged.
+        let mut bytes = words(unit(9), 4, 7).as_bytes()[1..].to_vec();
+        (bytes[0], bytes[1], bytes[5]) = (0x55, 0xAA, 0x11);
+        asker.master.receive(ms(given_up - 100), &bytes);
+        assert!(asker.master.poll(ms(given_up)).is_some());
+        assert_eq!(comes_damaged(&mut asker, given_up + 100, 4), expected, "given up at {given_up} ms");
+    }
+}
+
 /// That the line was opened anew, or brought one again, says nothing of what broke off before.
 #[test]
 fn what_broke_off_is_kept_in_mind_when_all_else_is_forgotten() {
