@@ -159,6 +159,7 @@ OPERATIONS = [
     "bus_timeout",
     "motor_block",
     "face",
+    "former_names",
 ]
 
 

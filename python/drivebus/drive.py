@@ -20,9 +20,9 @@ from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
 from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
+from drivebus.operations.former_names import BlockingFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.setpoints import SETPOINTS
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import Value
@@ -31,31 +31,13 @@ from drivebus.watchdog import Watchdog
 __all__ = ["Drive", "check_drive"]
 
 
-class _Setpoint:
-    """One thing that a drive is told besides commands, to read and to set."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self.__doc__ = SETPOINTS[name]
-
-    @overload
-    def __get__(self, drive: None, owner: type[Drive]) -> _Setpoint: ...
-    @overload
-    def __get__(self, drive: Drive, owner: type[Drive]) -> float: ...
-    def __get__(self, drive: Drive | None, owner: type[Drive]) -> float | _Setpoint:
-        return self if drive is None else at_once(setpoints.ask(unit_of(drive), self._name))
-
-    def __set__(self, drive: Drive, value: float) -> None:
-        at_once(setpoints.give(unit_of(drive), self._name, value))
-
-
 @known_only
-class Drive(DriveFace):
+class Drive(BlockingFormerNames):
     """One drive on a line: its commands, values and state. `drivebus.Bus.drive` makes it.
 
     Nothing is kept between calls but what was written to RAM, how often EEPROM was written, what the drive said it is,
-    and, for errors, its last state: every property asks the drive. Safe from any thread; a command and its confirmation
-    are several requests, between which others may come.
+    and, for errors, its last state. Every call asks the drive, and so does `setpoint`. Safe from any thread; a command
+    and its confirmation are several requests, between which others may come.
 
     Attributes:
         bus: The line it hangs on.
@@ -105,8 +87,8 @@ class Drive(DriveFace):
     set_virtual_outputs = blocking(bits.set_virtual_outputs)
     special_control = blocking(bits.special_control)
     bits = blocking(bits.bits)
-    ask = blocking(setpoints.ask)
-    give = blocking(setpoints.give)
+    read_setpoint = blocking(setpoints.read_setpoint)
+    write_setpoint = blocking(setpoints.write_setpoint)
     ping = blocking(state.ping)
     state = blocking(state.state)
     contradiction = blocking(registers.contradiction)
@@ -119,34 +101,17 @@ class Drive(DriveFace):
     diff = blocking(keeping.diff)
     discover = blocking(asking.discover)
 
-    torque = _Setpoint("torque")
-    pid = _Setpoint("pid")
-    pid_feedback = _Setpoint("pid_feedback")
-    forward_limit = _Setpoint("forward_limit")
-    reverse_limit = _Setpoint("reverse_limit")
-    motoring_torque_limit = _Setpoint("motoring_torque_limit")
-    braking_torque_limit = _Setpoint("braking_torque_limit")
-    vf_voltage = _Setpoint("vf_voltage")
-    analog_output_1 = _Setpoint("analog_output_1")
-    analog_output_2 = _Setpoint("analog_output_2")
-
     @property
     def setpoint(self) -> float:
-        """The setpoint last given over the bus, in Hz. Setting it changes the speed of a running motor.
+        """The frequency setpoint last given over the bus, in Hz. Setting it changes the speed of a running motor.
 
-        Raises, when set:
-            NotAllowed: Above the drive's own maximum or out of range, or another drive answers at this address since
-                the port was opened again; nothing was sent.
-            NoAnswer, BadAnswer, PortError: The drive may have taken it all the same, unless the error's `started` is
-                None. A confirmation that was lost was cleared up by reading, as `write` does, and that failed too.
-            Unconfirmed: The drive shows another setpoint, however often it was written.
-            Refused: The drive kept the old one.
+        Reading it is `read_setpoint()`, setting it is `write_setpoint(hz)`: errors as there.
         """
-        return at_once(setpoints.ask_setpoint(unit_of(self)))
+        return at_once(setpoints.read_setpoint(unit_of(self)))
 
     @setpoint.setter
     def setpoint(self, hz: float) -> None:
-        at_once(setpoints.set_setpoint(unit_of(self), hz))
+        at_once(setpoints.write_setpoint(unit_of(self), hz))
 
     @overload
     def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...

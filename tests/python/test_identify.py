@@ -274,9 +274,9 @@ class TestAfterThePortWasOpenedAgain:
 
     def test_the_same_one_is_written_to(self, simulator: Simulator, bus: Bus) -> None:
         drive = bus.drive(3, "vfd500", unverified=True)
-        drive.torque = 10.0
+        drive.write_setpoint(10.0, "torque")
         self.reopen(simulator, bus)
-        drive.torque = 20.0
+        drive.write_setpoint(20.0, "torque")
         assert [value for _, _, value in simulator.drive(3).writes()] == [1000, 2000]
 
     @pytest.mark.parametrize(("word", "says"), [(0x01A0, "01A0H"), (0, "answered")])
@@ -284,12 +284,12 @@ class TestAfterThePortWasOpenedAgain:
         self, simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch, word: int, says: str
     ) -> None:
         drive = bus.drive(3, "vfd500", unverified=True)
-        drive.torque = 10.0
+        drive.write_setpoint(10.0, "torque")
         self.reopen(simulator, bus)
         read = bus.read
         monkeypatch.setattr(bus, "read", lambda *what, **how: [word] if what[1] == CODE else read(*what, **how))
         with pytest.raises(NotAllowed, match=rf"another drive answers as unit 3.*2103H refused.*2103H {says} now"):
-            drive.torque = 20.0
+            drive.write_setpoint(20.0, "torque")
         assert [value for _, _, value in simulator.drive(3).writes()] == [1000]
 
     def test_one_without_a_signature_is_known_by_its_state_word(

@@ -226,10 +226,10 @@ def test_a_goodrive10_is_not_given_a_torque_or_a_limit(simulator: Simulator) -> 
     with Bus(simulator) as bus:
         drive = bus.drive(UNITS["gd10"], "gd10", unverified=True)
         with pytest.raises(NotAllowed):
-            drive.torque = 10.0
+            drive.write_setpoint(10.0, "torque")
         for setpoint in ("forward_limit", "braking_torque_limit", "vf_voltage"):
             with pytest.raises(NotAllowed):
-                drive.give(setpoint, 10.0)
+                drive.write_setpoint(10.0, setpoint)
         with pytest.raises(NotAllowed):
             drive.special_control(motor=2)
     assert written(simulator) == []

@@ -60,11 +60,9 @@ VALUES = [
 def test_what_is_set_goes_out_in_counts_and_is_read_back(
     simulator: Simulator, drive: Drive, name: str, value: float, address: int, word: int
 ) -> None:
-    setattr(drive, name, value)
+    drive.write_setpoint(value, name)
     assert taken(simulator) == [(address, word)]
-    assert getattr(drive, name) == value
-    drive.give(name, 0.0)
-    assert (drive.ask(name), taken(simulator)) == (0.0, [(address, 0)])
+    assert drive.read_setpoint(name) == value
 
 
 @pytest.mark.parametrize(
@@ -82,10 +80,10 @@ def test_another_family_counts_otherwise(
     simulator: Simulator, bus: Bus, name: str, value: float, address: int, word: int
 ) -> None:
     drive = bus.drive(2, "vfd500", unverified=True)
-    setattr(drive, name, value)
+    drive.write_setpoint(value, name)
     assert taken(simulator, 2) == [(address, word)]
     with pytest.raises(NotAllowed, match="can only be written"):
-        getattr(drive, name)
+        drive.read_setpoint(name)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +92,7 @@ def test_another_family_counts_otherwise(
 )
 def test_a_value_that_is_none_is_not_sent(simulator: Simulator, drive: Drive, name: str, value: object) -> None:
     with pytest.raises(NotAllowed):
-        setattr(drive, name, value)
+        drive.write_setpoint(value, name)  # type: ignore[arg-type]
     assert taken(simulator) == []
 
 
@@ -120,15 +118,15 @@ def test_true_is_no_number(drive: Drive, simulator: Simulator) -> None:
 
 def test_a_limit_is_held_against_the_drives_own_maximum(simulator: Simulator, drive: Drive) -> None:
     with pytest.raises(NotAllowed, match=r"fwd_upper_frequency .*= 60 Hz is above P00\.03 .*is 50 Hz"):
-        drive.forward_limit = 60.0
+        drive.write_setpoint(60.0, "forward_limit")
     assert taken(simulator) == []
 
 
 def test_what_the_family_does_not_have_is_said(bus: Bus, simulator: Simulator) -> None:
     drive = bus.drive(2, "vfd500")
     attempts: list[Callable[[], None]] = [
-        lambda: setattr(drive, "analog_output_1", 5.0),
-        lambda: drive.give("speed", 5.0),
+        lambda: drive.write_setpoint(5.0, "analog_output_1"),
+        lambda: drive.write_setpoint(5.0, "speed"),
         lambda: drive.set_virtual_inputs(S1=True),
     ]
     for attempt in attempts:
@@ -149,8 +147,9 @@ BAD_NAMES: list[Callable[[Any], object]] = [
     lambda drive: drive.write([1], 2),
     lambda drive: drive.write({None: 1}),
     lambda drive: drive.write("P00.11", 2.0, store="yes"),
-    lambda drive: drive.give([], 1),
-    lambda drive: drive.ask(None),
+    lambda drive: drive.write_setpoint(1, []),
+    lambda drive: drive.write_setpoint("torque", 40.0),
+    lambda drive: drive.read_setpoint(None),
     lambda drive: drive.check_control([]),
     lambda drive: drive.prepare_control("yes"),
     lambda drive: drive.prepare_control(setpoint=5),
@@ -183,7 +182,7 @@ class TestWhatTheDriveHeeds:
         self, simulator: Simulator, drive: Drive, name: str, source: str, number: int, register: int
     ) -> None:
         with pytest.raises(NotAllowed, match=rf'would ignore.*\n{source}.*needs {number}.*\n.*setpoint="{name}"'):
-            setattr(drive, name, 50.0)
+            drive.write_setpoint(50.0, name)
         assert taken(simulator) == []
         assert not drive.check_control(name)
         with pytest.raises(NotAllowed, match=rf"{source}.*not verified"):
@@ -192,7 +191,7 @@ class TestWhatTheDriveHeeds:
         control = drive.prepare_control(setpoint=name, unverified=True)
         assert [item.code for item in control] == ["P00.01", "P00.02", source]
         assert taken(simulator) == [(0x8000 | drive.profile.address(source), number)]
-        setattr(drive, name, 50.0)
+        drive.write_setpoint(50.0, name)
         assert taken(simulator) == [(register, 500)]
 
     def test_by_its_own_name_it_is_written_all_the_same(self, simulator: Simulator, drive: Drive) -> None:
@@ -272,17 +271,17 @@ def test_the_awaitable_face_has_the_same(simulator: Simulator) -> None:
             await drive.prepare_control()
             simulator.drive(1).take_writes()
             for name, value, address, word in VALUES:
-                await getattr(drive, f"set_{name}")(value)
-                assert await getattr(drive, name) == value
+                await drive.write_setpoint(value, name)
+                assert await drive.read_setpoint(name) == value
                 assert taken(simulator) == [(address, word)]
             with pytest.raises(NotAllowed, match="would ignore"):
-                await drive.set_pid(50.0)
+                await drive.write_setpoint(50.0, "pid")
             await drive.set_virtual_outputs(Y1=True)
             assert (await drive.inputs())["S1"] is False
             assert (await drive.bits("virtual_output"))["Y1"] == "on"
             await drive.special_control(motor=3)
             await drive.write_words(0x2001, 1000)
-            assert await drive.setpoint == 10.0
+            assert await drive.read_setpoint() == 10.0
             assert taken(simulator) == [(VIRTUAL_OUTPUTS, 1), (SPECIAL, 2), (0x2001, 1000)]
 
     asyncio.run(main())

@@ -290,7 +290,7 @@ class TestAStopThatWorksMeanwhile:
                 await drive.prepare_control()
                 await drive.run(50.0)
                 await drive.wait_for_speed(timeout=30)
-                await drive.set_setpoint(45.0)
+                await drive.write_setpoint(45.0)
                 await drive.stop()
             return asked_after(other, STOP)
 

@@ -238,7 +238,7 @@ WRITES: list[Callable[[Drive], Any]] = [
     lambda drive: drive.jog(),
     lambda drive: drive.write("P00.11", 2.0),
     lambda drive: drive.write({"P00.11": 2.0, "P00.12": 2.0}, store=True),
-    lambda drive: drive.give("analog_output_1", 10.0),
+    lambda drive: drive.write_setpoint(10.0, "analog_output_1"),
     lambda drive: drive.special_control(motor=2),
     lambda drive: drive.prepare_control(setpoint="pid"),
     lambda drive: drive.watchdog(1.0, unverified=True),
@@ -321,7 +321,7 @@ class TestWhatTellsNothing:
         simulator, bus = vfd500
         read = bus.read
         monkeypatch.setattr(bus, "read", lambda *what, **how: [3] if what[1] == CODE else read(*what, **how))
-        bus.drive(1, "vfd500", unverified=True).torque = 10.0
+        bus.drive(1, "vfd500", unverified=True).write_setpoint(10.0, "torque")
         assert len(written(simulator)) == 1
 
     @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05, 0x06, 0x09])
@@ -352,9 +352,9 @@ class TestWhatTellsNothing:
         simulator, bus = vfd500
         drive = bus.drive(1, "vfd500", unverified=True)
         refuse(simulator, 0x03)
-        drive.torque = 10.0
+        drive.write_setpoint(10.0, "torque")
         before = len(asked(simulator))
-        drive.torque = 20.0
+        drive.write_setpoint(20.0, "torque")
         assert len(asked(simulator)) == before + 4, "three questions, and the write"
 
     def test_what_was_said_before_silence_counts(self, gd300: tuple[Simulator, Bus]) -> None:
@@ -363,7 +363,7 @@ class TestWhatTellsNothing:
         drive = bus.drive(1, "vfd500", unverified=True)
         simulator.line.script([(2, "silence")])
         with pytest.raises(NotAllowed, match="refuses 1900H"):
-            drive.torque = 10.0
+            drive.write_setpoint(10.0, "torque")
         assert written(simulator) == []
 
     @pytest.mark.parametrize("exception", [0x01, 0x03, 0x04, 0x05])
@@ -371,7 +371,7 @@ class TestWhatTellsNothing:
         """05H: reading is refused, as a parameter may be. VFD500 manual, p. 133."""
         simulator, bus = vfd500
         refuse(simulator, exception)
-        bus.drive(1, "vfd500", unverified=True).torque = 10.0
+        bus.drive(1, "vfd500", unverified=True).write_setpoint(10.0, "torque")
         assert len(written(simulator)) == 1
 
     def test_silence(self, gd300: tuple[Simulator, Bus]) -> None:
@@ -436,7 +436,7 @@ class TestWhatTells:
 
         monkeypatch.setattr(bus, "read", other)
         with pytest.raises(NotAllowed, match=rf"refuses {address:04X}H \(exception 02H"):
-            drive.torque = 10.0
+            drive.write_setpoint(10.0, "torque")
         assert written(simulator) == []
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from typing import Any, overload
+from typing import overload
 
 from drivebus import checks
 from drivebus.aio.awake import Awake
@@ -15,10 +15,10 @@ from drivebus.backup import keeping
 from drivebus.discovery import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
-from drivebus.operations.face import DriveFace, awaited, documented_by, unit_of
+from drivebus.operations.face import awaited, documented_by, unit_of
+from drivebus.operations.former_names import AwaitedFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.setpoints import SETPOINTS
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import Value
@@ -26,33 +26,8 @@ from drivebus.values import Value
 __all__ = ["Drive"]
 
 
-class _Asked:
-    """A setpoint, once it is awaited."""
-
-    def __init__(self, ask: Callable[[], Awaitable[float]]) -> None:
-        self._ask = ask
-
-    def __await__(self) -> Generator[Any, None, float]:
-        return self._ask().__await__()
-
-
-class _Setpoint:
-    """One thing that a drive is told besides commands: `await drive.torque`, `await drive.set_torque(…)`."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self.__doc__ = SETPOINTS[name]
-
-    @overload
-    def __get__(self, drive: None, owner: type[Drive]) -> _Setpoint: ...
-    @overload
-    def __get__(self, drive: Drive, owner: type[Drive]) -> Awaitable[float]: ...
-    def __get__(self, drive: Drive | None, owner: type[Drive]) -> Awaitable[float] | _Setpoint:
-        return self if drive is None else _Asked(lambda: setpoints.ask(unit_of(drive), self._name))
-
-
 @known_only
-class Drive(DriveFace):
+class Drive(AwaitedFormerNames):
     """A drive, as `drivebus.aio.Bus.drive` gives it: what `drivebus.Drive` has, awaitable.
 
     Who cancels a command does not take it back: once its request has left, the drive does it. After that, ask for the
@@ -97,8 +72,8 @@ class Drive(DriveFace):
     set_virtual_outputs = awaited(bits.set_virtual_outputs)
     special_control = awaited(bits.special_control)
     bits = awaited(bits.bits)
-    ask = awaited(setpoints.ask)
-    give = awaited(setpoints.give)
+    read_setpoint = awaited(setpoints.read_setpoint)
+    write_setpoint = awaited(setpoints.write_setpoint)
     ping = awaited(state.ping)
     state = awaited(state.state)
     contradiction = awaited(registers.contradiction)
@@ -110,18 +85,6 @@ class Drive(DriveFace):
     restore = awaited(keeping.restore)
     diff = awaited(keeping.diff)
     discover = awaited(asking.discover)
-
-    set_setpoint = awaited(setpoints.set_setpoint)
-    set_torque = awaited(setpoints.setter("torque"))
-    set_pid = awaited(setpoints.setter("pid"))
-    set_pid_feedback = awaited(setpoints.setter("pid_feedback"))
-    set_forward_limit = awaited(setpoints.setter("forward_limit"))
-    set_reverse_limit = awaited(setpoints.setter("reverse_limit"))
-    set_motoring_torque_limit = awaited(setpoints.setter("motoring_torque_limit"))
-    set_braking_torque_limit = awaited(setpoints.setter("braking_torque_limit"))
-    set_vf_voltage = awaited(setpoints.setter("vf_voltage"))
-    set_analog_output_1 = awaited(setpoints.setter("analog_output_1"))
-    set_analog_output_2 = awaited(setpoints.setter("analog_output_2"))
 
     @overload
     async def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
@@ -152,22 +115,6 @@ class Drive(DriveFace):
             await parameters.write(unit_of(self), name, store=store, unverified=unverified)
         else:
             await parameters.write(unit_of(self), name, value, store, unverified=unverified)
-
-    @property
-    def setpoint(self) -> Awaitable[float]:
-        """The setpoint last given over the bus, in Hz: `await drive.setpoint`. `set_setpoint` gives another."""
-        return _Asked(lambda: setpoints.ask_setpoint(unit_of(self)))
-
-    torque = _Setpoint("torque")
-    pid = _Setpoint("pid")
-    pid_feedback = _Setpoint("pid_feedback")
-    forward_limit = _Setpoint("forward_limit")
-    reverse_limit = _Setpoint("reverse_limit")
-    motoring_torque_limit = _Setpoint("motoring_torque_limit")
-    braking_torque_limit = _Setpoint("braking_torque_limit")
-    vf_voltage = _Setpoint("vf_voltage")
-    analog_output_1 = _Setpoint("analog_output_1")
-    analog_output_2 = _Setpoint("analog_output_2")
 
     @asynccontextmanager
     async def running(

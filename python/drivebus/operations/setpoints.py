@@ -7,8 +7,6 @@ before; the frequency, whose source a start depends on anyway, goes out at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Coroutine
-from typing import Any, Protocol
 
 from drivebus import checks
 from drivebus.errors import NotAllowed
@@ -17,104 +15,59 @@ from drivebus.operations.unit import Unit
 from drivebus.values import Value
 
 __all__ = [
-    "SETPOINTS",
-    "ask",
-    "ask_setpoint",
-    "give",
+    "read_setpoint",
     "register_of",
-    "set_setpoint",
-    "setter",
     "with_setpoint",
     "word_of",
+    "write_setpoint",
     "write_word",
 ]
 
-SETPOINTS = {
-    "torque": "The torque setpoint in percent.",
-    "pid": "The PID setpoint in percent.",
-    "pid_feedback": "The PID feedback value in percent, if it comes over the bus.",
-    "forward_limit": "The highest frequency while turning forward, in Hz: under torque control.",
-    "reverse_limit": "The highest frequency while turning in reverse, in Hz: under torque control.",
-    "motoring_torque_limit": "The highest torque while driving the load, in percent.",
-    "braking_torque_limit": "The highest torque while braking the load, in percent.",
-    "vf_voltage": "The output voltage under V/F separation, in percent.",
-    "analog_output_1": "Analog output 1 in percent.",
-    "analog_output_2": "Analog output 2 in percent.",
-}
-"""Setpoints that are properties of a drive, beside the frequency, with what they are."""
 
+async def read_setpoint(unit: Unit, name: str = "frequency", *, unverified: bool = False) -> float:
+    """Reads the setpoint last given over the bus: the frequency in Hz, or another in the unit of its register.
 
-class Setter(Protocol):
-    """Gives one setpoint its value."""
-
-    def __call__(self, unit: Unit, value: float, *, unverified: bool = False) -> Coroutine[Any, Any, None]: ...
-
-
-def setter(setpoint: str) -> Setter:
-    """The operation that gives *setpoint*, and nothing else, its value."""
-
-    async def set_it(unit: Unit, value: float, *, unverified: bool = False) -> None:
-        await give(unit, setpoint, value, unverified=unverified)
-
-    set_it.__name__ = set_it.__qualname__ = f"set_{setpoint}"
-    set_it.__doc__ = f"{SETPOINTS[setpoint]} As `give`."
-    return set_it
-
-
-async def ask_setpoint(unit: Unit, *, unverified: bool = False) -> float:
-    """The setpoint last given over the bus, in Hz.
+    Args:
+        name: One of the family's `Profile.setpoint_names()`, such as `"torque"`.
+        unverified: Also where that is not verified for the family.
 
     Raises:
-        NotAllowed: The family has none, or not in Hz, or it is not verified. Nothing was sent.
-        NoAnswer, BadAnswer, Refused: See each.
+        NotAllowed: The family has no such setpoint, it can only be written, the frequency is not counted in Hz, or it
+            is not verified. Nothing was sent.
+        NoAnswer, BadAnswer, Refused, PortError: The drive was only asked; nothing changed.
     """
-    unit = await with_setpoint(unit.trusting(unverified), "frequency")
-    register = _frequency_in_hz(unit)
+    unit = await with_setpoint(unit.trusting(unverified), name)
+    register = _frequency_in_hz(unit) if name == "frequency" else register_of(unit, name)
     return float(await registers.read(unit, register))
 
 
-async def set_setpoint(unit: Unit, hz: float, *, unverified: bool = False) -> None:
-    """Gives a setpoint in Hz: changes the speed of a motor that runs.
+async def write_setpoint(unit: Unit, value: float, name: str = "frequency", *, unverified: bool = False) -> None:
+    """Gives a setpoint, the frequency or another, if the drive would follow it. A running motor follows it at once.
+
+    Whether the drive takes the frequency over the bus is not looked at: a start depends on that, and looks at it.
+
+    Args:
+        value: In Hz for the frequency, else in the unit of its register (`describe`): percent or Hz.
+        name: One of the family's `Profile.setpoint_names()`, such as `"torque"`.
+        unverified: Also where that is not verified for the family.
 
     Raises:
-        NotAllowed: Above the drive's own maximum or out of range, not in Hz with this drive, not verified for the
-            family, or another drive answers at this address since the port was opened again; nothing was sent.
+        NotAllowed: The drive takes it from elsewhere (the message lists what must be set, and
+            `prepare_control(setpoint=…)` sets it); above the drive's own maximum, out of range, not verified, or
+            unknown; the frequency is not counted in Hz; or another drive answers at this address since the port was
+            opened again. Nothing was sent.
         NoAnswer, BadAnswer, PortError: The drive may have taken it all the same, unless the error's `started` is
             None. A confirmation that was lost was cleared up by reading, as `write` does, and that failed too.
         Unconfirmed: The drive shows another setpoint, however often it was written.
         Refused: The drive kept the old one.
     """
-    unit = await with_setpoint(unit.trusting(unverified), "frequency")
-    await write_word(unit, await word_of(unit, hz))
-
-
-async def ask(unit: Unit, setpoint: str, *, unverified: bool = False) -> float:
-    """Reads the value that was given last for *setpoint*, in its own unit. Errors as for `ask_setpoint`."""
-    unit = await with_setpoint(unit.trusting(unverified), setpoint)
-    return float(await registers.read(unit, register_of(unit, setpoint)))
-
-
-async def give(unit: Unit, setpoint: str, value: float, *, unverified: bool = False) -> None:
-    """Writes *value* to *setpoint*, if the drive would follow it. A running motor follows it at once.
-
-    Args:
-        setpoint: One of the family's `Profile.setpoint_names()`, such as `"torque"`.
-        value: In the unit of its register (`describe`): percent or Hz.
-        unverified: Also where that is not verified for the family.
-
-    Raises:
-        NotAllowed: The drive takes it from elsewhere (the message lists what must be set, and
-            `prepare_control(setpoint=…)` sets it); out of range, not verified, or unknown; or another drive answers
-            at this address. Nothing was sent.
-        NoAnswer, BadAnswer, PortError, Refused, Unconfirmed: As for `set_setpoint`.
-    """
-    if setpoint == "frequency":
-        await set_setpoint(unit, value, unverified=unverified)
+    unit = await with_setpoint(unit.trusting(unverified), name)
+    if name == "frequency":
+        await write_word(unit, await word_of(unit, value))
         return
-    unit = await with_setpoint(unit.trusting(unverified), setpoint)
-    register = register_of(unit, setpoint)
-    planned = parameters.plan_write(unit, register, checks.number(setpoint, value, -math.inf), False)
-    await control.check_heeded(unit, setpoint, register)
+    register = register_of(unit, name)
+    planned = parameters.plan_write(unit, register, checks.number(name, value, -math.inf), False)
+    await control.check_heeded(unit, name, register)
     await parameters.check_now(unit, [planned])
     await sending.write(unit, [planned], False)
 
