@@ -42,8 +42,10 @@ __all__ = [
     "fault_kinds",
     "frame_len",
     "frames_in",
+    "is_write",
     "judge",
     "misses",
+    "only_reads",
     "open_bus",
     "port_facts",
     "port_url",
@@ -98,6 +100,12 @@ def touched(pdu: Buffer, /) -> tuple[int, int, list[int] | None] | None:
     Of a coil these are 0 or 1. Also where its counts are wrong, which a unit may not look at. None: it is no read or
     write of registers or bits.
     """
+
+def is_write(pdu: Buffer, /) -> bool:
+    """Whether the request *pdu* may change something in the unit, by its function: what is no request may."""
+
+def only_reads(pdu: Buffer, /) -> bool:
+    """Whether the request *pdu* only reads, whatever the unit makes of it: by its function and its form."""
 
 def frame_len(data: Buffer, /) -> int | None:
     """How many bytes at the front of *data* are a whole frame of a function that tells its length.

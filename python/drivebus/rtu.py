@@ -1,4 +1,4 @@
-"""Modbus RTU frames without a line: encode requests, judge answers, take apart any frame.
+"""Modbus RTU frames without a line: encode requests, tell what they do, judge answers, take apart any frame.
 
 Nothing here opens, sends or waits. Frames are whole: unit, PDU and CRC.
 """
@@ -9,9 +9,19 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from drivebus import _native
-from drivebus._native import decode_answer, encode_echo, encode_read, encode_write
+from drivebus._native import decode_answer, encode_echo, encode_read, encode_write, is_write, only_reads
 
-__all__ = ["Frame", "decode", "decode_answer", "encode_echo", "encode_read", "encode_write", "written"]
+__all__ = [
+    "Frame",
+    "decode",
+    "decode_answer",
+    "encode_echo",
+    "encode_read",
+    "encode_write",
+    "is_write",
+    "only_reads",
+    "written",
+]
 
 
 @dataclass(frozen=True, repr=False)

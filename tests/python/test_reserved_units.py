@@ -45,6 +45,7 @@ def test_a_write_to_unit_0_is_asked_for_by_name() -> None:
                 lambda: bus.write(0, 1, 1, table="coil"),
                 lambda: bus.transact(0, b"\x06\x20\x00\x00\x01"),
                 lambda: bus.transact(0, b"\x41"),
+                lambda: bus.transact(0, b"\x03\x01\x01"),  # runs a Huanyang HY
                 lambda: bus.drive(0, "gd350"),
             )
             for write in writes:

@@ -106,6 +106,22 @@ def test_requests_encode(vector: Vector) -> None:
     assert encode(vector.fields) == vector.wire
 
 
+@of(REQUESTS)
+def test_requests_say_whether_they_write(vector: Vector) -> None:
+    pdu = vector.wire[1:-2]
+    writes = vector.fields["kind"] in ("write", "write_many")
+    assert (drivebus.rtu.is_write(pdu), drivebus.rtu.only_reads(pdu)) == (writes, not writes)
+
+
+@pytest.mark.parametrize(
+    ("pdu", "reads"),
+    [("2B 0E 01 00", True), ("11", True), ("08 00 04 00 00", False), ("41", False), ("83 02", False), ("", False)],
+)
+def test_of_what_nobody_knows_it_is_taken_for_a_write(pdu: str, reads: bool) -> None:
+    request = bytes.fromhex(pdu)
+    assert (drivebus.rtu.is_write(request), drivebus.rtu.only_reads(request)) == (not reads, reads)
+
+
 @of(VECTORS)
 def test_frames_decode(vector: Vector) -> None:
     decoded = drivebus.rtu.decode(vector.wire)

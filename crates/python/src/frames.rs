@@ -1,7 +1,8 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
 use drivebus_rtu::{
-    Adu, Answer, Destination, Frame, Request, Table, Touched, UnitAddress, crc16 as crc, frame_len as len_of, function,
+    Adu, Answer, AnswerLength, Destination, Frame, Request, Table, Touched, UnitAddress, crc16 as crc,
+    frame_len as len_of, function,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -25,6 +26,24 @@ pub(crate) fn crc16(data: &Bound<'_, PyAny>) -> PyResult<u16> {
 #[pyo3(signature = (data, /))]
 pub(crate) fn frame_len(data: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     Ok(len_of(bytes_of(data)?.as_bytes()))
+}
+
+/// Whether the PDU of a request may change something in the unit; of what is no request nobody knows.
+#[pyfunction]
+#[pyo3(signature = (pdu, /))]
+pub(crate) fn is_write(pdu: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(custom(bytes_of(pdu)?.as_bytes()).is_none_or(|request| request.is_write()))
+}
+
+/// Whether the PDU of a request has the form of a read.
+#[pyfunction]
+#[pyo3(signature = (pdu, /))]
+pub(crate) fn only_reads(pdu: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(custom(bytes_of(pdu)?.as_bytes()).is_some_and(|request| request.only_reads()))
+}
+
+fn custom(pdu: &[u8]) -> Option<Request<'_>> {
+    Request::custom(pdu, AnswerLength::BySilence).ok()
 }
 
 /// First place, how many, and the words that are written.

@@ -43,8 +43,8 @@ mod _native {
     use crate::format::SerialFormat;
     #[pymodule_export]
     use crate::frames::{
-        crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, judge, misses,
-        touched,
+        crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, is_write, judge,
+        misses, only_reads, touched,
     };
     #[pymodule_export]
     use crate::mailbox::Mailbox;

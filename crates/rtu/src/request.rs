@@ -195,7 +195,7 @@ impl<'a> Request<'a> {
     /// Whether the request may change something in the unit.
     ///
     /// A custom request counts as a write unless its function only reads: 01H, 02H, 04H, 07H, 0BH, 0CH, 11H, 14H,
-    /// 18H, or 08H with a sub-function that returns a counter.
+    /// 18H, 08H with a sub-function that returns a counter, or 2BH with 0EH.
     pub const fn is_write(&self) -> bool {
         match self {
             Self::Read { .. } | Self::Echo { .. } => false,
@@ -204,6 +204,7 @@ impl<'a> Request<'a> {
                 pdu,
                 [READ_COILS..=READ_INPUT | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..]
                     | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
+                    | [0x2B, 0x0E, ..]
             ),
         }
     }

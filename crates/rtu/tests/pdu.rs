@@ -164,6 +164,9 @@ fn a_write_is_known_as_one() {
         (&[0x04, 0, 0, 0, 1], false),
         (&[0x08, 0, 0, 0, 1], false),
         (&[0x08, 0, 1, 0, 0], true), // restart communications
+        (&[0x2B, 0x0E, 1, 0], false),
+        (&[0x2B, 0x0D, 0, 0], true), // CANopen
+        (&[0x2B], true),
         (&[0x05, 0, 0, 0xFF, 0], true),
         (&[0x17, 0], true), // read and write at once
         (&[0x41], true),    // a maker's own: nobody knows
@@ -172,7 +175,7 @@ fn a_write_is_known_as_one() {
     }
 }
 
-/// Forms: *Modbus Application Protocol* V1.1b3, §6.1 to §6.4, §6.7, §6.8, §6.9, §6.10, §6.13, §6.14, §6.18. Huanyang's own
+/// Forms: *Modbus Application Protocol* V1.1b3, §6.1 to §6.4, §6.7, §6.8, §6.9, §6.10, §6.13, §6.14, §6.18, §6.21. Huanyang's own
 /// protocol is as LinuxCNC has it, src/hal/user_comps/huanyang-vfd/hy_modbus.c: function, number of bytes, bytes; 02H writes a
 /// parameter, 03H is a command, 04H reads a status.
 #[test]
@@ -225,7 +228,13 @@ fn only_what_has_the_form_of_a_read_is_known_to_be_one() {
         (&[0x18, 0x04], false),
         (&[0x05, 0, 0, 0xFF, 0], false),
         (&[0x06, 0, 0, 0, 0], false),
-        (&[0x2B, 14, 1, 0], false),
+        (&[0x2B, 0x0E, 1, 0], true),
+        (&[0x2B, 0x0E, 4, 0x80], true),
+        (&[0x2B, 0x0E, 0, 0], false),
+        (&[0x2B, 0x0E, 5, 0], false),
+        (&[0x2B, 0x0E, 1], false),
+        (&[0x2B, 0x0E, 1, 0, 0], false),
+        (&[0x2B, 0x0D, 1, 0], false),
         (&[0x41], false),
     ] {
         assert_eq!(only_reads(pdu), good, "{pdu:02X?}");

@@ -21,7 +21,7 @@ from drivebus.line.trace import meaning
 if TYPE_CHECKING:
     from drivebus.capture import Captured
 
-__all__ = ["COMMANDS", "framed", "show_frame", "show_frames"]
+__all__ = ["COMMANDS", "show_frame", "show_frames"]
 
 
 class _Shown(logging.Handler):
@@ -147,11 +147,6 @@ def _show_exchanges(session: Session, whole: list[Captured], format_: drivebus.S
         shown = Lines(session.out, families, any(frame.time is not None for frame in frames), line)
         for exchange in exchanges_in(frames, format_, families):
             shown.show(exchange)
-
-
-def framed(body: bytes) -> bytes:
-    """*body*, which is a unit and a PDU, with its CRC."""
-    return body + drivebus.crc16(body).to_bytes(2, "little")
 
 
 _ALIKE = ("write", "echo")

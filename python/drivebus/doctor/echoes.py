@@ -8,10 +8,11 @@ from statistics import median
 from typing import Any
 
 from drivebus.bus import Bus
+from drivebus.capture.frame import is_frame
 from drivebus.doctor.characters import of_unit
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
-from drivebus.line.frames import frames_in, is_frame, may_be_of
+from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.seven_bits import agreed, seen_in
 from drivebus.searching.settings import Settings
 

@@ -9,10 +9,7 @@ from __future__ import annotations
 from drivebus import checks
 from drivebus.errors import NotAllowed
 
-__all__ = ["EVERYBODY", "Addresses", "only_reads"]
-
-_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x11, 0x2B})
-"""Functions that change nothing in whoever hears them."""
+__all__ = ["EVERYBODY", "Addresses"]
 
 _HIGHEST = 255
 """The highest address that a frame can carry."""
@@ -73,8 +70,3 @@ class Addresses:
 
 EVERYBODY = Addresses(tcp=True, reserved=True)
 """The addresses that a frame can carry, where the line is not known, or not ours."""
-
-
-def only_reads(pdu: bytes) -> bool:
-    """Whether *pdu* changes nothing in whoever hears it."""
-    return pdu[:1] != b"" and pdu[0] in _READS

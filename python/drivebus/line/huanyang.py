@@ -94,6 +94,18 @@ def frames_in(data: bytes) -> list[bytes] | None:
     return frames or None
 
 
+def sure_in(data: bytes) -> Iterator[bytes]:
+    """The frames in *data* that are sure to be of this protocol, whatever stands between them."""
+    at = 0
+    while at + 2 < len(data):
+        frame = data[at : at + 5 + data[at + 2]]
+        if is_sure(frame):
+            yield frame
+            at += len(frame)
+        else:
+            at += 1
+
+
 def words(frame: bytes, sent: bool) -> str:
     """What *frame* means, which a master *sent* or a unit."""
     return f"unit {frame[0]}{':' if sent else ''} {' '.join(_said(frame, sent))}{REMARK}"

@@ -10,7 +10,6 @@ from typing import Any
 
 from drivebus import _native, checks, places
 from drivebus.errors import NotAllowed
-from drivebus.line.addresses import only_reads
 from drivebus.line.stats import Link
 from drivebus.line.units import Units
 
@@ -271,7 +270,7 @@ def transact_of(
         raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1 to 253 bytes, function code first")
     if reply_length is not None:
         reply_length = checks.whole("reply_length", reply_length, 1, 253)
-    unit = known.addresses.unit(unit, changes=not only_reads(body))
+    unit = known.addresses.unit(unit, changes=not _native.only_reads(body))
     known.check_pdu(unit, body, checks.flag("force", force))
     return unit, body, reply_length
 

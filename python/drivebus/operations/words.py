@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from drivebus import checks, places
+from drivebus import _native, checks, places
 from drivebus.errors import PortError, Refused
 from drivebus.line.write_guard import check_words
 from drivebus.operations.aim import check_harmless
@@ -20,9 +20,6 @@ _WRITE_ONE, _WRITE_MANY = 0x06, 0x10
 
 _LOCKED = ("password_error", "password_protected")
 """What INVT's families call the exceptions that have to do with the user password."""
-
-_TABLES = {0x01: "coil", 0x02: "discrete", 0x04: "input", 0x05: "coil"}
-"""The functions that are not for holding registers, and whose table they are for."""
 
 _AGAIN = 4
 """How often an absolute value is sent once more to a drive that could not take it, as it says."""
@@ -189,14 +186,15 @@ def _about_password(unit: Unit, exception: str) -> str:
 
 def _asked(request: bytes) -> str:
     """What a request frame asked for, for people."""
-    if len(request) < 6:
+    touched = _native.touched(request[1:-2])
+    if touched is None:
         return "the request"
-    at = places.place(_TABLES.get(request[1]), int.from_bytes(request[2:4], "big"))
-    address, number = places.shown(at), int.from_bytes(request[4:6], "big")
-    if request[1] == 0x05:
-        return f"to switch {address} {'on' if number else 'off'}"
-    if request[1] in _TABLES:
-        return f"to read {address}" if number == 1 else f"to read {number} from {address} on"
-    if request[1] == 0x03:
-        return f"to read {number} word{'s' if number != 1 else ''} at {address}"
-    return f"to write {number} at {address}" if request[1] == 0x06 else f"to write {number} words at {address}"
+    place, count, words = touched
+    address, table = places.shown(place), places.split(place)[0]
+    if words is None and table == "holding":
+        return f"to read {count} word{'s' if count != 1 else ''} at {address}"
+    if words is None:
+        return f"to read {address}" if count == 1 else f"to read {count} from {address} on"
+    if table == "coil" and len(words) == 1:
+        return f"to switch {address} {'on' if words[0] else 'off'}"
+    return f"to write {words[0]} at {address}" if len(words) == 1 else f"to write {len(words)} words at {address}"

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 
 from drivebus import checks
-from drivebus._native import SerialFormat, crc16
+from drivebus._native import SerialFormat, frame_len
+from drivebus.capture.frame import is_frame
 from drivebus.errors import NotAllowed
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.seen import Seen
@@ -179,17 +180,10 @@ class Replay:
 
 
 def _first_frame(heard: bytes) -> bytes | None:
-    """The first whole request in *heard*."""
+    """The first whole frame in *heard*; of a function that tells no length, all from its first byte on."""
     for start in range(len(heard) - 3):
-        for length in _lengths(heard[start:]):
-            frame = heard[start : start + length]
-            if len(frame) == length and crc16(frame[:-2]) == int.from_bytes(frame[-2:], "little"):
-                return frame
+        rest = heard[start:]
+        frame = rest[: frame_len(rest)]
+        if is_frame(frame):
+            return frame
     return None
-
-
-def _lengths(here: bytes) -> list[int]:
-    """How long a request may be that begins so; of a function that does not tell, as long as there is."""
-    if here[1] in (0x0F, 0x10):
-        return [9 + here[6]] if len(here) > 6 else []
-    return [8] if here[1] in range(0x01, 0x09) else [len(here)]

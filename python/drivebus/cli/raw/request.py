@@ -8,19 +8,16 @@ import click
 
 import drivebus
 from drivebus import places
+from drivebus.capture.frame import framed
 from drivebus.cli import names
 from drivebus.cli.advice import in_commands
-from drivebus.cli.frames import framed
-from drivebus.line.addresses import Addresses, only_reads
+from drivebus.line.addresses import Addresses
 from drivebus.line.trace import meaning
 
 __all__ = ["Request", "check_commands", "request_of"]
 
-_READS = frozenset({0x01, 0x02, 0x03, 0x04, 0x07, 0x08, 0x0B, 0x0C, 0x11, 0x14, 0x18})
-"""Function codes that change nothing in a unit, as the core has them; of 08H, most of its sub-functions."""
-
-_DIAGNOSTICS = frozenset({0x00, 0x02, *range(0x0B, 0x13)})
-"""Sub-functions of 08H that only tell something."""
+_DIAGNOSTICS = 0x08
+"""Of this function some change the state of the unit's own port, and none a word of it."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +40,12 @@ class Request:
     @property
     def writes(self) -> bool:
         """Whether it can change a word of the unit, and so move its motor."""
-        return self.pdu[0] not in _READS
+        return self.pdu[0] != _DIAGNOSTICS and not self.only_looks
 
     @property
     def only_looks(self) -> bool:
         """Whether it changes nothing at all, the state of the unit's own port included."""
-        told = self.pdu[0] != 0x08 or int.from_bytes(self.pdu[1:3], "big") in _DIAGNOSTICS
-        return not self.writes and told
+        return not drivebus.rtu.is_write(self.pdu)
 
     def text(self) -> str:
         """Its bytes, as people type them."""
@@ -78,7 +74,7 @@ def request_of(parts: tuple[str, ...], force: bool, addresses: Addresses) -> Req
         raise click.UsageError(
             f"no unit {body[0]:02X} answers; the first byte is the unit, 01 to F7. Unit {body[0]}: {in_commands(why)}"
         )
-    addresses.unit(body[0], changes=not only_reads(body[1:]))
+    addresses.unit(body[0], changes=not drivebus.rtu.only_reads(body[1:]))
     if not force and len(body) > 4 and framed(body[:-2]) == body:
         asked = body[:-2].hex(" ").upper()
         raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added; give {asked}")

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import drivebus
-from drivebus.cli.frames import framed, show_frame
+from drivebus.capture.frame import framed
+from drivebus.cli.frames import show_frame
 from drivebus.cli.output import remark
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.request import Request
