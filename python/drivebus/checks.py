@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
 from drivebus import places
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 
 __all__ = [
     "UNITS",
@@ -45,11 +45,11 @@ def whole(what: str, value: object, low: int, high: int, *, hexadecimal: bool = 
         return value
     allowed = f"{low:#06x} to {high:#06x}" if hexadecimal else f"{low} to {high}"
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):
-        raise NotAllowed(f"{what} {shown(value)} is not a whole number; allowed is {allowed}")
+        raise BadArgument(f"{what} {shown(value)} is not a whole number; allowed is {allowed}")
     number = operator.index(value)
     if not low <= number <= high:
         said = f"{number:#06x}" if hexadecimal and 0 <= number < 1 << 64 else shown(number)
-        raise NotAllowed(f"{what} {said} is out of range; allowed is {allowed}")
+        raise BadArgument(f"{what} {said} is out of range; allowed is {allowed}")
     return number
 
 
@@ -58,7 +58,7 @@ def unit(value: object) -> int:
     if type(value) is int and value in UNITS:
         return value
     if value == 0 and not isinstance(value, bool):
-        raise NotAllowed(
+        raise BadArgument(
             "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()"
         )
     return whole("unit", value, UNITS[0], UNITS[-1])
@@ -83,9 +83,9 @@ def of_table(table: object, value: object) -> int | list[int]:
     if table == "holding":
         return payload(value)
     if one_of("table", table, places.TABLES) not in places.WRITABLE:
-        raise NotAllowed(f"table {shown(table)} can only be read; {' and '.join(places.WRITABLE)} can be written")
+        raise BadArgument(f"table {shown(table)} can only be read; {' and '.join(places.WRITABLE)} can be written")
     if isinstance(value, Iterable):
-        raise NotAllowed(f"value {shown(value)} is not allowed: one coil is written at a time, to 0 or 1")
+        raise BadArgument(f"value {shown(value)} is not allowed: one coil is written at a time, to 0 or 1")
     return int(value) if isinstance(value, bool) else whole("value of a coil", value, 0, 1)
 
 
@@ -94,13 +94,13 @@ def number(what: str, value: object, low: float, high: float = math.inf, *, abov
     allowed = f"{'more than ' if above else ''}{low:g}" + ("" if math.isinf(high) else f" to {high:g}")
     allowed += " or more" if math.isinf(high) and not above else ""
     if isinstance(value, (bool, str, bytes)):
-        raise NotAllowed(f"{what} {shown(value)} is not a number; allowed is {allowed}")
+        raise BadArgument(f"{what} {shown(value)} is not a number; allowed is {allowed}")
     try:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise NotAllowed(f"{what} {shown(value)} is not a number; allowed is {allowed}") from None
+        raise BadArgument(f"{what} {shown(value)} is not a number; allowed is {allowed}") from None
     if not math.isfinite(result) or not low <= result <= high or (above and result == low):
-        raise NotAllowed(f"{what} {value} is out of range; allowed is {allowed}")
+        raise BadArgument(f"{what} {value} is out of range; allowed is {allowed}")
     return result
 
 
@@ -108,7 +108,7 @@ def flag(what: str, value: object) -> bool:
     """*value*, if it is True or False."""
     if isinstance(value, bool):
         return value
-    raise NotAllowed(f"{what} {shown(value)} is neither True nor False")
+    raise BadArgument(f"{what} {shown(value)} is neither True nor False")
 
 
 def one_of(what: str, value: object, allowed: Sequence[str]) -> str:
@@ -116,7 +116,7 @@ def one_of(what: str, value: object, allowed: Sequence[str]) -> str:
     if isinstance(value, str) and value in allowed:
         return value
     hint = closest(value, allowed) if isinstance(value, str) else ""
-    raise NotAllowed(f"{what} {shown(value)} is unknown; allowed is {', '.join(allowed)}{hint}")
+    raise BadArgument(f"{what} {shown(value)} is unknown; allowed is {', '.join(allowed)}{hint}")
 
 
 def path(what: str, value: object) -> str:
@@ -128,7 +128,7 @@ def path(what: str, value: object) -> str:
             return text
     except (TypeError, UnicodeError):
         pass
-    raise NotAllowed(f"{what} {shown(value)} is not a path")
+    raise BadArgument(f"{what} {shown(value)} is not a path")
 
 
 def digits(text: str) -> int | None:
@@ -160,7 +160,7 @@ def closest(name: str, known: Iterable[str]) -> str:
 def unread(name: object, error: OSError) -> NotAllowed:
     """What says that the file *name* cannot be read, and why."""
     reason = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror or error
-    return NotAllowed(f"{name} cannot be read: {reason}")
+    return BadArgument(f"{name} cannot be read: {reason}")
 
 
 def counted(count: int, what: str) -> str:

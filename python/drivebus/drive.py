@@ -15,7 +15,7 @@ from drivebus import checks
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
 from drivebus.discovery import asking
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
@@ -262,8 +262,8 @@ def check_drive(drive: object, what: str) -> None:
     if isinstance(drive, Drive):
         return
     if isinstance(drive, DriveFace):
-        raise NotAllowed(
+        raise BadArgument(
             f"{what} takes a drive whose calls block, and {checks.shown(drive)} is one of asyncio: open the line with "
             "drivebus.Bus, which may have the same port, and run it by asyncio.to_thread"
         )
-    raise NotAllowed(f"{what} takes a drive, such as bus.drive(1), and was given {checks.shown(drive)}")
+    raise BadArgument(f"{what} takes a drive, such as bus.drive(1), and was given {checks.shown(drive)}")

@@ -16,18 +16,24 @@ from typing import Any
 __all__ = [
     "LINE_ERRORS",
     "BadAnswer",
+    "BadArgument",
+    "BadLink",
     "CrcError",
     "DrivebusError",
     "DrivebusWarning",
     "NoAnswer",
     "NotAllowed",
     "NotReached",
+    "NotReady",
     "NotStopped",
     "PortError",
+    "QueueFull",
     "Refused",
     "SharedCodeWarning",
     "StoreWarning",
     "Unconfirmed",
+    "Unverified",
+    "WrongDrive",
 ]
 
 
@@ -188,9 +194,64 @@ class NotStopped(Unconfirmed):
 
 
 class NotAllowed(DrivebusError, ValueError):
-    """Out of range, read-only, unknown name, wrong state of the drive, or a read-only bus.
+    """What was asked is not done. Most are one of the kinds below, which a program can tell apart.
 
     Did the drive take it? No: what was asked was not sent.
+    """
+
+
+class BadArgument(NotAllowed):
+    """What was given cannot be: an unknown name, out of range, of another type, a file that is not what it should be.
+
+    Did the drive take it? No: what was asked was not sent. The same call is refused the next time, too.
+    """
+
+
+class NotReady(NotAllowed):
+    """What was asked is right, and has to wait for another state: of the drive, the bus or the program.
+
+    Did the drive take it? No: what was asked was not sent.
+
+    Attributes:
+        why: What stands against it. `"fault"`: the drive is in fault. `"no_voltage"`: its DC bus has none.
+            `"turning"`: its motor turns. `"control_source"`: its commands come from elsewhere. `"settings"`: a
+            parameter must be set, which the message names. `"read_only"`: the bus is for reading only.
+            `"being_stopped"`: the drive is being stopped for a program that is gone. `"halted"`: somebody told it to
+            stop meanwhile. `"ending"`: the program ends.
+    """
+
+    why: str
+
+    def __init__(self, message: str = "", *, why: str = "", **details: Any) -> None:
+        super().__init__(message, **details)
+        self.why = why
+
+
+class BadLink(NotAllowed):
+    """So much is lost on the line that a motor is not started: its stop might be lost as well.
+
+    Did the drive take it? No: what was asked was not sent.
+    """
+
+
+class Unverified(NotAllowed):
+    """No document of the family proves what is needed for it. Where `unverified=True` helps, the message says so.
+
+    Did the drive take it? No: what was asked was not sent.
+    """
+
+
+class WrongDrive(NotAllowed):
+    """What hangs at the address is another drive than the one that is meant, or may be; or a file is of another.
+
+    Did the drive take it? No: what was asked was not sent.
+    """
+
+
+class QueueFull(NotAllowed):
+    """As many requests wait for the line as may.
+
+    Did the drive take it? No: what was asked was not sent. A stop is never refused so.
     """
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus.attributes import known_only
-from drivebus.errors import DrivebusWarning, NotAllowed, level_of_the_program
+from drivebus.errors import BadArgument, DrivebusWarning, level_of_the_program
 from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
 
 __all__ = ["Poll"]
@@ -47,7 +47,7 @@ class Poll(Polling[Key]):
         callback: Callable[[Sample], object] | None,
     ) -> None:
         if callback is not None and not callable(callback):
-            raise NotAllowed(
+            raise BadArgument(
                 f"callback is {checks.shown(callback)}, which cannot be called; give a function that takes a sample"
             )
         super().__init__(bus, native, targets, interval, size)
@@ -134,7 +134,7 @@ class Poll(Polling[Key]):
 
     def _not_called_back(self) -> None:
         if self._callback is not None:
-            raise NotAllowed("this poll gives its samples to its callback; make another one to take them yourself")
+            raise BadArgument("this poll gives its samples to its callback; make another one to take them yourself")
 
     def _deliver(self, timeout: float | None = None) -> None:
         """Calls the callback for each sample, until the poll ends or *timeout* is over."""

@@ -18,7 +18,7 @@ from typing import TypeVar
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat, SimulatedLine
-from drivebus.errors import DrivebusWarning, NotAllowed, PortError, level_of_the_program
+from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed, PortError, level_of_the_program
 from drivebus.profile import Profile, native_of
 
 __all__ = ["FAULT_KINDS", "SimulatedDrive", "SimulatedLine", "Simulator", "check_faults"]
@@ -114,7 +114,7 @@ class SimulatedDrive:
         fault = self._profile.fault_named(mnemonic)
         if fault is None:
             hint = checks.closest(mnemonic, [fault.mnemonic for fault in self._profile.faults() if fault.mnemonic])
-            raise NotAllowed(f"{self.profile} has no fault {checks.shown(mnemonic)}{hint}")
+            raise BadArgument(f"{self.profile} has no fault {checks.shown(mnemonic)}{hint}")
         return fault.code
 
     def refuse(
@@ -269,16 +269,16 @@ class Simulator:
         checks.one_of("transport", transport, ("auto", "pty", "tcp", "process"))
         checks.one_of("clock", clock, ("real", "virtual"))
         if clock == "virtual" and transport != "process":
-            raise NotAllowed(
+            raise BadArgument(
                 f'clock "virtual" needs transport "process": nothing outside can share it over "{transport}"'
             )
         if link is not None:
             link = checks.path("link", link)
             if transport not in ("auto", "pty"):
-                raise NotAllowed(f'link {checks.shown(link)} leads to a pseudo-terminal: it needs transport "pty"')
+                raise BadArgument(f'link {checks.shown(link)} leads to a pseudo-terminal: it needs transport "pty"')
         ear_link = None if isinstance(ear, bool) else checks.path("ear", ear)
         if clock == "virtual" and ear is not False:
-            raise NotAllowed('an ear is for another program, which lives in real time: it needs clock "real"')
+            raise BadArgument('an ear is for another program, which lives in real time: it needs clock "real"')
         self._profiles = _profiles_of(units)
         families = {unit: native_of(profile) for unit, profile in self._profiles.items()}
         checks.flag("strict_silence", strict_silence)
@@ -381,7 +381,7 @@ def first_served(transports: Sequence[str], served: Callable[[str], _T]) -> tupl
                 text = f"{', '.join(missing)}: the simulator is served {_SERVED_BY[transport]}"
                 warnings.warn(text, DrivebusWarning, stacklevel=level_of_the_program())
             return transport, made
-    raise NotAllowed("no transport was given")
+    raise BadArgument("no transport was given")
 
 
 def core_of(simulator: Simulator) -> _native.Simulator:
@@ -420,7 +420,7 @@ def _remove(folder: str, made_by: int) -> None:
 def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float]:
     """*faults* as rates, if each is a kind of fault (or "all") with a share that this transport can have."""
     if not isinstance(faults, Mapping):
-        raise NotAllowed(
+        raise BadArgument(
             f'faults {checks.shown(faults)} is not a mapping; give one such as {{"flip_bit": 0.02}}, or None'
         )
     rates = {}
@@ -428,12 +428,12 @@ def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float
         checks.one_of("fault", kind, ("all", *FAULT_KINDS))
         rates[kind] = checks.number(f"rate of {kind}", rate, 0.0, 1.0)
     if rates.get("unplug") and transport != "process":
-        raise NotAllowed('"unplug" by rate needs transport "process"; line.unplug() pulls out any port')
+        raise BadArgument('"unplug" by rate needs transport "process"; line.unplug() pulls out any port')
     return rates
 
 
 def _profiles_of(units: object) -> dict[int, Profile]:
     """The profile of each of *units*, if that is what they are."""
     if not isinstance(units, Mapping) or not units:
-        raise NotAllowed(f'units {checks.shown(units)} name no drive; give at least one, such as {{1: "gd350"}}')
+        raise BadArgument(f'units {checks.shown(units)} name no drive; give at least one, such as {{1: "gd350"}}')
     return {checks.unit(unit): Profile.find(profile) for unit, profile in units.items()}

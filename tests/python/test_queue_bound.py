@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import drivebus.aio
-from drivebus import Bus, NoAnswer, NotAllowed, Simulator
+from drivebus import Bus, NoAnswer, NotAllowed, QueueFull, Simulator
 
 SILENT = 9
 """A unit that is not there: asked for, it has the line for a whole time-out."""
@@ -39,7 +39,7 @@ def test_who_finds_no_room_is_told_so_and_a_stop_always_finds_some() -> None:
         assert stop is None
         assert reads == [[0x01A0]] * 2
         for refused in (last, write):
-            assert isinstance(refused, NotAllowed)
+            assert isinstance(refused, QueueFull)
             assert "2 requests wait" in str(refused)
             assert "nothing was sent" in str(refused)
             assert refused.started is None

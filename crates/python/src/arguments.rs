@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::convert::{one_word, table_of};
-use crate::errors::{not_allowed, port_error, refuse};
+use crate::errors::{bad_argument, port_error, refuse};
 use crate::format::SerialFormat;
 use crate::open;
 
@@ -60,9 +60,9 @@ pub(crate) fn write_request<'a>(table: &str, address: u16, words: &'a Result<Vec
         (Table::Holding, Err(word)) => Ok(Request::write(address, *word)),
         (Table::Holding, Ok(words)) => Request::write_many(address, words).map_err(refuse),
         (Table::Coil, Err(word @ (0 | 1))) => Ok(Request::write_coil(address, *word == 1)),
-        (Table::Coil, _) => Err(not_allowed("a coil is written as 0 or 1, one at a time".to_owned())),
+        (Table::Coil, _) => Err(bad_argument("a coil is written as 0 or 1, one at a time".to_owned())),
         (Table::Input | Table::Discrete, _) => {
-            Err(not_allowed(format!("table {table:?} can only be read; holding and coil can be written")))
+            Err(bad_argument(format!("table {table:?} can only be read; holding and coil can be written")))
         }
     }
 }
@@ -89,5 +89,5 @@ pub(crate) fn options_for(request: &Request<'_>, options: CallOptions, urgent: b
 
 pub(crate) fn duration(what: &str, given: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(given)
-        .map_err(|_| not_allowed(format!("{what} {given} is not a number of seconds, 0 or more")))
+        .map_err(|_| bad_argument(format!("{what} {given} is not a number of seconds, 0 or more")))
 }

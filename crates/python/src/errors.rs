@@ -21,12 +21,15 @@ pub(crate) enum Class {
     Crc,
     Refused,
     NotAllowed,
+    BadArgument,
+    NotReady,
+    QueueFull,
     Unconfirmed,
 }
 
 impl Class {
     fn get(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 7] = [const { PyOnceLock::new() }; 7];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 10] = [const { PyOnceLock::new() }; 10];
         let (index, name) = match self {
             Self::Port => (0, "PortError"),
             Self::NoAnswer => (1, "NoAnswer"),
@@ -35,6 +38,9 @@ impl Class {
             Self::Refused => (4, "Refused"),
             Self::NotAllowed => (5, "NotAllowed"),
             Self::Unconfirmed => (6, "Unconfirmed"),
+            Self::BadArgument => (7, "BadArgument"),
+            Self::NotReady => (8, "NotReady"),
+            Self::QueueFull => (9, "QueueFull"),
         };
         CLASSES[index].import(py, "drivebus.errors", name)
     }
@@ -59,14 +65,14 @@ impl Class {
     }
 }
 
-/// `NotAllowed`: nothing was sent.
-pub(crate) fn not_allowed(message: String) -> PyErr {
-    Class::NotAllowed.raise(message, |_| Ok(()))
+/// `BadArgument`: nothing was sent.
+pub(crate) fn bad_argument(message: String) -> PyErr {
+    Class::BadArgument.raise(message, |_| Ok(()))
 }
 
-/// `NotAllowed` with an error's own words.
+/// `BadArgument` with an error's own words.
 pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
-    not_allowed(error.to_string())
+    bad_argument(error.to_string())
 }
 
 /// `PortError`: the port cannot be opened or was lost.
@@ -147,11 +153,23 @@ pub(crate) fn call_error(error: &CallError, clock: UnixClock) -> PyErr {
         ErrorKind::NoAnswer => Class::NoAnswer,
         ErrorKind::Crc => Class::Crc,
         ErrorKind::Unconfirmed => Class::Unconfirmed,
-        ErrorKind::NotAllowed => Class::NotAllowed,
+        ErrorKind::NotAllowed => match error.failure {
+            Failure::NotBegun(_) => Class::BadArgument,
+            Failure::QueueFull { .. } => Class::QueueFull,
+            _ => Class::NotAllowed,
+        },
         _ => Class::BadAnswer,
+    };
+    let not_ready = |why| {
+        Class::NotReady.raise(message.clone(), |keywords| {
+            details(keywords)?;
+            keywords.set_item("why", why)
+        })
     };
     let kind = match &error.failure {
         Failure::Refused { code, .. } => return refused(&message, *code, details),
+        Failure::ReadOnly { .. } | Failure::NotARead { .. } => return not_ready("read_only"),
+        Failure::BeingStopped { .. } => return not_ready("being_stopped"),
         Failure::Port(error) => error.kind,
         Failure::Closed | Failure::Forked => PortErrorKind::Closed,
         _ if matches!(class, Class::Port) => PortErrorKind::Lost,

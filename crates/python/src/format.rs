@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyString};
 
 use crate::convert::shown;
-use crate::errors::{not_allowed, refuse};
+use crate::errors::{bad_argument, refuse};
 
 /// How characters look on the wire, and how long they take.
 #[pyclass(name = "SerialFormat", frozen, eq, from_py_object, module = "drivebus._native")]
@@ -33,24 +33,24 @@ impl SerialFormat {
             None => rtu::SerialFormat::DEFAULT.baud_rate(),
             Some(given) => no_bool(given).and_then(|given| given.extract().ok()).ok_or_else(|| {
                 let (low, high) = (rtu::SerialFormat::MIN_BAUD_RATE, rtu::SerialFormat::MAX_BAUD_RATE);
-                not_allowed(format!("baudrate {} is not a number from {low} to {high} bit/s", shown(given)))
+                bad_argument(format!("baudrate {} is not a number from {low} to {high} bit/s", shown(given)))
             })?,
         };
         let parity = match text(parity, "E").as_str() {
             "N" => Parity::None,
             "E" => Parity::Even,
             "O" => Parity::Odd,
-            other => return Err(not_allowed(format!("parity {other} is not \"N\", \"E\" or \"O\""))),
+            other => return Err(bad_argument(format!("parity {other} is not \"N\", \"E\" or \"O\""))),
         };
         let stops = match number(stopbits, 1) {
             Some(1) => StopBits::One,
             Some(2) => StopBits::Two,
-            _ => return Err(not_allowed(format!("stopbits {} is not 1 or 2", shown_or(stopbits)))),
+            _ => return Err(bad_argument(format!("stopbits {} is not 1 or 2", shown_or(stopbits)))),
         };
         let data_bits = match number(bytesize, 8) {
             Some(7) => DataBits::Seven,
             Some(8) => DataBits::Eight,
-            _ => return Err(not_allowed(format!("bytesize {} is not 7 or 8", shown_or(bytesize)))),
+            _ => return Err(bad_argument(format!("bytesize {} is not 7 or 8", shown_or(bytesize)))),
         };
         let silence = silence.map_or(Ok(Silence::Spec), silence_rule)?;
         rtu::SerialFormat::new(baudrate, data_bits, parity, stops, silence).map(Self).map_err(refuse)
@@ -139,7 +139,7 @@ fn silence_rule(given: &Bound<'_, PyAny>) -> PyResult<Silence> {
         return Ok(Silence::Fixed(time));
     }
     let longest = rtu::SerialFormat::MAX_SILENCE.as_secs();
-    Err(not_allowed(format!("silence {} is not \"spec\", \"characters\" or 0 to {longest} seconds", shown(given))))
+    Err(bad_argument(format!("silence {} is not \"spec\", \"characters\" or 0 to {longest} seconds", shown(given))))
 }
 
 /// A text argument in capitals, or its default; what is no text as it shows itself.

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
 use crate::convert::shown;
-use crate::errors::{not_allowed, port_error, refuse};
+use crate::errors::{bad_argument, port_error, refuse};
 use crate::pyserial::PySerialLine;
 use crate::sim::Simulator;
 
@@ -50,7 +50,7 @@ fn named(port: &str, format: SerialFormat, tty: TtyOptions) -> PyResult<(Opener,
     let parsed = PortUrl::parse(port, &Known::default()).map_err(refuse)?;
     let key = parsed.key();
     let opener = parsed.opener(&PortOptions::new(format).tty(tty));
-    let opener = opener.ok_or_else(|| not_allowed(format!("port {port:?} is not opened by its name here")))?;
+    let opener = opener.ok_or_else(|| bad_argument(format!("port {port:?} is not opened by its name here")))?;
     Ok((opener, key))
 }
 
@@ -115,9 +115,9 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
         options = known.ok_or_else(|| refuse(WordError::Switch { word: shown(&mode) }))?;
     }
     for (key, value) in given {
-        let key: String = key.extract().map_err(|_| not_allowed(format!("rs485: {key} is not known")))?;
-        let bad = |_| not_allowed(format!("rs485: {key} cannot be {value}"));
-        let too_long = || not_allowed(format!("rs485: {key} cannot be {value}; allowed is 0 to {MAX_DELAY_MS}"));
+        let key: String = key.extract().map_err(|_| bad_argument(format!("rs485: {key} is not known")))?;
+        let bad = |_| bad_argument(format!("rs485: {key} cannot be {value}"));
+        let too_long = || bad_argument(format!("rs485: {key} cannot be {value}; allowed is 0 to {MAX_DELAY_MS}"));
         match key.as_str() {
             "mode" => {}
             "enabled" => options.enabled = value.extract().map_err(bad)?,
@@ -125,7 +125,7 @@ fn rs485_options(given: &Bound<'_, PyDict>) -> PyResult<Rs485> {
             "delay_before_ms" => options.delay_before_ms = delay(&value).ok_or_else(too_long)?,
             "delay_after_ms" => options.delay_after_ms = delay(&value).ok_or_else(too_long)?,
             _ => {
-                return Err(not_allowed(format!(
+                return Err(bad_argument(format!(
                     "rs485: {key:?} is not known; known are mode, enabled, rts_on_send, delay_before_ms, delay_after_ms"
                 )));
             }

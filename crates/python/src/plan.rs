@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use crate::convert::words_of;
-use crate::errors::not_allowed;
+use crate::errors::bad_argument;
 use crate::tables::number;
 
 /// Reads and their values, worked out once.
@@ -36,7 +36,7 @@ impl Plan {
         let reads = self.core.reads();
         let answers = answers
             .try_iter()?
-            .map(|words| words_of(&words?)?.map_err(|word| not_allowed(format!("{word} is not the words of a read"))))
+            .map(|words| words_of(&words?)?.map_err(|word| bad_argument(format!("{word} is not the words of a read"))))
             .collect::<PyResult<Vec<_>>>()?;
         let fits = answers.len() == reads.len()
             && answers.iter().zip(reads).all(|(words, read)| words.len() == usize::from(read.count));
@@ -44,7 +44,7 @@ impl Plan {
             let numbers = |counts: Vec<usize>| counts.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
             let came = numbers(answers.iter().map(Vec::len).collect());
             let asked = numbers(reads.iter().map(|read| usize::from(read.count)).collect());
-            return Err(not_allowed(format!("answers of {came} words, for reads of {asked} words")));
+            return Err(bad_argument(format!("answers of {came} words, for reads of {asked} words")));
         }
         let words = answers.concat();
         let values = self.core.values(&words).filter_map(|(quantity, value)| Some(number(py, quantity, value?)));

@@ -12,7 +12,7 @@ use crate::arguments::duration;
 use crate::bus::Bus;
 use crate::clock::UnixClock;
 use crate::convert::{any_unit, one_word, shown};
-use crate::errors::{Class, call_error, not_allowed, refuse};
+use crate::errors::{Class, bad_argument, call_error, refuse};
 use crate::mailbox::Mailbox;
 use crate::plan::Plan;
 use crate::requests::{Asked, apart, nothing};
@@ -221,7 +221,7 @@ fn table(table: Table) -> drivebus_rtu::Table {
 /// Address and number of words.
 fn one_read(given: &Bound<'_, PyAny>) -> PyResult<(u16, u16)> {
     let pair: Result<(Bound<'_, PyAny>, Bound<'_, PyAny>), _> = given.extract();
-    let (address, count) = pair.map_err(|_| not_allowed(format!("{} is not an (address, count)", shown(given))))?;
+    let (address, count) = pair.map_err(|_| bad_argument(format!("{} is not an (address, count)", shown(given))))?;
     Ok((one_word("address", &address)?, one_word("count", &count)?))
 }
 

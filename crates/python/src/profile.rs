@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
 use crate::convert::{one_word, place_of, shown};
-use crate::errors::{not_allowed, refuse};
+use crate::errors::{bad_argument, refuse};
 use crate::plan::Plan;
 use crate::tables::{self, known_as, number};
 
@@ -224,13 +224,13 @@ impl Profile {
         }
         let both: u32 = raw
             .extract()
-            .map_err(|_| not_allowed(format!("raw {} is not a number from 0 to 4294967295", shown(raw))))?;
+            .map_err(|_| bad_argument(format!("raw {} is not a number from 0 to 4294967295", shown(raw))))?;
         let mut words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
         if quantity.is_high_first() {
             words.reverse();
         }
         let value = quantity.decode_words(&words);
-        value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| not_allowed("no words".to_owned()))
+        value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| bad_argument("no words".to_owned()))
     }
 
     #[pyo3(signature = (name, value, /))]
@@ -238,7 +238,7 @@ impl Profile {
         let entry = self.find(name)?;
         // A switch is on or off. Anything else that is told True was meant for another name.
         if value.is_instance_of::<PyBool>() && entry.quantity().high().is_none_or(|high| high.to_string() != "1") {
-            return Err(not_allowed(format!("{} = {}: not a number", entry.name(), shown(value))));
+            return Err(bad_argument(format!("{} = {}: not a number", entry.name(), shown(value))));
         }
         let word = if let Ok(float) = value.cast::<PyFloat>() {
             entry.encode(float.extract::<f64>()?)
@@ -283,7 +283,7 @@ impl Profile {
     #[pyo3(signature = (name, /))]
     fn command(&self, name: &Bound<'_, PyAny>) -> PyResult<(u32, u16)> {
         let command: Command = text("command", name)?.parse().map_err(refuse)?;
-        let missing = || not_allowed(format!("{} has no command {}", self.0.name(), command.name()));
+        let missing = || bad_argument(format!("{} has no command {}", self.0.name(), command.name()));
         self.0.command(command).map(|(place, code)| (place.number(), code)).ok_or_else(missing)
     }
 
@@ -376,7 +376,7 @@ impl Profile {
         let name = text("setpoint", setpoint)?;
         let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
         let role = known.and_then(|setpoint| self.0.setpoints().get(&setpoint));
-        let missing = || not_allowed(format!("{} has no setpoint {name}", self.0.name()));
+        let missing = || bad_argument(format!("{} has no setpoint {name}", self.0.name()));
         tables::items(setpoint.py(), &self.0, &role.ok_or_else(missing)?.needs)
     }
 
@@ -428,7 +428,7 @@ impl Profile {
     #[pyo3(signature = (code, /))]
     fn exception(&self, code: &Bound<'_, PyAny>) -> PyResult<(String, String)> {
         let code =
-            code.extract().map_err(|_| not_allowed(format!("code {} is not a number from 0 to 255", shown(code))))?;
+            code.extract().map_err(|_| bad_argument(format!("code {} is not a number from 0 to 255", shown(code))))?;
         let exception = self.0.exception(code).into_owned();
         Ok((exception.name, exception.meaning))
     }
@@ -436,7 +436,7 @@ impl Profile {
     #[pyo3(signature = (code, /))]
     fn exception_means(&self, code: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         let code =
-            code.extract().map_err(|_| not_allowed(format!("code {} is not a number from 0 to 255", shown(code))))?;
+            code.extract().map_err(|_| bad_argument(format!("code {} is not a number from 0 to 255", shown(code))))?;
         Ok(self.meanings().of(ExceptionCode(code)).name())
     }
 }
@@ -456,7 +456,7 @@ pub(crate) fn exception_means(code: u8) -> &'static str {
 }
 
 fn path(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
-    given.extract().map_err(|_| not_allowed(format!("folder {} is not a path", shown(given))))
+    given.extract().map_err(|_| bad_argument(format!("folder {} is not a path", shown(given))))
 }
 
 fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
@@ -469,5 +469,5 @@ fn problem(problem: ProfileError) -> (String, Option<u64>, String) {
 
 /// A `str`.
 fn text(what: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
-    given.extract().map_err(|_| not_allowed(format!("{what} {} is not a text", shown(given))))
+    given.extract().map_err(|_| bad_argument(format!("{what} {} is not a text", shown(given))))
 }

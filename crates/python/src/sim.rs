@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::clock::seconds;
 use crate::convert::{duration, one_word, shown, unit_address};
-use crate::errors::{not_allowed, refuse, sim_error};
+use crate::errors::{bad_argument, refuse, sim_error};
 use crate::format::SerialFormat;
 use crate::profile::Profile;
 use crate::sim_line::SimulatedLine;
@@ -28,7 +28,7 @@ impl Server {
     fn start(simulator: &sim::Simulator, transport: &str, link: Option<PathBuf>) -> PyResult<Self> {
         let failed = |error| sim_error(&format!("simulator ({transport})"), error);
         if link.is_some() && transport != "pty" {
-            return Err(not_allowed(format!(
+            return Err(bad_argument(format!(
                 "a link leads to a pseudo-terminal, and there is none with {transport:?}"
             )));
         }
@@ -42,10 +42,10 @@ impl Server {
             #[cfg(unix)]
             "tcp" => simulator.serve_tcp().map(Self::Tcp).map_err(failed),
             #[cfg(not(target_os = "linux"))]
-            "pty" => Err(not_allowed(String::from("transport \"pty\" needs Linux; use \"tcp\" or \"process\""))),
+            "pty" => Err(bad_argument(String::from("transport \"pty\" needs Linux; use \"tcp\" or \"process\""))),
             #[cfg(not(unix))]
-            "tcp" => Err(not_allowed(String::from("transport \"tcp\" needs a Unix system; use \"process\""))),
-            other => Err(not_allowed(format!("transport {other:?} is not \"pty\", \"tcp\" or \"process\""))),
+            "tcp" => Err(bad_argument(String::from("transport \"tcp\" needs a Unix system; use \"process\""))),
+            other => Err(bad_argument(format!("transport {other:?} is not \"pty\", \"tcp\" or \"process\""))),
         }
     }
 
@@ -80,7 +80,7 @@ impl Ear {
 
     #[cfg(not(target_os = "linux"))]
     fn start(_: &sim::Simulator, _: Option<PathBuf>) -> PyResult<Self> {
-        Err(not_allowed(String::from("an ear needs Linux; here, drivebus.sniff hears a bus of the same program")))
+        Err(bad_argument(String::from("an ear needs Linux; here, drivebus.sniff hears a bus of the same program")))
     }
 }
 
@@ -275,7 +275,7 @@ impl SimulatedDrive {
             "anything" => Asked::Anything,
             "reads" => Asked::Reads,
             "writes" => Asked::Writes,
-            other => return Err(not_allowed(format!("asked {other:?} is not \"anything\", \"reads\" or \"writes\""))),
+            other => return Err(bad_argument(format!("asked {other:?} is not \"anything\", \"reads\" or \"writes\""))),
         };
         let mut refusals = Refusals::new(code).of(asked).share(share);
         if let Some(seconds) = seconds {
@@ -310,7 +310,7 @@ impl SimulatedDrive {
         let address = one_word("address", address)?;
         self.0.register(address).map_err(|code| {
             let unit = self.0.unit();
-            not_allowed(format!("unit {unit} would refuse to read {address:04X}H with exception {:02X}H", code.0))
+            bad_argument(format!("unit {unit} would refuse to read {address:04X}H with exception {:02X}H", code.0))
         })
     }
 
@@ -360,7 +360,7 @@ impl BehavesLike {
 /// A mapping's items as unit address and what is there.
 fn units_of(units: &Bound<'_, PyAny>) -> PyResult<Vec<(u8, BehavesLike)>> {
     let mistake =
-        || not_allowed(format!("units {} do not map unit addresses to names of profiles or profiles", shown(units)));
+        || bad_argument(format!("units {} do not map unit addresses to names of profiles or profiles", shown(units)));
     let items = units.call_method0("items").map_err(|_| mistake())?;
     items
         .try_iter()?

@@ -6,7 +6,7 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::clock::seconds;
 use crate::convert::{bytes_of, duration, shown};
-use crate::errors::{not_allowed, refuse, sim_error};
+use crate::errors::{bad_argument, refuse, sim_error};
 use crate::format::SerialFormat;
 
 /// The wire: what it saw, and what it is told to spoil.
@@ -98,7 +98,7 @@ impl SimulatedLine {
     #[pyo3(signature = (faults, /))]
     fn script(&self, faults: &Bound<'_, PyAny>) -> PyResult<()> {
         let mistake =
-            || not_allowed(format!("script {} is not a list of (answer number from 1, kind or bytes)", shown(faults)));
+            || bad_argument(format!("script {} is not a list of (answer number from 1, kind or bytes)", shown(faults)));
         let (mut kinds, mut instead) = (Vec::new(), Vec::new());
         for item in faults.try_iter().map_err(|_| mistake())? {
             let (answer, what): (u64, Bound<'_, PyAny>) = item?.extract().map_err(|_| mistake())?;
@@ -141,7 +141,7 @@ impl SimulatedLine {
         if let Some((least, most)) = overtaken {
             let (least, most) = (duration(least)?, duration(most)?);
             if least > most {
-                return Err(not_allowed(format!("overtaken {least:?} to {most:?}: give the least first")));
+                return Err(bad_argument(format!("overtaken {least:?} to {most:?}: give the least first")));
             }
             self.0.set_overtaken(least, most);
         }
@@ -190,7 +190,7 @@ fn rates_of(rates: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(Option<FaultKind
             let name: String = name.extract()?;
             let kind = if name == "all" { None } else { Some(kind_of(&name)?) };
             let rate = rate.extract().ok().filter(|rate| (0.0..=1.0).contains(rate));
-            let mistake = || not_allowed(format!("a rate of {name} is not a number from 0.0 to 1.0"));
+            let mistake = || bad_argument(format!("a rate of {name} is not a number from 0.0 to 1.0"));
             Ok((kind, rate.ok_or_else(mistake)?))
         })
         .collect()
@@ -211,6 +211,6 @@ fn answers(count: Option<&Bound<'_, PyAny>>) -> PyResult<u32> {
     count.map_or(Ok(1), |count| {
         count
             .extract()
-            .map_err(|_| not_allowed(format!("count {} is not a number from 0 to {}", shown(count), u32::MAX)))
+            .map_err(|_| bad_argument(format!("count {} is not a number from 0 to {}", shown(count), u32::MAX)))
     })
 }

@@ -6,7 +6,7 @@ import contextlib
 import os
 from pathlib import Path
 
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 
 __all__ = ["is_there", "part_of", "read", "remove", "write"]
 
@@ -34,7 +34,7 @@ def read(path: Path) -> bytes:
     """
     try:
         if not path.is_file():
-            raise NotAllowed(f"{path} is not a file" if path.exists() else f"there is no file {path}")
+            raise BadArgument(f"{path} is not a file" if path.exists() else f"there is no file {path}")
         with path.open("rb") as file:
             data = file.read(_MOST + 1)
     except (OSError, ValueError) as error:
@@ -42,7 +42,7 @@ def read(path: Path) -> bytes:
             raise
         raise NotAllowed(f"{path} cannot be read: {_reason(error)}") from None
     if len(data) > _MOST:
-        raise NotAllowed(f"{path} is larger than a backup can be ({_MOST >> 20} MiB)")
+        raise BadArgument(f"{path} is larger than a backup can be ({_MOST >> 20} MiB)")
     return data
 
 
@@ -56,7 +56,7 @@ def write(path: Path, text: str) -> None:
         # A link goes on leading to the file, and the file is replaced.
         path = Path(os.path.realpath(path))
         if path.exists() and not path.is_file():
-            raise NotAllowed(f"{path} is not a file, and a backup cannot take its place")
+            raise BadArgument(f"{path} is not a file, and a backup cannot take its place")
         # Always the same name: what a killed process left behind is overwritten by the next, and does not pile up.
         passing = path.with_name(f"{path.name}.tmp")
         passing.unlink(missing_ok=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, WrongDrive
 from drivebus.operations.unit import Unit
 
 # Every drive has these three, and few programs use them: what they need is loaded when one is called.
@@ -151,7 +151,7 @@ async def diff(
         kept = _kept(unit, backup, force)
         others = [] if force else kept.origin.other(await taking.origin_of(unit))
         if others:
-            raise NotAllowed(
+            raise WrongDrive(
                 f"the backup is not of the drive at unit {unit.address}: {'; '.join(others)}. To compare them all the "
                 "same, say force=True (`--force`)",
                 unit=unit.address,
@@ -179,7 +179,7 @@ def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
 
     kept = backup if isinstance(backup, Backup) else Backup.load(_path(backup), unit.profile)
     if kept.interrupted:
-        raise NotAllowed(
+        raise BadArgument(
             f"the backup of {kept.origin.taken:%Y-%m-%d %H:%M} was never completed; nothing was sent. Take it "
             "again with the same path to have the rest",
             unit=unit.address,
@@ -187,7 +187,7 @@ def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
     if kept.origin.family == unit.profile.family:
         return kept
     if not force:
-        raise NotAllowed(
+        raise WrongDrive(
             f"the backup is of a {kept.origin.family}, and unit {unit.address} is a {unit.profile.family}: a code may "
             "mean another thing there; nothing was sent. If that is right, say force=True (`--force`)",
             unit=unit.address,
@@ -200,5 +200,5 @@ def _path(path: object) -> Path:
     from pathlib import Path
 
     if not isinstance(path, (str, os.PathLike)) or not isinstance(os.fspath(path), str) or not Path(path).name:
-        raise NotAllowed(f"{checks.shown(path)} is neither a backup nor the path of a file")
+        raise BadArgument(f"{checks.shown(path)} is neither a backup nor the path of a file")
     return Path(checks.path("file", path))

@@ -16,7 +16,7 @@ from drivebus.backup import disk, parse, text
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, is_open
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed, WrongDrive
 from drivebus.profile import Profile
 from drivebus.values import Value
 
@@ -150,7 +150,7 @@ class Backup(Mapping[str, Value]):
         if other is None:
             return compare(self.profile, factory(self.profile), ours, everything=everything)
         if other.origin.family != self.origin.family:
-            raise NotAllowed(
+            raise WrongDrive(
                 f"a backup of a {self.origin.family} and one of a {other.origin.family} cannot be compared: a code may "
                 "mean another thing"
             )
@@ -166,9 +166,9 @@ class Backup(Mapping[str, Value]):
             try:
                 there = profile.describe(code)
                 if not there.listed:
-                    raise NotAllowed(f"{profile.name} does not list {code}")
+                    raise BadArgument(f"{profile.name} does not list {code}")
                 if (there.code, there.name, there.unit) != (here.code, here.name, here.unit):
-                    raise NotAllowed(f"{code} is another thing in a {profile.title}: {there.label}")
+                    raise BadArgument(f"{code} is another thing in a {profile.title}: {there.label}")
                 raw[code] = profile.encode(code, value)
             except NotAllowed as error:
                 unread[code] = Unread(str(error), "not there")
@@ -220,4 +220,4 @@ def _shipped(family: str) -> Profile:
     try:
         return Profile.builtin(family)
     except NotAllowed as error:
-        raise NotAllowed(f"{error}; for a profile of your own give profile=… (`--profile`)") from None
+        raise BadArgument(f"{error}; for a profile of your own give profile=… (`--profile`)") from None

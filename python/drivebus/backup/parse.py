@@ -18,7 +18,7 @@ from drivebus import checks
 from drivebus.backup.parameter import FIELDS, Wrong, lacking, word
 from drivebus.backup.text import FORMAT, printable
 from drivebus.backup.unread import Unread
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile
 
 if sys.version_info >= (3, 11):
@@ -117,7 +117,7 @@ class _File:
                 "as it is, give the profile that it was read with (`--profile`)"
             )
         count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
-        return NotAllowed("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
+        return BadArgument("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))
 
 
 def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) -> Parsed:
@@ -132,7 +132,7 @@ def parse(path: Path, data: bytes, profile: Profile | Callable[[str], Profile]) 
         NotAllowed: It is no backup, or lines are wrong; the message names all of them.
     """
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise NotAllowed(f"{path} was saved as UTF-16, and a backup is UTF-8: save it as that; nothing was sent")
+        raise BadArgument(f"{path} was saved as UTF-16, and a backup is UTF-8: save it as that; nothing was sent")
     file = _File(path)
     for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), 1):
         try:

@@ -19,7 +19,7 @@ from drivebus.backup.rules import Rules
 from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
-from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
+from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, WrongDrive
 from drivebus.operations import sending, state
 from drivebus.operations.unit import Unit
 from drivebus.profile.refusals import means
@@ -107,10 +107,10 @@ class Restore:
             NotAllowed: It is no list of codes, or the backup lacks one; nothing was sent.
         """
         if isinstance(raw, str) or not all(isinstance(code, str) for code in raw):
-            raise NotAllowed(f'raw is {checks.shown(raw)}, not a list of codes; give one such as ["P05.01"]')
+            raise BadArgument(f'raw is {checks.shown(raw)}, not a list of codes; give one such as ["P05.01"]')
         for code in raw:
             if code not in self._backup:
-                raise NotAllowed(f"the backup has no {checks.shown(code)}{checks.closest(code, self._backup)}")
+                raise BadArgument(f"the backup has no {checks.shown(code)}{checks.closest(code, self._backup)}")
         return raw
 
     def _to_ram(self, code: str) -> bool:
@@ -126,7 +126,7 @@ class Restore:
     async def _check_identity(self, force: bool) -> None:
         others = self._backup.origin.other(await origin_of(self._unit))
         if others and not force:
-            raise NotAllowed(
+            raise WrongDrive(
                 f"the backup is not of the drive at unit {self._unit.address}: {'; '.join(others)}; nothing was "
                 "written. If that is right, say force=True (`--force`)",
                 unit=self._unit.address,
@@ -172,9 +172,10 @@ class Restore:
             # Its family does not say where it tells its state; the drive itself refuses what it must.
             return
         if now.running:
-            raise NotAllowed(
+            raise NotReady(
                 f"{', '.join(stopped[:5])}{' and others' if len(stopped) > 5 else ''} can be restored only while the "
                 f"drive is stopped, and unit {self._unit.address} runs ({now}); nothing was written",
+                why="turning",
                 unit=self._unit.address,
             )
 

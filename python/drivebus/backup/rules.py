@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from drivebus import checks
 from drivebus.backup.unread import Unread
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile
 from drivebus.values import group_of
 
@@ -95,13 +95,15 @@ class Rules:
         if groups is None:
             return codes
         if isinstance(groups, str) or not all(isinstance(group, str) for group in groups):
-            raise NotAllowed(f'groups is {checks.shown(groups)}, not a list of groups; give one such as ["P00", "P09"]')
+            raise BadArgument(
+                f'groups is {checks.shown(groups)}, not a list of groups; give one such as ["P00", "P09"]'
+            )
         every = self.codes()
         known = {group_of(code) for code in every} | set(every)
         for group in groups:
             if group not in known:
                 near = checks.closest(group, known)
-                raise NotAllowed(f"{self.profile.name} has no group {checks.shown(group)}{near}")
+                raise BadArgument(f"{self.profile.name} has no group {checks.shown(group)}{near}")
         return [code for code in codes if _among(code, frozenset(groups))]
 
     def last(self) -> list[str]:

@@ -13,7 +13,7 @@ from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, refused
-from drivebus.errors import NotAllowed, Refused
+from drivebus.errors import BadArgument, NotAllowed, Refused, WrongDrive
 from drivebus.operations import registers, sending, words
 from drivebus.operations.unit import Unit
 
@@ -89,7 +89,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     rules = Rules(unit.profile)
     codes = rules.codes()
     if not codes:
-        raise NotAllowed(f"{unit.profile.name} has no parameters that are known: there is nothing to keep")
+        raise BadArgument(f"{unit.profile.name} has no parameters that are known: there is nothing to keep")
     unread: dict[str, Unread] = {
         code: reason for code in codes if (reason := rules.unread(code, unit.unverified)) is not None
     }
@@ -150,7 +150,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
 def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
     if disk.is_there(path) and not path.is_file():
-        raise NotAllowed(f"{path} is not a file, and a backup cannot take its place; nothing was read")
+        raise BadArgument(f"{path} is not a file, and a backup cannot take its place; nothing was read")
     if force or not disk.is_there(path):
         return
     try:
@@ -162,7 +162,7 @@ def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
             f"{path} is there and would be replaced, but: {why}\nTake another name, or force=True (`--force`)"
         ) from None
     if others:
-        raise NotAllowed(
+        raise WrongDrive(
             f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or "
             "force=True (`--force`)",
             unit=unit.address,
@@ -184,7 +184,7 @@ def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
     if before.origin.profile_version != origin.profile_version:
         others.append(f"it was read with version {before.origin.profile_version} of the profile")
     if others:
-        raise NotAllowed(
+        raise WrongDrive(
             f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With "
             "resume=False (`--fresh`) it starts again",
             unit=unit.address,

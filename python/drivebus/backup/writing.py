@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivebus.errors import LINE_ERRORS, NotAllowed, Refused
+from drivebus.errors import LINE_ERRORS, Refused, Unverified
 from drivebus.operations import sending, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.refusals import means
@@ -57,7 +57,7 @@ def place(unit: Unit, code: str, *, store: bool) -> int:
     plain = store and address == profile.describe(code).place
     if memory is None or unit.evidence.allows(memory["reason"]) or plain:
         return address
-    raise NotAllowed(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")
+    raise Unverified(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")
 
 
 async def _look(unit: Unit, code: str) -> int:

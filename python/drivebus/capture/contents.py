@@ -13,7 +13,7 @@ from drivebus.capture.modbus_tcp import Found, found_in
 from drivebus.capture.packets import Interface, Packet
 from drivebus.capture.serial_line import SerialLine
 from drivebus.checks import counted
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["Contents"]
 
@@ -57,7 +57,7 @@ class Contents:
         frames = list(self._of_serial_lines(say) if self._lines else self._of_servers(say))
         yield from frames
         if broken is None and not any(is_frame(frame.data) for frame in frames):
-            raise NotAllowed(self._without())
+            raise BadArgument(self._without())
 
     def _of_serial_lines(self, say: Callable[[str], object]) -> Iterator[Captured]:
         for interface, count in self._others.items():

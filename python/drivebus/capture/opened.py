@@ -12,7 +12,7 @@ from typing import BinaryIO, cast
 from drivebus import checks
 from drivebus.capture import pcap, pcapng
 from drivebus.capture.packets import Packet
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["opened", "packets_of"]
 
@@ -45,10 +45,10 @@ def opened(path: Path, name: str) -> Iterator[tuple[bytes, BinaryIO]]:
             magic = stream.read(4)
             stream.seek(0)
             if magic in _OTHERS:
-                raise NotAllowed(f"{name} is {_OTHERS[magic]}")
+                raise BadArgument(f"{name} is {_OTHERS[magic]}")
             yield magic, stream
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise NotAllowed(f"{name} breaks off: what gzip packed is not whole ({error})") from None
+        raise BadArgument(f"{name} breaks off: what gzip packed is not whole ({error})") from None
     except OSError as error:
         raise checks.unread(name, error) from None
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from drivebus.capture.packets import LARGEST, Interface, Packet, moment
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["MAGICS", "packets"]
 
@@ -34,7 +34,7 @@ def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
     """
     head = stream.read(24)
     if head[:4] not in MAGICS or len(head) < 24:
-        raise NotAllowed(f"{name} breaks off in its head: it is not a whole pcap file")
+        raise BadArgument(f"{name} breaks off in its head: it is not a whole pcap file")
     order, per_second = MAGICS[head[:4]]
     interface = Interface(0, struct.unpack(f"{order}I", head[20:])[0] & _LINK)
     count = 0
@@ -44,7 +44,7 @@ def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
             seconds, part, length, whole = struct.unpack(f"{order}IIII", head)
         data = stream.read(length) if length <= LARGEST else b""
         if len(data) < length:
-            raise NotAllowed(f"{name} breaks off behind its packet {count}: it is not a whole pcap file")
+            raise BadArgument(f"{name} breaks off behind its packet {count}: it is not a whole pcap file")
         time = moment(seconds * per_second + part, per_second) if part < per_second else None
         yield Packet(interface, time, None, data, length < whole)
         count += 1

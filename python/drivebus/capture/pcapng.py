@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from drivebus.capture.packets import LARGEST, Interface, Packet, moment
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["MAGIC", "descriptions", "interface", "packet", "packets", "section"]
 
@@ -96,14 +96,14 @@ def packets(stream: BinaryIO, name: str) -> Iterator[Packet]:
                 yield _packet(kind, body, order, lines)
                 count += 1
         except (struct.error, ValueError) as error:
-            raise NotAllowed(f"{name} has a block that is not whole behind its packet {count}: {error}") from None
+            raise BadArgument(f"{name} has a block that is not whole behind its packet {count}: {error}") from None
 
 
 def _order(magic: bytes, name: str) -> str:
     for order in "<>":
         if len(magic) == 4 and struct.unpack(f"{order}I", magic)[0] == _BYTE_ORDER:
             return order
-    raise NotAllowed(f"{name} begins as a pcapng file and has no byte order; it is damaged")
+    raise BadArgument(f"{name} begins as a pcapng file and has no byte order; it is damaged")
 
 
 def _rest(stream: BinaryIO, head: bytes, order: str, name: str, count: int) -> bytes:
@@ -113,7 +113,7 @@ def _rest(stream: BinaryIO, head: bytes, order: str, name: str, count: int) -> b
         rest = stream.read(length - len(head))
         if len(rest) == length - len(head) and rest[-4:] == head[4:8]:
             return head[8:] + rest[:-4]
-    raise NotAllowed(f"{name} breaks off behind its packet {count}: it is not a whole pcapng file")
+    raise BadArgument(f"{name} breaks off behind its packet {count}: it is not a whole pcapng file")
 
 
 def _line(body: bytes, order: str, number: int) -> _Line:

@@ -13,7 +13,7 @@ from drivebus.capture import pcapng
 from drivebus.capture.contents import Contents
 from drivebus.capture.frame import Captured
 from drivebus.capture.opened import opened, packets_of
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 
 __all__ = ["line_of", "read"]
 
@@ -75,7 +75,7 @@ def line_of(path: str | os.PathLike[str]) -> SerialFormat | None:
 
 def _text(data: bytes, name: str, say: Callable[[str], object]) -> Iterator[Captured]:
     if len(data) > _MOST_TEXT:
-        raise NotAllowed(f"{name} is not a pcapng file, and too long to be hex text: {_MOST_TEXT >> 20} MiB at most")
+        raise BadArgument(f"{name} is not a pcapng file, and too long to be hex text: {_MOST_TEXT >> 20} MiB at most")
     # What reads text takes a while to load, and who listens to a line needs none of it.
     from drivebus.capture import text
     from drivebus.capture.encoding import decoded
@@ -87,7 +87,7 @@ def _text(data: bytes, name: str, say: Callable[[str], object]) -> Iterator[Capt
     yield from found
     if not has_frame:
         why = "".join(f"; {remark}" for remark in said)
-        raise NotAllowed(
+        raise BadArgument(
             f"{name} holds no frame: it is neither a pcapng file nor hex text with a frame in it; "
             f"{text.LOOKED_FOR}{why}"
         )

@@ -90,7 +90,7 @@ def _keep_older(file: Path) -> None:
     origin = older.origin
     # Where its replacement was begun, that goes on.
     if older.complete and not file.with_name(f"{file.name}.part").exists():
-        raise drivebus.NotAllowed(
+        raise drivebus.BadArgument(
             f"{file} has a backup already: {len(older)} parameters of unit {origin.unit}, {origin.title}, begun "
             f"{origin.taken:%Y-%m-%d %H:%M} UTC; give another name, or --force to replace it; nothing was read"
         )

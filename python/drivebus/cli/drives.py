@@ -30,7 +30,7 @@ def drives(context: click.Context, session: Session) -> None:
         for drive in site.drives.values()
     ]
     if not rows:
-        raise drivebus.NotAllowed(f"{site.path} names no drive; give it a table such as [drives.pump1]")
+        raise drivebus.BadArgument(f"{site.path} names no drive; give it a table such as [drives.pump1]")
     out.rows(["drive", "line", "port", "unit", "profile", "groups"], rows)
 
 

@@ -37,7 +37,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
     except drivebus.NotAllowed:
         shown = next((fault.mnemonic for fault in profile.faults() if fault.mnemonic.lower() == wanted.lower()), "")
         if shown:
-            raise drivebus.NotAllowed(
+            raise drivebus.BadArgument(
                 f'"{wanted}" is not a register or parameter of {profile.name}, but a fault: `drivebus faults {shown}`'
             ) from None
         found = profile.search(wanted, limit=10_000)
@@ -106,7 +106,7 @@ def list_(session: Session, group: str | None) -> None:
     unlisted = _unlisted(profile, wanted)
     if not chosen and not unlisted and wanted not in _ALWAYS:
         known = ", ".join([*_ALWAYS, *_groups(rows)])
-        raise drivebus.NotAllowed(f'{profile.name} has no group "{group}"; it has {known}')
+        raise drivebus.BadArgument(f'{profile.name} has no group "{group}"; it has {known}')
     session.out.say(f"{profile.title}, {group}: {counted(len(chosen), 'row')}")
     session.out.rows(
         ["name", "code", "address", "unit", "range", "access", "label"],
@@ -233,7 +233,7 @@ def _show_known(session: Session, text: str) -> None:
     profile = session.known_profile()
     known = _meant(profile.faults(), text) if text else profile.faults()
     if text and not known:
-        raise drivebus.NotAllowed(
+        raise drivebus.BadArgument(
             f'{profile.name} names no fault "{text}"; `drivebus faults --all` lists those it names'
         )
     if text and len(known) == 1 and not session.out.as_json:
@@ -252,7 +252,7 @@ def _show_of_all(session: Session, text: str) -> None:
         (name, fault) for name in drivebus.profiles() for fault in _meant(drivebus.Profile.builtin(name).faults(), text)
     ]
     if not found:
-        raise drivebus.NotAllowed(f'no family that is known names a fault "{text}"; `drivebus profiles` lists them')
+        raise drivebus.BadArgument(f'no family that is known names a fault "{text}"; `drivebus profiles` lists them')
     # Families of one maker have most of their faults in common.
     families: dict[tuple[Any, ...], list[str]] = {}
     for name, fault in found:

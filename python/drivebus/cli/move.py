@@ -50,7 +50,7 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
     with session.drive() as drive:
         told = drive.profile.role("setpoint") is not None
         if wait is not None and hz is None and not told:
-            raise drivebus.NotAllowed(
+            raise drivebus.BadArgument(
                 f"{drive.profile.title} does not tell its setpoint, so there is no speed to wait for: give the speed, "
                 f"or leave --wait out. Nothing was sent to unit {drive.unit}"
             )
@@ -191,7 +191,7 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
                 continue
             known = drive.describe(place)
             if known.name in wanted:
-                raise drivebus.NotAllowed(f"{known.code or known.name} is given twice; nothing was sent")
+                raise drivebus.BadArgument(f"{known.code or known.name} is given twice; nothing was sent")
             wanted[known.name] = names.without_unit(value, known.unit)
         if words:
             session.ask(f"This writes {', '.join(assignments)}, without knowing what that does", yes)
@@ -240,11 +240,11 @@ def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, A
 def _word(drive: drivebus.Drive, place: int, value: float | str, force: bool) -> int:
     """The word for an address that the profile does not know, which only *force* writes."""
     if not force:
-        raise drivebus.NotAllowed(
+        raise drivebus.BadArgument(
             f"{drive.profile.name} knows nothing at {place:04X}H, so its range is unknown; --force writes a word there"
         )
     if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
-        raise drivebus.NotAllowed(
+        raise drivebus.BadArgument(
             f'"{value}" is not a word from 0 to 65535, which is what an address takes; nothing was sent'
         )
     return value

@@ -55,7 +55,7 @@ def named(profile: drivebus.Profile, text: str) -> str:
     """As `resolve`, for what needs a name: an address without one is refused."""
     place = resolve(profile, text)
     if isinstance(place, int):
-        raise drivebus.NotAllowed(f"{profile.name} has no name for address {place:04X}H; `read` takes it as it is")
+        raise drivebus.BadArgument(f"{profile.name} has no name for address {place:04X}H; `read` takes it as it is")
     return place
 
 

@@ -284,9 +284,10 @@ class Session:
         if group is not None and group.parent is not None:
             name = f"{group.info_name} {name}"
         halt = " If it must stop now, use the emergency stop." if name in ("stop", "coast") else ""
-        raise drivebus.NotAllowed(
+        raise drivebus.NotReady(
             f"`{name}` writes to the drive, and --read-only says that nothing may; nothing was sent. Say it without "
-            f"that switch; where the environment has it, with DRIVEBUS_READ_ONLY=0.{halt}"
+            f"that switch; where the environment has it, with DRIVEBUS_READ_ONLY=0.{halt}",
+            why="read_only",
         )
 
     def known_profile(self) -> drivebus.Profile:

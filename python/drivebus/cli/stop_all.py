@@ -77,7 +77,7 @@ def _lines(context: click.Context, session: Session) -> list[tuple[Session, dict
 def _stop_line(line: Session, drives: dict[int, Session], within: float, done: _Done) -> None:
     """Stops the *drives* of one line: those whose family is known at once, the others when they have told it."""
     if not drives:
-        raise drivebus.NotAllowed(
+        raise drivebus.BadArgument(
             f"no drive is known on {line.port}, so nobody was told to stop. Name them: `{line.command('stop --unit')} "
             "1-4`; `drivebus scan` finds them. If a motor must stop now, use the emergency stop"
         )

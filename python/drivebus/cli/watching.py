@@ -32,7 +32,7 @@ def watched(session: Session, drive: drivebus.Drive, wanted: Sequence[str] = (),
     usual = [name for name in drive.readable() if not name.startswith("identification")]
     known = [names.named(profile, text) for text in wanted] or usual
     if not known:
-        raise drivebus.NotAllowed(
+        raise drivebus.Unverified(
             f"no register of {profile.title} may be watched without --unverified; name the registers you want to see"
         )
     rows = {name: drive.describe(name) for name in known}

@@ -16,7 +16,7 @@ from drivebus import checks
 from drivebus.backup import disk
 from drivebus.backup.unread import Unread
 from drivebus.discovery import guesses
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.values import Description
 
@@ -139,14 +139,14 @@ class Discovery:
         """
         _base(profile, base)
         if not _NAME.fullmatch(folder.name):
-            raise NotAllowed(
+            raise BadArgument(
                 f"{folder.name or folder} cannot be the name of a profile: lower-case letters, digits, - and _; "
                 "nothing was asked"
             )
         if folder.name in profiles():
-            raise NotAllowed(f"{folder.name} is the name of a shipped profile; give another one. Nothing was asked")
+            raise BadArgument(f"{folder.name} is the name of a shipped profile; give another one. Nothing was asked")
         if disk.is_there(folder) and (not folder.is_dir() or any(folder.iterdir())):
-            raise NotAllowed(
+            raise BadArgument(
                 f"{folder} is there already, and what is in it would be lost; give another name. Nothing was asked"
             )
 
@@ -198,7 +198,7 @@ def _base(profile: Profile, base: str | None) -> str:
     if base is not None:
         return checks.path("base", base)
     if profile.name not in profiles():
-        raise NotAllowed(
+        raise BadArgument(
             f"{profile.name} is a profile of your own: say where it is, seen from the new folder, such as "
             f'base="../{profile.name}"; nothing was asked'
         )

@@ -12,7 +12,7 @@ from typing import Any
 from drivebus.backup import disk
 from drivebus.backup.model import Origin
 from drivebus.backup.unread import WHY, Unread
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, WrongDrive
 
 __all__ = ["Group", "Kept"]
 
@@ -95,7 +95,7 @@ class Kept:
                 for group, one in whole["groups"].items()
             }
         except (ValueError, TypeError, KeyError, AttributeError):
-            raise NotAllowed(
+            raise BadArgument(
                 f"{path} is not what an interrupted discovery left; nothing was asked. Give another name, or "
                 "resume=False (`--fresh`) replaces it"
             ) from None
@@ -127,7 +127,7 @@ class Kept:
             other = ", ".join(
                 f"{name} {left.whose.get(name)}" for name in self.whose if left.whose.get(name) != self.whose[name]
             )
-            raise NotAllowed(
+            raise WrongDrive(
                 f"{self.path} was begun with another drive ({other}); nothing was asked. Give another name, or "
                 "resume=False (`--fresh`) starts again"
             )

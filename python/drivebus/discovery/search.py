@@ -12,7 +12,7 @@ from drivebus.backup.unread import Unread, lost, refused
 from drivebus.discovery.found import Discovery
 from drivebus.discovery.kept import Group, Kept
 from drivebus.discovery.walk import LAST, Walk
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused, WrongDrive
 from drivebus.operations import words
 from drivebus.operations.unit import Unit
 
@@ -106,7 +106,7 @@ class _Search:
         for refusal in refusals:
             raise refusal
         if all(isinstance(answer, list) for answer in answers):
-            raise NotAllowed(
+            raise WrongDrive(
                 f"unit {self._unit.address} answers at {' and '.join(_address(group) for group in ends)}, where no "
                 "parameter can be: what it answers does not tell what it has. Nothing was written",
                 unit=self._unit.address,
@@ -199,17 +199,17 @@ def _groups(unit: Unit, groups: Sequence[str] | None) -> list[int]:
     profile = unit.profile
     known = {_named(group): group for group in profile.parameter_groups()}
     if not known:
-        raise NotAllowed(
+        raise BadArgument(
             f"the codes of {profile.title} do not tell addresses: nothing can be asked for but what its profile lists",
             unit=unit.address,
         )
     if groups is None:
         return list(known.values())
     if isinstance(groups, str) or not groups or not all(isinstance(group, str) for group in groups):
-        raise NotAllowed(f'groups is {checks.shown(groups)}, not a list of groups; give one such as ["P00", "P09"]')
+        raise BadArgument(f'groups is {checks.shown(groups)}, not a list of groups; give one such as ["P00", "P09"]')
     for group in groups:
         if group not in known:
-            raise NotAllowed(
+            raise BadArgument(
                 f"{checks.shown(group)} is not a group that can be searched in a {profile.title}: that is P00 to "
                 f"P{LAST}, without those that the maker keeps closed or that are addresses of registers"
             )

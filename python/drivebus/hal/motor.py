@@ -10,7 +10,7 @@ from collections.abc import Callable
 from types import TracebackType
 
 from drivebus.drive import Drive
-from drivebus.errors import DrivebusError, NotAllowed
+from drivebus.errors import BadArgument, DrivebusError, NotAllowed, Unverified
 from drivebus.hal.core import Action, Coast, Look, Reset, Run, Speed
 from drivebus.line.blocking import at_once
 from drivebus.operations import motion, setpoints
@@ -66,7 +66,7 @@ class Motor:
         register = setpoints.register_of(unit, "frequency")
         described = unit.profile.describe(register)
         if described.unit != "Hz":
-            raise NotAllowed(
+            raise BadArgument(
                 f"the setpoint of unit {unit.address} is in {described.unit or 'a unit that is not known'}, and a "
                 "spindle needs one in Hz",
                 unit=unit.address,
@@ -176,7 +176,7 @@ class Motor:
             )
             return None
         if not (settings.verified or self._drive.unverified):
-            raise NotAllowed(
+            raise Unverified(
                 f"the communication time-out of {profile.title} ({settings.timeout}) is not verified: {settings.note} "
                 "Use it all the same with --unverified, or do without with --no-watchdog. Nothing was sent",
                 unit=self._drive.unit,

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Mapping
 
 from drivebus import checks
-from drivebus.errors import NotAllowed, SharedCodeWarning, level_of_the_program
+from drivebus.errors import BadArgument, NotAllowed, SharedCodeWarning, WrongDrive, level_of_the_program
 from drivebus.identify.families import one_of, shipped
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Identification
@@ -29,7 +29,7 @@ async def profile_of(
 ) -> tuple[Profile, int | None]:
     """The profile that *profile* means, or else that of the drive at *unit*, and the code that it gave if asked."""
     if variants is not None and not isinstance(variants, Mapping):
-        raise NotAllowed(
+        raise BadArgument(
             f'variants is {checks.shown(variants)}, not a mapping; give one, such as {{"speed_unit": "Hz"}}'
         )
     code: int | None = None
@@ -82,7 +82,7 @@ def _not_sure(found: Identification) -> NotAllowed:
         ", or unverified=True (`--unverified`) to take it for that" if len(found.candidates) == len(known) == 1 else ""
     )
     like = known[0] if len(known) == 1 else f"one of {', '.join(known or profiles())}"
-    return NotAllowed(
+    return WrongDrive(
         f"unit {found.unit} answers, but could not be identified for sure: {what}{found.reason} ({found.certainty}). "
         f"Registers and command codes differ between families; if you know that it behaves like {like}, "
         f"give profile=… (`--profile`){with_one}",

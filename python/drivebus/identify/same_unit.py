@@ -16,7 +16,7 @@ import functools
 from collections.abc import Sequence
 
 from drivebus import places
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, PortError
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, WrongDrive
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer, answer_once, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
@@ -157,7 +157,7 @@ class SameUnit:
         known.spoke = any(answer.word is not None for answer in answers) or not _may_be_shown(self._profile)
         known.is_sure = against is None and known.known is not None and self._is_told(answers)
         if against is not None and judged:
-            raise NotAllowed(f"{against}; nothing was written to it", unit=self._unit)
+            raise WrongDrive(f"{against}; nothing was written to it", unit=self._unit)
 
     def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
         """Raises where the unit does not say what is *known* of it any more."""
@@ -169,9 +169,9 @@ class SameUnit:
             ) from failure
         told = self._told(answers)
         if self._put_off(answers):
-            raise NotAllowed(f"{unsaid} ({told}); nothing was written", unit=self._unit)
+            raise WrongDrive(f"{unsaid} ({told}); nothing was written", unit=self._unit)
         if told != known:
-            raise NotAllowed(
+            raise WrongDrive(
                 f"another drive answers as unit {self._unit} since the port was opened again: its identification was "
                 f"{known}, and is {told} now; nothing was sent. If that is right, ask for the drive anew: "
                 f"bus.drive({self._unit})",

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterable
 
 from drivebus import checks
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused
 from drivebus.identify.choose import usable
 from drivebus.identify.identify import Read, identify
 from drivebus.identify.results import Found
@@ -33,7 +33,7 @@ _TIMEOUT = 0.1
 def units(given: Iterable[int], addresses: Addresses) -> list[int]:
     """The units of a scan, which may be asked as *addresses* says."""
     if not isinstance(given, Iterable):
-        raise NotAllowed(f"units is {checks.shown(given)}; give addresses from 1 to 247, such as range(1, 248) or [5]")
+        raise BadArgument(f"units is {checks.shown(given)}; give addresses from 1 to 247, such as range(1, 248) or [5]")
     return [addresses.unit(unit) for unit in given]
 
 

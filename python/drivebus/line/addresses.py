@@ -7,7 +7,7 @@ broadcast. On a serial line 0 is the broadcast, and 248 to 254 are what some uni
 from __future__ import annotations
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["EVERYBODY", "Addresses"]
 
@@ -43,11 +43,11 @@ class Addresses:
         why = self.why_not(value)
         if why and value:
             allowed = f"{checks.UNITS[0]} to {checks.UNITS[-1]}"
-            raise NotAllowed(f"unit {value} is out of range; allowed is {allowed}; {why}")
+            raise BadArgument(f"unit {value} is out of range; allowed is {allowed}; {why}")
         if why:
             return checks.unit(value)
         if value == 0 and changes and not self._reserved:
-            raise NotAllowed(
+            raise BadArgument(
                 "unit 0 over tcp:// may be a device by itself, and a gateway hands on what is written to it to every "
                 "unit behind it: if it is a device, give reserved=True to the bus; or use broadcast()"
             )

@@ -14,7 +14,7 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
-from drivebus.errors import NotAllowed, PortError
+from drivebus.errors import BadArgument, PortError
 from drivebus.profile import profiles
 from drivebus.sim import FAULT_KINDS, Simulator
 
@@ -73,7 +73,7 @@ def resolve(port: object, line: SerialFormat) -> Any:
         return _resolve_text(port, line)
     if callable(getattr(port, "read", None)) and callable(getattr(port, "write", None)):
         return port
-    raise NotAllowed(
+    raise BadArgument(
         f"{checks.shown(port)} is not a port; give a path (/dev/ttyUSB0, COM3), a URL (socket://host:port, "
         "sim://gd350), a Simulator, or an open serial.Serial"
     )
@@ -98,7 +98,7 @@ def _resolve_text(port: str, line: SerialFormat) -> Any:
     try:
         port.encode()
     except UnicodeError:
-        raise NotAllowed(f"port {checks.shown(port)} is not in UTF-8, and no port can be called that") from None
+        raise BadArgument(f"port {checks.shown(port)} is not in UTF-8, and no port can be called that") from None
     scheme, simulator = _native.port_url(port, schemes=_PYSERIAL_SCHEMES, families=profiles(), faults=FAULT_KINDS)
     if scheme == "sim":
         return _simulator(simulator, line)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from drivebus import _native, checks, places
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.line.stats import Link
 from drivebus.line.units import Units
 
@@ -263,11 +263,11 @@ def transact_of(
     try:
         body = bytes(memoryview(pdu))
     except TypeError:
-        raise NotAllowed(
+        raise BadArgument(
             f"a PDU is bytes, and {checks.shown(pdu)} is not; give 1 to 253 bytes, function code first"
         ) from None
     if not 1 <= len(body) <= 253:
-        raise NotAllowed(f"a PDU of {len(body)} bytes is not allowed; give 1 to 253 bytes, function code first")
+        raise BadArgument(f"a PDU of {len(body)} bytes is not allowed; give 1 to 253 bytes, function code first")
     if reply_length is not None:
         reply_length = checks.whole("reply_length", reply_length, 1, 253)
     unit = known.addresses.unit(unit, changes=not _native.only_reads(body))

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
 
 from drivebus import _native, checks
-from drivebus.errors import DrivebusError, NotAllowed, Refused
+from drivebus.errors import BadArgument, DrivebusError, Refused
 from drivebus.line.addresses import Addresses
 from drivebus.line.units import units_of
 from drivebus.profile import Profile
@@ -313,14 +313,14 @@ def seconds(timeout: float | None) -> float | None:
 
 def _targets(bus: object, addresses: Addresses, wanted: object) -> tuple[Target, ...]:
     if not isinstance(wanted, Mapping):
-        raise NotAllowed(f"poll() takes {{drive: names, …}}, such as {{drive: None}}, and not {checks.shown(wanted)}")
+        raise BadArgument(f"poll() takes {{drive: names, …}}, such as {{drive: None}}, and not {checks.shown(wanted)}")
     if not wanted:
-        raise NotAllowed("nothing to poll: give {drive: names, …}, such as {drive: None}")
+        raise BadArgument("nothing to poll: give {drive: names, …}, such as {drive: None}")
     targets = tuple(_target(bus, addresses, key, names) for key, names in wanted.items())
     units = [target.unit for target in targets]
     twice = next((unit for unit in units if units.count(unit) > 1), None)
     if twice is not None:
-        raise NotAllowed(f"unit {twice} is there twice; name all that is wanted of it in one place", unit=twice)
+        raise BadArgument(f"unit {twice} is there twice; name all that is wanted of it in one place", unit=twice)
     return targets
 
 
@@ -330,38 +330,38 @@ def _target(bus: object, addresses: Addresses, key: Any, names: object) -> Targe
     drive: PolledDrive = key
     unit, profile = drive.unit, drive.profile
     if drive.bus is not bus:
-        raise NotAllowed(f"unit {unit} is a drive of another bus; poll it there", unit=unit)
+        raise BadArgument(f"unit {unit} is a drive of another bus; poll it there", unit=unit)
     if not isinstance(profile, Profile):
-        raise NotAllowed(f"the profile of unit {unit} is not of this package; poll the unit by addresses", unit=unit)
+        raise BadArgument(f"the profile of unit {unit} is not of this package; poll the unit by addresses", unit=unit)
     if names is None:
         names = drive.readable()
     elif isinstance(names, str):
         names = [names]
     elif not isinstance(names, Iterable):
-        raise NotAllowed(
+        raise BadArgument(
             f"{checks.shown(names)} is not a list of names; give one, or None for the monitor registers", unit=unit
         )
     wanted = list(names)
     unfit = next((name for name in wanted if not isinstance(name, str)), None)
     if unfit is not None:
-        raise NotAllowed(f"a name is a text, and {checks.shown(unfit)} of unit {unit} is not", unit=unit)
+        raise BadArgument(f"a name is a text, and {checks.shown(unfit)} of unit {unit} is not", unit=unit)
     asked = list(dict.fromkeys(wanted))
     plan = profile.compile(drive.readable(*asked) if asked else asked)
     if not plan.names:
-        raise NotAllowed(f"nothing is asked of unit {unit}; give names, or None for its monitor registers", unit=unit)
+        raise BadArgument(f"nothing is asked of unit {unit}; give names, or None for its monitor registers", unit=unit)
     return Target(key, unit, drive, profile, plan, plan.names, plan.native)
 
 
 def _raw_target(unit: int, reads: object) -> Target:
     usage = f"unit {unit} has no profile here: give [(address, count), …] for it, or use bus.drive({unit})"
     if isinstance(reads, (str, bytes)) or not isinstance(reads, Iterable):
-        raise NotAllowed(usage)
+        raise BadArgument(usage)
     asked = []
     for read in reads:
         if not isinstance(read, Sequence) or isinstance(read, (str, bytes)) or len(read) != 2:
-            raise NotAllowed(usage)
+            raise BadArgument(usage)
         asked.append((checks.address(read[0]), checks.whole("count", read[1], 1, 125)))
     names = tuple(address + offset for address, count in asked for offset in range(count))
     if len(set(names)) < len(names):
-        raise NotAllowed(f"of unit {unit} one address is asked for twice")
+        raise BadArgument(f"of unit {unit} one address is asked for twice")
     return Target(unit, unit, None, None, None, names, asked)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.line import ports
 from drivebus.line.addresses import Addresses
 from drivebus.line.stats import Stats
@@ -56,7 +56,7 @@ class Opening:
     ) -> None:
         self.timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
         if rs485 is not None and not isinstance(rs485, Mapping):
-            raise NotAllowed(
+            raise BadArgument(
                 f'rs485 is {checks.shown(rs485)}, not a mapping; give one such as {{"mode": "kernel"}}, or None'
             )
         self.keywords: dict[str, Any] = {
@@ -93,7 +93,7 @@ class Opening:
 def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
-        raise NotAllowed("trust_profile needs a profile: give profile=… (`--profile`) too")
+        raise BadArgument("trust_profile needs a profile: give profile=… (`--profile`) too")
 
 
 def _wire_file(path: object, port: str, line: SerialFormat) -> WireFile:

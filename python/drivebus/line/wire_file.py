@@ -12,7 +12,7 @@ from drivebus import checks
 from drivebus._native import SerialFormat
 from drivebus.capture import Captured, Writer
 from drivebus.capture.standing import LOOK, Standing
-from drivebus.errors import DrivebusWarning, NotAllowed
+from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed
 
 __all__ = ["WireFile"]
 
@@ -31,7 +31,7 @@ class WireFile:
 
     def __init__(self, path: object, port: str, line: SerialFormat) -> None:
         if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
-            raise NotAllowed(f"trace is {checks.shown(path)}, which is not a file; give the path of a pcapng file")
+            raise BadArgument(f"trace is {checks.shown(path)}, which is not a file; give the path of a pcapng file")
         self._name = str(os.fspath(path))
         settings = f"{line.baudrate} {line.bytesize}{line.parity}{line.stopbits}"
         try:

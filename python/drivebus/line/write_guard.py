@@ -10,7 +10,7 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 
 from drivebus import places
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
 
 __all__ = ["check_words", "code_text", "prepare_guard"]
@@ -38,7 +38,7 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 
 def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
     codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
-    return NotAllowed(
+    return BadArgument(
         f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
         f"{family.title}: its codes are {codes or 'not known'}; {_HINT}",
         unit=unit,
@@ -54,7 +54,7 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
         return
     own = families[0].command_address
     where = "is not known" if own is None else f"is {places.shown(own)}"
-    raise NotAllowed(
+    raise BadArgument(
         f"{places.shown(address)} is the command register of {others}; unit {unit} is known as {families[0].title}, "
         f"whose command register {where}; {_HINT}",
         unit=unit,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.operations import commands, control, setpoints, start_checks, words
 from drivebus.operations.commands import A_WORD
 from drivebus.operations.unit import Unit
@@ -94,7 +94,7 @@ async def _terminals(unit: Unit, name: str) -> dict[str, bool]:
     try:
         unit.profile.describe(name)
     except NotAllowed:
-        raise NotAllowed(
+        raise BadArgument(
             f"no {name.replace('_', ' ')} word of {unit.profile.title} is known; unit {unit.address} was not asked",
             unit=unit.address,
         ) from None
@@ -107,7 +107,7 @@ async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], forc
     unit.evidence.writes(register)
     known, masks = unit.profile.describe(register), _masks(unit, register)
     if not given:
-        raise NotAllowed(f"nothing to set was named; {register} has {', '.join(masks) or 'no bits that are known'}")
+        raise BadArgument(f"nothing to set was named; {register} has {', '.join(masks) or 'no bits that are known'}")
     wanted = [
         (masks[checks.one_of(f"bit of {register}", name, list(masks))], _bits(known, name, value))
         for name, value in given.items()
@@ -160,4 +160,4 @@ def _bits(known: Description, name: str, value: object) -> int:
         if called in choices:
             return called
     allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
-    raise NotAllowed(f"{name} is {checks.shown(value)}, which {known.name} cannot be; allowed is {allowed}")
+    raise BadArgument(f"{name} is {checks.shown(value)}, which {known.name} cannot be; allowed is {allowed}")

@@ -9,7 +9,7 @@ import math
 from contextlib import suppress
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, Unconfirmed
+from drivebus.errors import BadArgument, DrivebusError, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.last_will import LastWill
@@ -50,12 +50,12 @@ class BusTimeout:
     def __init__(self, drive: Unit, timeout: float, action: str) -> None:
         settings = drive.profile.watchdog
         if settings is None:
-            raise NotAllowed(
+            raise BadArgument(
                 f"{drive.profile.title} has no communication time-out that is known; nothing was sent",
                 unit=drive.address,
             )
         if drive.profile.memory() is None:
-            raise NotAllowed(
+            raise BadArgument(
                 f"no way to write {settings.timeout} of {drive.profile.title} to RAM alone is known, and a watchdog "
                 "must not wear the EEPROM each time; nothing was sent. Set the time-out in the drive, for good",
                 unit=drive.address,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from drivebus import checks
-from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameters, registers, sending
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
@@ -67,11 +67,12 @@ async def prepare_control(
         if item.ok and not (store and sending.is_in_ram(unit, item.code)):
             continue
         if item.actual is not None and row["by_hand"]:
-            raise NotAllowed(
+            raise NotReady(
                 f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
                 f"({item.label}). prepare_control() (`drivebus prepare`) does not set it: {item.note} "
                 f"Nothing was written. If {int(item.wanted)} is meant, write() {item.code} first, "
                 "with store=True (`--store`)",
+                why="settings",
                 unit=unit.address,
             )
         if item.actual is None or not (item.verified or unit.unverified):
@@ -93,10 +94,11 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
     """Raises `NotAllowed` if the drive would not heed *setpoint*, because it takes that from elsewhere."""
     control = await _check_items(unit, unit.profile.needs(setpoint))
     if not control:
-        raise NotAllowed(
+        raise NotReady(
             f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
             f'sent. prepare_control(setpoint="{setpoint}") sets it so; write("{register}", …) writes it '
             "all the same",
+            why="settings",
             unit=unit.address,
         )
 
@@ -109,9 +111,10 @@ async def check_set(unit: Unit, wanted: list[dict[str, Any]], what: str) -> None
     sure = [row for row in wanted if row["verified"] or unit.unverified]
     wrong = Control(item for item in await _check_items(unit, sure) if item.actual is not None and not item.ok)
     if len(wrong):
-        raise NotAllowed(
+        raise NotReady(
             f"unit {unit.address} {what}:\n{wrong}\nNothing that moves it was sent. prepare_control() (`drivebus "
             "prepare`) sets what is needed",
+            why="settings",
             unit=unit.address,
         )
 

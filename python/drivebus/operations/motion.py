@@ -8,7 +8,7 @@ caller is told so.
 from __future__ import annotations
 
 from drivebus import checks
-from drivebus.errors import NotAllowed, Unconfirmed
+from drivebus.errors import BadArgument, NotReady, Unconfirmed
 from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.halting import WITHIN, Halt
@@ -97,9 +97,10 @@ async def jog(
     await start_checks.prove_link(unit, force)
     before = await start_checks.ready_to_start(unit)
     if before.state.running:
-        raise NotAllowed(
+        raise NotReady(
             f"unit {unit.address} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
             "wait_until_stopped(), before a jog",
+            why="turning",
             unit=unit.address,
         )
     await _start(unit, command, None, reverse, before, confirm)
@@ -152,7 +153,7 @@ async def jog_stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, 
     if "jog_stop" not in unit.profile.commands():
         jogs = "jog_forward" in unit.profile.commands()
         ends = ": stop() ends it along the ramp, coast() takes the voltage off" if jogs else ", nor one to jog"
-        raise NotAllowed(
+        raise BadArgument(
             f"{unit.profile.title} has no command that ends a jog alone{ends}; nothing was sent to unit {unit.address}",
             unit=unit.address,
         )

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple, overload
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed
+from drivebus.errors import BadArgument, DrivebusError, NotReady
 from drivebus.operations import registers, sending, state, variants
 from drivebus.operations.sending import Planned
 from drivebus.operations.unit import Unit
@@ -76,14 +76,14 @@ async def write(
     Where one of several fails, those before it were written; the error's note names them.
     """
     if not isinstance(name, (str, Mapping)):
-        raise NotAllowed(
+        raise BadArgument(
             f"a name is a text, or a mapping of names to values, and {checks.shown(name)} is neither; nothing was sent",
             unit=unit.address,
         )
     store = checks.flag("store", store)
     wanted = name if isinstance(name, Mapping) else {name: value}
     if not isinstance(name, Mapping) and value is None:
-        raise NotAllowed(f'no value is given for "{name}"; say write("{name}", value)')
+        raise BadArgument(f'no value is given for "{name}"; say write("{name}", value)')
     _check_deciding(unit, wanted)
     unit = await variants.settled(unit.trusting(unverified), *wanted)
     planned = [plan_write(unit, key, asked, store) for key, asked in wanted.items()]
@@ -155,14 +155,14 @@ def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
             continue
         depends = next((other for other in wanted if unit.profile.describe(other).variant == variant), None)
         if depends is not None:
-            raise NotAllowed(
+            raise BadArgument(
                 f"{name} decides what {depends} means; nothing was sent to unit {unit.address}. Write {name} by "
                 "itself, and first",
                 unit=unit.address,
             )
         chosen = unit.profile.variants_chosen.get(variant)
         if chosen is not None and unit.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
-            raise NotAllowed(
+            raise BadArgument(
                 f"{name} = {checks.shown(wanted[name])} would change the {variant} of unit {unit.address}, which was "
                 f"said to be {chosen}; nothing was sent. Write it by a drive without variants=…",
                 unit=unit.address,
@@ -173,16 +173,16 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
     """The write of *value* to *name*. Raises `NotAllowed` where the profile does not allow it."""
     known = unit.profile.describe(name)
     if not known.writable:
-        raise NotAllowed(f"{name} ({known.label}) is read-only; nothing was sent", unit=unit.address)
+        raise BadArgument(f"{name} ({known.label}) is read-only; nothing was sent", unit=unit.address)
     if known.place is not None and unit.profile.is_command(known.place):
-        raise NotAllowed(
+        raise BadArgument(
             f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
             "or reset_fault(), or for terminals and the special control word their own methods",
             unit=unit.address,
         )
     unit.evidence.writes(name)
     if known.kind == "parameter" and not store and unit.profile.memory() is None:
-        raise NotAllowed(
+        raise BadArgument(
             f"no way to write {name} to RAM alone is known of {unit.profile.title}, so every write may wear its "
             f"EEPROM; nothing was sent to unit {unit.address}. With store=True (`--store`) it is kept there",
             unit=unit.address,
@@ -213,9 +213,10 @@ async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
         now = state.state_of(unit, int(values[state_word]))
         state.remember(unit, str(now))
         if now.running:
-            raise NotAllowed(
+            raise NotReady(
                 f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {unit.address} "
                 f"runs ({now}); nothing was written",
+                why="turning",
                 unit=unit.address,
             )
     in_force = {sending.key(unit.profile.describe(name)): values[name] for name in others}
@@ -231,7 +232,7 @@ def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> No
         limit = in_force.get(sending.key(narrow))
         if limit is None or (value >= limit if low else value <= limit):
             continue
-        raise NotAllowed(
+        raise BadArgument(
             f"{item.name} ({item.known.label}) = {value:g} {item.known.unit} is {'below' if low else 'above'} "
             f"{other} ({narrow.label}), which is {limit:g} {narrow.unit} in unit {unit.address}; nothing was written. "
             f"Write {other} first, or before it in the same call",

@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from types import FrameType
 
 from drivebus._native import begin_of_child, end_of_program
-from drivebus.errors import NotAllowed
+from drivebus.errors import NotAllowed, NotReady
 from drivebus.operations.interruptions import Kept
 
 __all__ = ["Guard", "before_start", "end_over"]
@@ -176,8 +176,9 @@ def end_over(line: object) -> None:
 
 
 def _too_late() -> NotAllowed:
-    return NotAllowed(
-        "the program is ending, and nobody could stop the motor: nothing starts any more. Nothing was sent"
+    return NotReady(
+        "the program is ending, and nobody could stop the motor: nothing starts any more. Nothing was sent",
+        why="ending",
     )
 
 

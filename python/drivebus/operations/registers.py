@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import overload
 
 from drivebus import places
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.operations import variants, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -43,7 +43,7 @@ async def read(unit: Unit, *names: str, verify: bool = False, unverified: bool =
         NoAnswer, BadAnswer, Refused: See each. With *verify* also where the words change all the time.
     """
     if not names:
-        raise NotAllowed("read() needs at least one name, such as 'output_current' or 'P00.11'")
+        raise BadArgument("read() needs at least one name, such as 'output_current' or 'P00.11'")
     values = await snapshot(unit.trusting(unverified), *names, verify=verify)
     return values[names[0]] if len(names) == 1 else dict(values)
 
@@ -90,7 +90,7 @@ def readable(unit: Unit, *names: str) -> list[str]:
         if variants.is_open(unit, name):
             variant = unit.profile.describe(name).variant or ""
             rule = variants.rules(unit)[variant]
-            raise NotAllowed(
+            raise BadArgument(
                 f"what {name} means depends on {rule['parameter']} of unit {unit.address}: give variants=… to "
                 f"bus.drive() (`--variant {variant}=…`; {', '.join(map(repr, rule['choices']))})",
                 unit=unit.address,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.operations import control, parameters, registers, sending, variants, words
 from drivebus.operations.unit import Unit
 from drivebus.values import Value
@@ -80,14 +80,14 @@ async def with_setpoint(unit: Unit, setpoint: str) -> Unit:
 def register_of(unit: Unit, setpoint: str) -> str:
     """The register of *setpoint*. Raises `NotAllowed` where the family has none that is known."""
     if not isinstance(setpoint, str):
-        raise NotAllowed(
+        raise BadArgument(
             f"a setpoint is named by a text, and {checks.shown(setpoint)} is not one; nothing was sent",
             unit=unit.address,
         )
     register = unit.profile.role(f"setpoints.{setpoint}")
     if register is None:
         known = ", ".join(unit.profile.setpoint_names())
-        raise NotAllowed(
+        raise BadArgument(
             f"no {setpoint.replace('_', ' ')} setpoint of {unit.profile.title} is known"
             f"{f', only {known}' if known else ''}; nothing was sent to unit {unit.address}",
             unit=unit.address,
@@ -100,7 +100,7 @@ def _frequency_in_hz(unit: Unit) -> str:
     register = register_of(unit, "frequency")
     counted_in = unit.profile.describe(register).unit
     if counted_in != "Hz":
-        raise NotAllowed(
+        raise BadArgument(
             f"the setpoint of unit {unit.address} is in {counted_in or 'a unit that is not known'}, not in Hz; "
             f'nothing was sent. write("{register}", …) takes it as it is',
             unit=unit.address,
@@ -125,7 +125,7 @@ async def word_of(unit: Unit, hz: float) -> int:
     if limit is not None and unit.evidence.unreadable(limit) is None:
         highest: Value = await registers.read(unit, limit)
         if hz > highest:
-            raise NotAllowed(
+            raise BadArgument(
                 f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
                 f"allowed is 0 to {highest:g} Hz. No setpoint was sent to unit {unit.address}",
                 unit=unit.address,

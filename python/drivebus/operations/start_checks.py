@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
+from drivebus.errors import BadAnswer, BadLink, NoAnswer, NotReady, Refused
 from drivebus.operations import control, start_sequence, state
 from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
@@ -51,7 +51,7 @@ async def prove_link(unit: Unit, force: bool) -> None:
             lost += 1
     link = await unit.bus.link(unit.address)
     if lost > _FAILURES_ALLOWED or link.failed > _FAILURES_ALLOWED:
-        raise NotAllowed(
+        raise BadLink(
             f"the link to unit {unit.address} is bad: {link}, and {lost} of {looks} looks at its state failed; "
             "nothing that moves it was sent, for its stop might be lost as well. Mend the line (bus.stats() may "
             "say how), or start all the same with force=True (`--force`)",
@@ -64,19 +64,23 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
     await control.check_set(unit, control.wanted_always(unit), "has its words elsewhere")
     seen = await state.glance(unit)
     if seen.tripped:
-        raise NotAllowed(
+        raise NotReady(
             f"unit {unit.address} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
             "Remove the cause, then reset_fault()",
+            why="fault",
             unit=unit.address,
         )
     if seen.state is State.POWER_OFF:
-        raise NotAllowed(
-            f"unit {unit.address} has no voltage on its DC bus; nothing that moves it was sent", unit=unit.address
+        raise NotReady(
+            f"unit {unit.address} has no voltage on its DC bus; nothing that moves it was sent",
+            why="no_voltage",
+            unit=unit.address,
         )
     if by_bus and seen.source not in (ControlSource.COMMUNICATION, None):
-        raise NotAllowed(
+        raise NotReady(
             f"unit {unit.address} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
             "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
+            why="control_source",
             unit=unit.address,
         )
     if by_bus and seen.source is None:

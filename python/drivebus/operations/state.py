@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from drivebus import places
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.operations import registers, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -157,7 +157,7 @@ async def ping(unit: Unit) -> None:
     for name in unit.evidence.readable(name for name in named if name is not None):
         await words.read_words(unit, unit.profile.address(name))
         return
-    raise NotAllowed(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
+    raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
 
 def planned(unit: Unit) -> _Look:

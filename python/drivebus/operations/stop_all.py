@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from drivebus import checks
-from drivebus.errors import DrivebusError, NotAllowed, NotStopped, Unconfirmed
+from drivebus.errors import BadArgument, DrivebusError, NotStopped, Unconfirmed
 from drivebus.operations import commands, motion
 from drivebus.operations.aim import goes_out_at_once
 from drivebus.operations.halting import WITHIN, Halt
@@ -76,7 +76,7 @@ async def stop_all(
     within = checks.number("within", within, 0.0, 3600.0)
     trusted = [unit.trusting(unverified) for unit in units]
     if not trusted:
-        raise NotAllowed(
+        raise BadArgument(
             "no drive is known on this bus, so nobody was told to stop: ask for each with drive(unit) first. "
             "If a motor must stop now, use the emergency stop"
         )

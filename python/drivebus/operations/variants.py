@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from typing import Any
 
-from drivebus.errors import NotAllowed
+from drivebus.errors import NotReady
 from drivebus.operations.unit import Unit
 from drivebus.operations.words import read_words
 from drivebus.profile.evidence import Evidence, not_verified
@@ -58,8 +58,9 @@ async def _chosen(unit: Unit, variant: str) -> str:
     for choice, value in choices.items():
         if value == raw:
             return str(choice)
-    raise NotAllowed(
+    raise NotReady(
         f"{parameter} of unit {unit.address} is {raw}, which means nothing known; {given}. Nothing was written",
+        why="settings",
         unit=unit.address,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drivebus import checks
-from drivebus.errors import NotAllowed, NotReached, Unconfirmed
+from drivebus.errors import BadArgument, NotReached, Unconfirmed
 from drivebus.operations import state
 from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.speed import STANDSTILL
@@ -55,7 +55,7 @@ def _check_told(unit: Unit, what: str, *roles: str) -> None:
     for role in roles:
         name = unit.profile.role(role)
         if name is None:
-            raise NotAllowed(
+            raise BadArgument(
                 f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that "
                 "is known",
                 unit=unit.address,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.plot.picture import Picture
 
 __all__ = ["check", "draw"]
@@ -45,7 +45,7 @@ def _drawing(path: str | os.PathLike[str]) -> Callable[[Picture, Path, str], Non
     """What draws into a file of this name."""
     known = _BY.get(Path(path).suffix.lower())
     if known is None:
-        raise NotAllowed(
+        raise BadArgument(
             f"the name {os.fspath(path)} does not say which kind of picture it is; end it with {', '.join(_BY)}"
         )
     try:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.plot.thin import thinned
 from drivebus.record.reading import Event, Recording
 from drivebus.record.table import moment
@@ -150,7 +150,7 @@ def of_recording(
     # All drives of a line are late at the same time.
     picture.late = max((sum(event.drive == drive for event in late) for drive in recording.drives), default=0)
     if not picture.panels and not any(band.lamp for band in picture.bands):
-        raise NotAllowed(
+        raise BadArgument(
             f"{title}: there is nothing to draw between these moments, or no value that was not 0 all the time"
         )
     picture.panels = {unit: picture.panels[unit] for unit in sorted(picture.panels, key=_rank)}
@@ -181,7 +181,7 @@ def _titled(name: str, known: set[str]) -> str:
     for title in known:
         if name in (title, title.partition(" [")[0]):
             return title
-    raise NotAllowed(f'there is no "{name}" in the recording; it has {", ".join(sorted(known))}')
+    raise BadArgument(f'there is no "{name}" in the recording; it has {", ".join(sorted(known))}')
 
 
 def _take(

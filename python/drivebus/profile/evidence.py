@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed, Unverified
 from drivebus.profile.profile import Profile
 
 __all__ = ["Evidence", "not_verified"]
@@ -24,7 +24,7 @@ _NO_RANGE = "its range is not printed"
 
 def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
     """The error for *what* of *unit*, which is not verified for the *reason* that the profile gives."""
-    return NotAllowed(
+    return Unverified(
         f"{what} is not verified: {_sentence(reason)} Nothing was sent to unit {unit}; with unverified=True "
         "(`--unverified`) it is done nevertheless",
         unit=unit,
@@ -68,7 +68,7 @@ class Evidence:
         """Raises `NotAllowed` if one of *names* may not be read."""
         for name in names:
             if not isinstance(name, str):
-                raise NotAllowed(
+                raise BadArgument(
                     f"a name is a text, and {checks.shown(name)} is not; nothing was sent to unit {self.unit}",
                     unit=self.unit,
                 )
@@ -81,7 +81,7 @@ class Evidence:
                 if known.address is None:
                     raise self._without_address(name)
                 if known.access == "wo":
-                    raise NotAllowed(f"{self._named(name)} can only be written; nothing was sent", unit=self.unit)
+                    raise BadArgument(f"{self._named(name)} can only be written; nothing was sent", unit=self.unit)
                 raise not_verified(f"reading {self._named(name)}", missing, self.unit)
             self._readable.add(name)
 
@@ -118,7 +118,7 @@ class Evidence:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
         reason = self.unusable(name)
         if name not in self.profile.commands():
-            raise NotAllowed(f"{reason}; nothing was sent to unit {self.unit}", unit=self.unit)
+            raise BadArgument(f"{reason}; nothing was sent to unit {self.unit}", unit=self.unit)
         if reason is not None:
             raise not_verified(f"the command {name} of {self.profile.title}", reason, self.unit)
 
@@ -145,7 +145,7 @@ class Evidence:
         """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
         helps = better(self.trusting(True)) is None
         hint = "; unverified=True (`--unverified`) uses what is assumed" if helps else ""
-        return NotAllowed(f"{what}: {_sentence(reason)} Nothing was sent to unit {self.unit}{hint}", unit=self.unit)
+        return Unverified(f"{what}: {_sentence(reason)} Nothing was sent to unit {self.unit}{hint}", unit=self.unit)
 
     def allows(self, reason: str | None) -> bool:
         """Whether what has a *reason* not to be used may be used all the same; with None there is no such reason."""
@@ -161,7 +161,7 @@ class Evidence:
 
     def _without_address(self, name: str) -> NotAllowed:
         known = self.profile.describe(name)
-        return NotAllowed(
+        return Unverified(
             f"the address of {self._named(name)} is not known: {_sentence(known.reason or known.note)} Nothing was "
             f"sent to unit {self.unit}; an overlay on the profile can fill it in (`drivebus profiles new`)",
             unit=self.unit,

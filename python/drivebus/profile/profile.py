@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drivebus import _native, checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
@@ -68,7 +68,7 @@ class Profile:
             return cls.load(profile) if is_folder else cls.builtin(profile)
         if isinstance(profile, os.PathLike):
             return cls.load(profile)
-        raise NotAllowed(
+        raise BadArgument(
             f"{checks.shown(profile)} is not a profile; give a name ({', '.join(profiles())}), a folder, or a Profile"
         )
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.record.table import Row, Table
 
 __all__ = ["FORMATS", "Sink", "format_of", "sink_for"]
@@ -74,7 +74,7 @@ def format_of(path: str | os.PathLike[str]) -> str:
     try:
         return FORMATS[ending]
     except KeyError:
-        raise NotAllowed(
+        raise BadArgument(
             f"the name {os.fspath(path)} does not say which format it is; end it with {', '.join(FORMATS)}"
         ) from None
 
@@ -88,7 +88,7 @@ def sink_for(path: Path, table: Table, replace: bool) -> Sink:
     """
     known = format_of(path)
     if path.exists() and not replace:
-        raise NotAllowed(f"{path} is there already; give another name, or replace=True (`--force`)")
+        raise BadArgument(f"{path} is there already; give another name, or replace=True (`--force`)")
     try:
         make: Callable[[Path, Table], Sink] = import_module(f"drivebus.record.{known}").open_new
         if replace:

@@ -14,7 +14,7 @@ from typing import Any
 
 from drivebus import checks
 from drivebus._native import read_sheet
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.record.files import format_of
 from drivebus.record.table import FIXED, seconds_of
 
@@ -87,7 +87,7 @@ class Recording:
                 when = at.timestamp() if isinstance(at, datetime) else seconds_of(at)
                 drive, event = row.get("drive") or "", row.get("event") or ""
             except (KeyError, TypeError, ValueError, AttributeError):
-                raise NotAllowed(f"{name} is not a recording: row {number} has no time") from None
+                raise BadArgument(f"{name} is not a recording: row {number} has no time") from None
             if event:
                 self._happened(Event(when, drive, event, row.get("text") or ""))
                 continue
@@ -132,7 +132,7 @@ def read(*paths: str | os.PathLike[str]) -> Recording:
         titles, rows = _READERS[format_of(path)](Path(path), name)
         found.take(titles, rows, name)
     if not found.events and not found.drives:
-        raise NotAllowed(f"{', '.join(str(path) for path in paths)} has no row: it is not a recording")
+        raise BadArgument(f"{', '.join(str(path) for path in paths)} has no row: it is not a recording")
     return found
 
 
@@ -146,7 +146,7 @@ def _csv_rows(path: Path, name: str) -> _Rows:
         raise _unread(name, error) from None
     for number, cells in rows:
         if len(cells) > len(titles):
-            raise NotAllowed(f"{name} is not a recording: line {number} has more cells than there are titles")
+            raise BadArgument(f"{name} is not a recording: line {number} has more cells than there are titles")
     return titles, ({title: _number(cell) for title, cell in zip(titles, cells, strict=False)} for _, cells in rows)
 
 
@@ -157,20 +157,20 @@ def _json_rows(path: Path, name: str) -> _Rows:
     except (OSError, ValueError) as error:
         raise _unread(name, error) from None
     if not all(isinstance(row, dict) for row in rows):
-        raise NotAllowed(f"{name} is not a recording: a line is not an object")
+        raise BadArgument(f"{name} is not a recording: a line is not an object")
     return list(dict.fromkeys(title for row in rows for title in row)), iter(rows)
 
 
 def _sqlite_rows(path: Path, name: str) -> _Rows:
     if not path.is_file():
-        raise NotAllowed(f"{name} cannot be read: there is no such file")
+        raise BadArgument(f"{name} cannot be read: there is no such file")
     try:
         with closing(sqlite3.connect(path)) as base:
             found = base.execute("SELECT * FROM record ORDER BY rowid")
             titles = [each[0] for each in found.description]
             rows = found.fetchall()
     except sqlite3.Error as error:
-        raise NotAllowed(f"{name} is not a recording: {error}") from None
+        raise BadArgument(f"{name} is not a recording: {error}") from None
     return titles, (dict(zip(titles, row, strict=True)) for row in rows)
 
 
@@ -183,7 +183,7 @@ def _parquet_rows(path: Path, name: str) -> _Rows:
     except FileNotFoundError as error:
         raise _unread(name, error) from None
     except (OSError, pyarrow.ArrowException) as error:
-        raise NotAllowed(f"{name} is not a recording: {str(error).splitlines()[0]}") from None
+        raise BadArgument(f"{name} is not a recording: {str(error).splitlines()[0]}") from None
     return table.column_names, iter(table.to_pylist())
 
 
@@ -193,7 +193,7 @@ _READERS = {"csv_file": _csv_rows, "json_lines": _json_rows, "sqlite": _sqlite_r
 def _unread(name: str, error: Exception) -> NotAllowed:
     if isinstance(error, OSError):
         return checks.unread(name, error)
-    return NotAllowed(f"{name} is not a recording: {error}")
+    return BadArgument(f"{name} is not a recording: {error}")
 
 
 def _number(cell: str) -> Any:

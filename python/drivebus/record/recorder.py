@@ -16,7 +16,7 @@ from drivebus import _native, checks
 from drivebus.attributes import known_only
 from drivebus.bus import Bus
 from drivebus.drive import Drive, check_drive
-from drivebus.errors import DrivebusWarning, NotAllowed
+from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed
 from drivebus.line.samples import Names, Sample
 from drivebus.operations.face import DriveFace
 from drivebus.poll import Poll, never_run
@@ -255,7 +255,7 @@ class Recorder:
 def _recorded(drives: Any, labels: Mapping[Drive, str], state: bool) -> dict[Drive, Recorded]:
     """What is recorded of each of *drives*."""
     if not isinstance(drives, Mapping) or not drives or not all(isinstance(drive, DriveFace) for drive in drives):
-        raise NotAllowed(f"drives is {checks.shown(drives)}; give {{drive: names, …}}, such as {{drive: None}}")
+        raise BadArgument(f"drives is {checks.shown(drives)}; give {{drive: names, …}}, such as {{drive: None}}")
     for drive in drives:
         check_drive(drive, "a Recorder")
     several = len({id(drive.bus) for drive in drives}) > 1
@@ -281,7 +281,7 @@ def _recorded(drives: Any, labels: Mapping[Drive, str], state: bool) -> dict[Dri
     names_in_file = [known.label for known in found.values()]
     twice = next((name for name in names_in_file if names_in_file.count(name) > 1), None)
     if twice is not None:
-        raise NotAllowed(f'two drives are called "{twice}"; give each a label of its own')
+        raise BadArgument(f'two drives are called "{twice}"; give each a label of its own')
     return found
 
 

@@ -13,7 +13,7 @@ from types import TracebackType
 
 from drivebus import checks
 from drivebus.bus import Bus
-from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, PortError
+from drivebus.errors import BadAnswer, BadArgument, NoAnswer, PortError
 from drivebus.identify.scan import speaks_otherwise
 from drivebus.line import huanyang, ports
 from drivebus.line.frames import frames_in, may_be_of
@@ -91,7 +91,7 @@ def search(
     if timeout is not None:
         timeout = checks.number("timeout", timeout, 0.0, 3600.0, above=True)
     if progress is not None and not callable(progress):
-        raise NotAllowed(
+        raise BadArgument(
             f"progress is {checks.shown(progress)}, which cannot be called; give a function that takes a Progress"
         )
     return Search(port, first, checks.flag("full", full), timeout, rs485, progress, open)

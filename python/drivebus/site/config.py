@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 from drivebus.line.addresses import Addresses
 
 if sys.version_info >= (3, 11):
@@ -122,9 +122,9 @@ class Site:
             with place.open("rb") as file:
                 data = file.read(_LARGEST + 1)
         except (OSError, ValueError) as error:
-            raise NotAllowed(f"{place} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+            raise BadArgument(f"{place} cannot be read: {getattr(error, 'strerror', None) or error}") from None
         if len(data) > _LARGEST:
-            raise NotAllowed(f"{place} is not a {FILE}: it has more than {_LARGEST} bytes")
+            raise BadArgument(f"{place} is not a {FILE}: it has more than {_LARGEST} bytes")
         return _Reader(place, data).site()
 
     def select(self, names: Iterable[str]) -> list[SiteDrive]:
@@ -142,7 +142,7 @@ class Site:
             else:
                 known = [*self.drives, *self.groups]
                 hint = checks.closest(name, known)
-                raise NotAllowed(f'{self.path} has no drive or group "{name}"{hint}; it has {_list(known)}')
+                raise BadArgument(f'{self.path} has no drive or group "{name}"{hint}; it has {_list(known)}')
         return list(chosen.values())
 
 
@@ -160,14 +160,14 @@ class _Reader:
             self._text = data.decode("utf-8")
             self._data = tomllib.loads(self._text)
         except UnicodeDecodeError:
-            raise NotAllowed(f"{path} is not a {FILE}: it is not text in UTF-8") from None
+            raise BadArgument(f"{path} is not a {FILE}: it is not text in UTF-8") from None
         except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
             shown = re.sub(r" \(at .*\)$", "", str(error))
             where = f"{path}:{line[1]}" if line else f"{path}, at its end"
-            raise NotAllowed(f"{where}: not TOML: {shown[:1].lower()}{shown[1:]}") from None
+            raise BadArgument(f"{where}: not TOML: {shown[:1].lower()}{shown[1:]}") from None
         except RecursionError:
-            raise NotAllowed(f"{path} is not a {FILE}: its values are nested too deeply") from None
+            raise BadArgument(f"{path} is not a {FILE}: its values are nested too deeply") from None
 
     def site(self) -> Site:
         """What the file says, or all that is wrong in it."""
@@ -182,7 +182,7 @@ class _Reader:
         if self._wrong:
             count = "one mistake" if len(self._wrong) == 1 else f"{len(self._wrong)} mistakes"
             told = [f"{self._path}:{line}: {reason}" for line, reason in sorted(self._wrong)]
-            raise NotAllowed("\n".join([f"{self._path} has {count}; nothing was opened:", *told]))
+            raise BadArgument("\n".join([f"{self._path} has {count}; nothing was opened:", *told]))
         return Site(self._path, lines, drives, groups)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:

@@ -13,7 +13,7 @@ from types import TracebackType
 from drivebus import checks
 from drivebus._native import SerialFormat, frame_len
 from drivebus.capture.frame import is_frame
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.seen import Seen
 
@@ -61,7 +61,7 @@ class Replay:
                 self._answers.setdefault(exchange.request, deque()).append((at, exchange.answer))
         self._units = {exchange.request[0] for exchange in known if exchange.request and exchange.answer}
         if not self._units:
-            raise NotAllowed("no request in the capture has an answer: there is nothing to replay")
+            raise BadArgument("no request in the capture has an answer: there is nothing to replay")
         # Who left an echo without an answer there leaves any.
         self._silent = {request[0] for request in self._answers if request[1] == _ECHO} - self._units
         self._seen = Seen(known)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument
 
 __all__ = ["Change", "Course", "Wave"]
 
@@ -49,7 +49,7 @@ class Change:
         for name in ("start", "to"):
             checks.number(name, getattr(self, name), 0.0, _HIGHEST)
         if self.start == self.to:
-            raise NotAllowed(f"from {self.start:g} Hz to {self.to:g} Hz is no change; nothing was sent")
+            raise BadArgument(f"from {self.start:g} Hz to {self.to:g} Hz is no change; nothing was sent")
 
     @property
     def low(self) -> float:
@@ -83,7 +83,7 @@ class Wave:
         checks.number("high", self.high, 0.0, _HIGHEST)
         checks.number("period", self.period, 0.1, 3600.0)
         if self.low >= self.high:
-            raise NotAllowed(f"{self.low:g} Hz is not below {self.high:g} Hz; nothing was sent")
+            raise BadArgument(f"{self.low:g} Hz is not below {self.high:g} Hz; nothing was sent")
 
     @property
     def start(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from drivebus import checks
 from drivebus.drive import Drive, check_drive
-from drivebus.errors import NotAllowed
+from drivebus.errors import BadArgument, NotAllowed
 from drivebus.trial.courses import Change, Wave
 from drivebus.trial.figures import (
     RampFigures,
@@ -165,7 +165,7 @@ def sine(
     """
     course = Wave(low, high, period)
     if checks.number("duration", duration, 0.1, 3600.0) < 3 * period:
-        raise NotAllowed(
+        raise BadArgument(
             f"{duration:g} s are less than three periods of {period:g} s, and the first counts for nothing; nothing "
             f"was sent. Give {3 * period:g} s or more"
         )
@@ -228,7 +228,7 @@ def _roles(drive: Drive, max_current: float | None) -> Roles:
     profile = drive.profile
     frequency = profile.role("frequency")
     if frequency is None:
-        raise NotAllowed(
+        raise BadArgument(
             f"a trial needs the output frequency, and {profile.title} has no register of it that is known; nothing was "
             f"sent to unit {drive.unit}",
             unit=drive.unit,
@@ -237,7 +237,7 @@ def _roles(drive: Drive, max_current: float | None) -> Roles:
     setpoint = profile.role("setpoint")
     current = _CURRENT if _CURRENT in profile.names() and _may_be_read(drive, _CURRENT) else None
     if current is None and max_current is not None:
-        raise NotAllowed(
+        raise BadArgument(
             f"no register of the output current of {profile.title} may be read, so {max_current:g} A cannot be "
             f"watched; nothing was sent to unit {drive.unit}. max_current=None (`--max-current off`) goes without",
             unit=drive.unit,

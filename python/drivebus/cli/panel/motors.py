@@ -259,7 +259,7 @@ class Motor:
     def _moving(self, since: int) -> Iterator[None]:
         with self._lock:
             if self.stops != since:
-                raise drivebus.NotAllowed(_STOPPED)
+                raise drivebus.NotReady(_STOPPED, why="halted")
             self._under_way += 1
         try:
             yield

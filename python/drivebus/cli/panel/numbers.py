@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from drivebus import NotAllowed
+from drivebus import BadArgument
 from drivebus.cli.types import with_a_point
 
 __all__ = ["number"]
@@ -19,8 +19,8 @@ def number(text: str, what: str, most: float | None = None) -> float:
     try:
         given = float(text)
     except ValueError:
-        raise NotAllowed(f'"{text}" is not a number of {what}{with_a_point(text)}; nothing was sent') from None
+        raise BadArgument(f'"{text}" is not a number of {what}{with_a_point(text)}; nothing was sent') from None
     if not math.isfinite(given) or given < 0 or (most is not None and given > most):
         allowed = "0 or more" if most is None else f"0 to {most:g}"
-        raise NotAllowed(f"{text} {what} is out of range; allowed is {allowed}; nothing was sent")
+        raise BadArgument(f"{text} {what} is out of range; allowed is {allowed}; nothing was sent")
     return given

@@ -94,7 +94,7 @@ def check_commands(request: Request) -> None:
     for address, word in enumerate(words, first):
         there = [family for family in families if address in family.command_registers()]
         if there and not any(word in family.command_registers()[address] for family in there):
-            raise drivebus.NotAllowed(
+            raise drivebus.BadArgument(
                 f"{word} at {places.shown(address)} is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
                 "--profile the family is known; with --force it is sent all the same"

@@ -85,7 +85,7 @@ def located(where: str) -> Iterator[None]:
     except drivebus.NotAllowed as error:
         if not where:
             raise
-        raise drivebus.NotAllowed(f"{where}: {error}") from None
+        raise drivebus.BadArgument(f"{where}: {error}") from None
 
 
 def typed_in(lines: Iterable[str], name: str, unit: int, force: bool, addresses: Addresses = SERIAL) -> Iterator[Typed]:
@@ -226,7 +226,7 @@ def _write(unit: int, text: str, profile: drivebus.Profile, unverified: bool) ->
     else:
         known = profile.describe(place)
         if not known.writable:
-            raise drivebus.NotAllowed(f"{place} ({known.label}) is read-only")
+            raise drivebus.BadArgument(f"{place} ({known.label}) is read-only")
         _check_proved(known, ("verified",), "writing", unverified)
         address = profile.address(place, store=False)
         word = profile.encode(place, names.without_unit(value, known.unit))
@@ -237,7 +237,7 @@ def _check_proved(row: drivebus.Description, enough: tuple[str, ...], doing: str
     """Raises `NotAllowed` where less is known of *row* than every command asks for."""
     if row.evidence not in enough and not unverified:
         reason = (row.reason or "no document of this family says so").rstrip(".")
-        raise drivebus.NotAllowed(
+        raise drivebus.Unverified(
             f"{doing} {row.code or row.name} ({row.label}) is not verified: {reason}. With --unverified it is done "
             "nevertheless, and so it is in hex"
         )

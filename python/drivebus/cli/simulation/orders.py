@@ -57,7 +57,7 @@ class Orders:
         name = order.get("order")
         carry_out = orders.get(name) if isinstance(name, str) else None
         if carry_out is None:
-            raise drivebus.NotAllowed(f"{name!r} is not an order; a simulation takes {', '.join(map(str, orders))}")
+            raise drivebus.BadArgument(f"{name!r} is not an order; a simulation takes {', '.join(map(str, orders))}")
         with self._turn:
             done = carry_out(order)
             if done:
