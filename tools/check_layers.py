@@ -67,6 +67,7 @@ UNSAFE_ALLOWED = {"crates/line/src/ports/tty/low_latency.rs", "crates/line/src/s
 
 # The rooms of the Python package, from the ground up: each may import those of the rows above its own.
 ROOMS: list[set[str]] = [
+    {"advice"},
     {"errors", "later", "named", "places"},
     {"values", "checks", "rtu"},
     {"attributes"},
@@ -107,6 +108,7 @@ ON_THE_CORE = {
 # What stands beside the rooms, and all that it may import. `drivebus` is the public package itself.
 PROGRAMS: dict[str, set[str]] = {
     "cli": {
+        "advice",
         "backup",
         "capture",
         "drivebus",

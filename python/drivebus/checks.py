@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
 from drivebus import places
+from drivebus.advice import Advice, Text
 from drivebus.errors import BadArgument, NotAllowed
 
 __all__ = [
@@ -59,7 +60,10 @@ def unit(value: object) -> int:
         return value
     if value == 0 and not isinstance(value, bool):
         raise BadArgument(
-            "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247, or use broadcast()"
+            Text(
+                "unit 0 is the broadcast address, which nobody answers; allowed is 1 to 247",
+                Advice("broadcast", None, ", or use broadcast()"),
+            )
         )
     return whole("unit", value, UNITS[0], UNITS[-1])
 

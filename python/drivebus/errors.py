@@ -3,7 +3,7 @@
 After an error on a line with a motor at its end, the first question is: *did the drive take it?* Each class answers
 that in its docstring. Nothing that arrives on a line can raise anything outside this tree.
 
-This module uses nothing of the package; the compiled core imports it and raises these classes.
+The compiled core imports this module and raises these classes.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import sys
 from collections.abc import Mapping
 from errno import EIO
 from typing import Any
+
+from drivebus.advice import Advice, Text
 
 __all__ = [
     "LINE_ERRORS",
@@ -73,7 +75,17 @@ class DrivebusError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The built-in reduction passes positional arguments only, and OSError adds its own.
-        return _rebuild, (type(self), str(self), dict(self.__dict__))
+        return _rebuild, (type(self), self.text, dict(self.__dict__))
+
+    @property
+    def text(self) -> Text:
+        """The message, with the calls and arguments that it names as data: each face has its own words for them."""
+        return Text(*self.args[:1])
+
+    @property
+    def advice(self) -> tuple[Advice, ...]:
+        """The calls and arguments that the message names: what helps, or what else may be done."""
+        return tuple(part for part in self.text.parts if isinstance(part, Advice))
 
 
 class PortError(DrivebusError, OSError):

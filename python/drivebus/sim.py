@@ -18,6 +18,7 @@ from typing import TypeVar
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat, SimulatedLine
+from drivebus.advice import Advice, Text
 from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed, PortError, level_of_the_program
 from drivebus.profile import Profile, native_of
 
@@ -40,6 +41,8 @@ _LINE = "line"
 """What the link to a simulator's pseudo-terminal is called, in a folder of its own."""
 
 _T = TypeVar("_T")
+
+_UNPLUG = Advice("unplug", None, "; line.unplug() pulls out any port")
 
 
 class SimulatedDrive:
@@ -428,7 +431,7 @@ def check_faults(faults: Mapping[str, float], transport: str) -> dict[str, float
         checks.one_of("fault", kind, ("all", *FAULT_KINDS))
         rates[kind] = checks.number(f"rate of {kind}", rate, 0.0, 1.0)
     if rates.get("unplug") and transport != "process":
-        raise BadArgument('"unplug" by rate needs transport "process"; line.unplug() pulls out any port')
+        raise BadArgument(Text('"unplug" by rate needs transport "process"', _UNPLUG))
     return rates
 
 

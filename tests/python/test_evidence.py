@@ -22,7 +22,7 @@ from drivebus import Bus, Drive, NotAllowed, Simulator, State
 GD350, GD600, GD3000, VFD500 = 1, 2, 3, 4
 UNITS = {GD350: "gd350", GD600: "gd600", GD3000: "gd3000", VFD500: "vfd500"}
 PROFILES = Path(__file__).parents[2] / "crates/drives/profiles"
-HOW = r"unverified=True \(`--unverified`\)"
+HOW = r"unverified=True"
 
 
 @pytest.fixture

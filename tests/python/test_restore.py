@@ -94,7 +94,7 @@ def test_what_was_changed_by_hand_and_is_not_verified_needs_to_be_asked_for(
         [item] = report.having("blocked")
         assert (item.code, report.ok) == ("P00.14", False)
         assert "not what the drive told" in item.reason
-        assert "`--unverified`" in item.reason
+        assert "unverified=True" in item.reason
     assert stored(virtual) == []
     assert [item.code for item in drive.restore(path, unverified=True).having("restored")] == ["P00.14"]
     assert stored(virtual) == [0x000E]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, WrongDrive
 from drivebus.operations.unit import Unit
 
@@ -152,8 +153,11 @@ async def diff(
         others = [] if force else kept.origin.other(await taking.origin_of(unit))
         if others:
             raise WrongDrive(
-                f"the backup is not of the drive at unit {unit.address}: {'; '.join(others)}. To compare them all the "
-                "same, say force=True (`--force`)",
+                Text(
+                    f"the backup is not of the drive at unit {unit.address}: {'; '.join(others)}. To compare them all "
+                    "the same, say ",
+                    argument("force", True),
+                ),
                 unit=unit.address,
             )
         left = Side(os.fspath(backup) if isinstance(backup, (str, os.PathLike)) else "backup", kept.raw, kept.unread)
@@ -188,8 +192,11 @@ def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
         return kept
     if not force:
         raise WrongDrive(
-            f"the backup is of a {kept.origin.family}, and unit {unit.address} is a {unit.profile.family}: a code may "
-            "mean another thing there; nothing was sent. If that is right, say force=True (`--force`)",
+            Text(
+                f"the backup is of a {kept.origin.family}, and unit {unit.address} is a {unit.profile.family}: a code "
+                "may mean another thing there; nothing was sent. If that is right, say ",
+                argument("force", True),
+            ),
             unit=unit.address,
         )
     return kept.translated(unit.profile)

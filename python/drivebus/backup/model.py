@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.backup import disk, parse, text
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
@@ -220,4 +221,4 @@ def _shipped(family: str) -> Profile:
     try:
         return Profile.builtin(family)
     except NotAllowed as error:
-        raise BadArgument(f"{error}; for a profile of your own give profile=… (`--profile`)") from None
+        raise BadArgument(Text(error.text, "; for a profile of your own give ", argument("profile"))) from None

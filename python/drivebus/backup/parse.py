@@ -114,7 +114,7 @@ class _File:
         if profile is not None and read_with not in (None, profile.name):
             lines.append(
                 f'it was read with the profile "{read_with}", and checked against "{profile.name}"; to use it '
-                "as it is, give the profile that it was read with (`--profile`)"
+                "as it is, give the profile that it was read with"
             )
         count = "one line is" if len(self.wrong) == 1 else f"{len(self.wrong)} lines are"
         return BadArgument("\n".join([f"{self.path} cannot be used, {count} wrong; nothing was sent:", *lines]))

@@ -10,6 +10,7 @@ import functools
 from collections.abc import Collection, Sequence
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.backup.compare import amount
 from drivebus.backup.model import Backup
 from drivebus.backup.order import Order, Step
@@ -127,8 +128,11 @@ class Restore:
         others = self._backup.origin.other(await origin_of(self._unit))
         if others and not force:
             raise WrongDrive(
-                f"the backup is not of the drive at unit {self._unit.address}: {'; '.join(others)}; nothing was "
-                "written. If that is right, say force=True (`--force`)",
+                Text(
+                    f"the backup is not of the drive at unit {self._unit.address}: {'; '.join(others)}; nothing was "
+                    "written. If that is right, say ",
+                    argument("force", True),
+                ),
                 unit=self._unit.address,
             )
 
@@ -152,7 +156,7 @@ class Restore:
         try:
             place(self._unit, code, store=not self._to_ram(code))
         except NotAllowed as error:
-            self._results[code] = ("blocked", str(error))
+            self._results[code] = ("blocked", error.text)
         else:
             if unproved is not None:
                 self._results[code] = ("blocked", _unproved(unproved))
@@ -213,11 +217,11 @@ class Restore:
             by = order.hindrance(code, float(self._backup[code]))
             limit = "another parameter" if by is None else f"{by}, which the drive has at {self._shown(by)}"
             other, why = self._results.get(by or "", ("", ""))
-            cause = f"; that was refused: {why}" if other == "refused" else _by_way_of(passing.get(code, ()))
-            self._results[code] = ("blocked", f"it would be beyond {limit}{cause}")
+            cause = Text("; that was refused: ", why) if other == "refused" else _by_way_of(passing.get(code, ()))
+            self._results[code] = ("blocked", Text(f"it would be beyond {limit}", cause))
         for code, (result, reason) in self._results.items():
             if result in ("refused", "blocked") and self._has[code] != self._had[code]:
-                self._results[code] = (result, f"{reason}; on the way there it was given {self._shown(code)}")
+                self._results[code] = (result, Text(reason, f"; on the way there it was given {self._shown(code)}"))
 
     async def _take(self, step: Step, order: Order) -> None:
         """Does one step, and says to *order* what came of it."""
@@ -342,17 +346,20 @@ def _meaning(error: Refused) -> str:
     return f"exception {error.code:02X}H, {error.name}: {error.meaning}" if error.meaning else str(error)
 
 
-def _by_way_of(codes: Sequence[str]) -> str:
+def _by_way_of(codes: Sequence[str]) -> Text:
     if not codes:
-        return ""
-    return (
+        return Text()
+    return Text(
         f"; what the drive has is beyond its own limits, and only another value of {' and '.join(codes)} leads there, "
-        "on the way. Its family has no known write to RAM alone: twice=True (`--twice`) writes the memory twice"
+        "on the way. Its family has no known write to RAM alone: ",
+        argument("twice", True),
+        " writes the memory twice",
     )
 
 
-def _unproved(reason: str) -> str:
-    return (
-        f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With unverified=True "
-        "(`--unverified`) it is written nevertheless"
+def _unproved(reason: str) -> Text:
+    return Text(
+        f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With ",
+        argument("unverified", True),
+        " it is written nevertheless",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.backup.unread import Unread
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile
@@ -69,7 +70,9 @@ class Rules:
     def unasked(self, code: str, *, serial: bool, motor: bool, raw: Collection[str] = ()) -> str | None:
         """Why *code* is not given back unless that is asked for; None if it is."""
         if code not in raw and self.is_raw(code):
-            return "what it means is not known; given back only by its name, with raw=[…] (`--raw`)"
+            return Text(
+                "what it means is not known; given back only by its name, with ", argument("raw", written="[…]")
+            )
         if not serial and self.is_serial(code):
             return "a setting of the serial line; given back only where that is asked for"
         if not motor and _among(code, self._motor):

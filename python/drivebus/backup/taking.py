@@ -8,6 +8,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from drivebus._native import __version__
+from drivebus.advice import Text, argument
 from drivebus.backup import disk
 from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
@@ -159,12 +160,14 @@ def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
         told = str(error).splitlines()
         why = "\n".join(told[:_LINES] + ["…"] * (len(told) > _LINES))
         raise NotAllowed(
-            f"{path} is there and would be replaced, but: {why}\nTake another name, or force=True (`--force`)"
+            Text(f"{path} is there and would be replaced, but: {why}\nTake another name, or ", argument("force", True))
         ) from None
     if others:
         raise WrongDrive(
-            f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or "
-            "force=True (`--force`)",
+            Text(
+                f"{path} is the backup of another drive: {'; '.join(others)}; nothing was read. Take another name, or ",
+                argument("force", True),
+            ),
             unit=unit.address,
         )
 
@@ -177,7 +180,12 @@ def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
         before = Backup.load(part, unit.profile)
     except NotAllowed as error:
         raise NotAllowed(
-            f"{error}\nThat is what an interrupted backup left; with resume=False (`--fresh`) it starts again",
+            Text(
+                error.text,
+                "\nThat is what an interrupted backup left; with ",
+                argument("resume", False),
+                " it starts again",
+            ),
             unit=unit.address,
         ) from None
     others = before.origin.other(origin, unit=True)
@@ -185,8 +193,11 @@ def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
         others.append(f"it was read with version {before.origin.profile_version} of the profile")
     if others:
         raise WrongDrive(
-            f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With "
-            "resume=False (`--fresh`) it starts again",
+            Text(
+                f"{part} was begun with another drive: {'; '.join(others)}; nothing was read. With ",
+                argument("resume", False),
+                " it starts again",
+            ),
             unit=unit.address,
         )
     return before

@@ -4,43 +4,59 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["in_commands"]
+from drivebus import DrivebusError
+from drivebus.advice import Advice, Text
 
-_WHOLE = {
-    "stop() it, and wait_until_stopped(), before a jog": "`drivebus stop --wait 30` before a jog",
-    "(bus.stats() may say how)": "(`drivebus doctor` may say how)",
-    "prepare_control() (`drivebus prepare`)": "`drivebus prepare`",
-    ", or for terminals and the special control word their own methods": "",
-    "; line.unplug() pulls out any port": "",
-    "give reserved=True to the bus": "give --reserved",
-    "; or use broadcast()": "",
-    ", or use broadcast()": "",
-    "Write it by a drive without variants=…": "Write it without `--variant`",
+__all__ = ["WORDS", "in_commands"]
+
+WORDS = {
+    # calls
+    "broadcast": "",
+    "coast": "`drivebus coast`",
+    "identify": "`drivebus info`",
+    "jog": "`drivebus jog`",
+    "own_methods": "",
+    "prepare_control": "`drivebus prepare`",
+    "reset_fault": "`drivebus reset`",
+    "run": "`drivebus run`",
+    "search": "`drivebus scan --search`",
+    "stats": "`drivebus doctor`",
+    "stop": "`drivebus stop`",
+    "stop_and_wait": "`drivebus stop --wait 30`",
+    "to_ram": "write without `--store` in a loop",
+    "unplug": "",
+    "write": "`drivebus write`",
+    # arguments
+    "force": "`--force`",
+    "max_current": "`--max-current off`",
+    "profile": "`--profile`",
+    "raw": "`--raw`",
+    "replace": "`--force`",
+    "reserved": "give --reserved",
+    "resume": "`--fresh`",
+    "store": "`--store`",
+    "transport": "`--transport {}`",
+    "trust_profile": "`--trust-profile`",
+    "twice": "`--twice`",
+    "unverified": "`--unverified`",
+    "variants": "`--variant {}=…`",
 }
-"""Advice that reads otherwise here as a whole."""
+"""What calls and arguments of Python's are here, `{}` for the value; empty where no command leads there."""
 
-_COMMANDS = {
-    "run()": "run",
-    "stop()": "stop",
-    "coast()": "coast",
-    "jog()": "jog",
-    "write()": "write",
-    "read()": "read",
-    "reset_fault()": "reset",
-}
-"""What a call of Python's is as a command."""
+_WITH_VALUE = {"profile": "`--profile {}`"}
+"""The same, where a value is meant."""
 
-# `force=True (`--force`)`, `variants={…} for bus.drive() (`--variant …`; Hz, rpm)`: both languages at once.
-_BOTH = re.compile(r"\w+=(?:\{[^}]*\}|True|…)(?: (?:for|to) bus\.drive\(\))? \(`(--[^`]+)`(?:; ([^)]*))?\)")
 # A name that nothing is near to.
 _NAMELESS = re.compile(r"\S+ has no \"[^\"]*\"$")
-_CALL = re.compile("|".join(re.escape(call) for call in _COMMANDS))
 
 
-def in_commands(text: str) -> str:
-    """*text* with commands and options where it names calls and arguments of Python's."""
-    for python, here in _WHOLE.items():
-        text = text.replace(python, here)
-    text = _NAMELESS.sub(lambda said: f"{said[0]}; `drivebus list` shows what it has", text)
-    text = _BOTH.sub(lambda both: f"`{both[1]}`" + (f" ({both[2]})" if both[2] else ""), text)
-    return _CALL.sub(lambda call: f"`drivebus {_COMMANDS[call[0]]}`", text)
+def in_commands(said: str | DrivebusError) -> str:
+    """What *said* says, with commands and options where it names calls and arguments of Python's."""
+    text = said.text if isinstance(said, DrivebusError) else Text(said)
+    told = "".join(part if isinstance(part, str) else _here(part) for part in text.parts)
+    return _NAMELESS.sub(lambda nameless: f"{nameless[0]}; `drivebus list` shows what it has", told)
+
+
+def _here(advice: Advice) -> str:
+    words = WORDS[advice.name] if advice.value is None else _WITH_VALUE.get(advice.name, WORDS[advice.name])
+    return words.format(advice.value)

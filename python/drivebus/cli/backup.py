@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import drivebus
 from drivebus.backup.unread import Unread, counts, in_words
+from drivebus.cli.advice import in_commands
 from drivebus.cli.names import complete_group
 from drivebus.cli.output import counted, remark, show
 from drivebus.cli.session import Session, pass_session, yes_option
@@ -210,7 +211,13 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
         session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.{rest}{hint}")
         if len(found):
             rows = [
-                [each.code, *_texts(profile, each.code, each.left, each.right), each.unit, each.label, each.reason]
+                [
+                    each.code,
+                    *_texts(profile, each.code, each.left, each.right),
+                    each.unit,
+                    each.label,
+                    in_commands(each.reason),
+                ]
                 for each in found
             ]
             session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
@@ -285,7 +292,7 @@ def _show_report(session: Session, profile: drivebus.Profile, report: drivebus.R
                 item.unit,
                 item.result,
                 item.label,
-                item.reason,
+                in_commands(item.reason),
             ]
             for item in told
         ]

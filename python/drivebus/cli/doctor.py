@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from rich.status import Status
 
 import drivebus
+from drivebus.cli.advice import in_commands
 from drivebus.cli.output import Output, counted, show
 from drivebus.cli.session import EXIT_CODES, Session, parse_format, pass_session
 from drivebus.cli.types import Seconds, Whole
@@ -103,14 +104,14 @@ def doctor(
 def _show(out: Output, finding: drivebus.doctor.Finding, port: str) -> None:
     # What it says to type is for this port, unless the environment has it.
     here = "`drivebus " if os.environ.get("DRIVEBUS_PORT") == port else f"`drivebus --port {shlex.quote(port)} "
-    advice = finding.advice.replace("`drivebus ", here)
+    text, advice = (in_commands(said).replace("`drivebus ", here) for said in (finding.text, finding.advice))
     if out.as_json:
         fields: dict[str, Any] = {
             "step": finding.step,
             "name": finding.name,
             "severity": finding.severity,
             "unit": finding.unit,
-            "text": finding.text,
+            "text": text,
             "advice": advice,
             "values": finding.values,
             "exit_code": _exit_code(finding),
@@ -118,7 +119,7 @@ def _show(out: Output, finding: drivebus.doctor.Finding, port: str) -> None:
         out.record(fields)
         return
     style = _STYLES[finding.severity.value]
-    out.say(f"{_SIGNS[finding.severity.value]:<8} {finding.text}", style, hanging=9)
+    out.say(f"{_SIGNS[finding.severity.value]:<8} {text}", style, hanging=9)
     if advice:
         out.say(f"{'':<8} -> {advice}", hanging=3)
 

@@ -10,6 +10,7 @@ import click
 import drivebus
 from drivebus import places
 from drivebus.cli import names
+from drivebus.cli.advice import in_commands
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import counted
 from drivebus.cli.session import Session, pass_session
@@ -186,7 +187,7 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
         try:
             present, reason = drive.fault(), None
         except drivebus.NotAllowed as error:
-            present, reason = None, str(error)
+            present, reason = None, in_commands(error)
     if out.as_json:
         if reason is not None:
             out.record({"when": "now", "missing": reason})

@@ -12,6 +12,7 @@ import click
 import drivebus
 from drivebus import State
 from drivebus.cli import names
+from drivebus.cli.advice import in_commands
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import remark
 from drivebus.cli.session import Session, force_option, pass_session, within_option, yes_option
@@ -233,7 +234,7 @@ def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, A
             del missing[0]
     except drivebus.DrivebusError as error:
         lost = ", ".join(described[name].code or name for name in missing)
-        _say_lost(f"{lost}: written, but could not be read back: {error}")
+        _say_lost(f"{lost}: written, but could not be read back: {in_commands(error)}")
     return now
 
 
@@ -291,7 +292,7 @@ def _done(session: Session, drive: drivebus.Drive, command: str, towards: State 
         status = drive.status()
     except drivebus.DrivebusError as error:
         whose = "" if session.crew else f"{session.called}: "
-        _say_lost(f"{whose}{command} was done, but the state afterwards could not be read: {error}")
+        _say_lost(f"{whose}{command} was done, but the state afterwards could not be read: {in_commands(error)}")
     if session.out.as_json:
         told = ("state", "frequency", "setpoint", "fault")
         session.out.record(

@@ -10,6 +10,7 @@ from rich.progress import Progress
 
 import drivebus
 from drivebus.cli import names, rules, searching
+from drivebus.cli.advice import in_commands
 from drivebus.cli.crew import each_drive
 from drivebus.cli.output import Output, counted, remark
 from drivebus.cli.session import Session, exit_code, pass_session, tell
@@ -144,7 +145,8 @@ def info(session: Session) -> None:
             raise
         control = drive.check_control()
         profile = drive.profile
-        against = drive.contradiction()
+        contradiction = drive.contradiction()
+        against = None if contradiction is None else in_commands(contradiction)
         out.facts(
             {
                 "unit": drive.unit,
@@ -284,7 +286,7 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
                     row["bits"] = bits
             except drivebus.DrivebusError as error:
                 failed.append((row["name"], error))
-                row |= {"error": str(error), "exit_code": exit_code(error)}
+                row |= {"error": in_commands(error), "exit_code": exit_code(error)}
             rows.append(row)
     _show_read(session.out, rows)
     for name, reason in failed:

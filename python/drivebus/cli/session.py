@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 import drivebus
+from drivebus.advice import Text
 from drivebus.cli.advice import in_commands
 from drivebus.cli.held import gives_way_when_held
 from drivebus.cli.output import Output, remark
@@ -455,5 +456,5 @@ def tell_wills(bus: drivebus.Bus) -> None:
 def tell(error: drivebus.DrivebusError, about: str = "") -> None:
     """Says *error* on standard error; *about* is what it is the error of, where it was one of several."""
     # Notes say what was done before; Python 3.10 has none.
-    for line in (f"Error: {about + ': ' if about else ''}{error}", *getattr(error, "__notes__", ())):
+    for line in (Text(f"Error: {about + ': ' if about else ''}", error.text), *getattr(error, "__notes__", ())):
         remark(in_commands(line))

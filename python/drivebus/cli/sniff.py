@@ -13,6 +13,7 @@ from rich.live import Live
 
 import drivebus
 from drivebus.capture import Captured
+from drivebus.cli.advice import in_commands
 from drivebus.cli.exchanges import Filter, Lines
 from drivebus.cli.kept import Kept
 from drivebus.cli.names import parse_families
@@ -166,13 +167,12 @@ def _told(session: Session, figures: Figures, target: str | None, kept: Kept | N
     """Says what was heard, and what it means."""
     asked = sum(unit.requests for unit in figures.units.values())
     answered = sum(unit.answers for unit in figures.units.values())
+    hints = [in_commands(hint) for hint in figures.hints()]
     if session.out.as_json:
-        session.out.record(
-            {"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": list(figures.hints())}
-        )
+        session.out.record({"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": hints})
     else:
         remark(f"{counted(asked, 'request')} to {counted(len(figures.units), 'unit')}, {answered} answered.")
-        for hint in figures.hints():
+        for hint in hints:
             remark(f"- {hint}")
     if not figures.exchanges:
         remark(

@@ -11,6 +11,7 @@ from rich.text import Text
 
 import drivebus
 from drivebus import places
+from drivebus.cli.advice import in_commands
 from drivebus.cli.output import printable
 from drivebus.line import huanyang
 from drivebus.sniffer import Exchange, Families, Figures
@@ -62,7 +63,7 @@ class SniffTable:
         yield from notes
 
     def _notes(self) -> list[str]:
-        return [*self._figures.hints(), *self._wrong][-_LAST:]
+        return [*map(in_commands, self._figures.hints()), *self._wrong][-_LAST:]
 
     def _units(self) -> Table:
         table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 2, 0, 0))

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivebus.advice import Text, argument
 from drivebus.backup import disk
 from drivebus.backup.model import Origin
 from drivebus.backup.unread import WHY, Unread
@@ -96,8 +97,11 @@ class Kept:
             }
         except (ValueError, TypeError, KeyError, AttributeError):
             raise BadArgument(
-                f"{path} is not what an interrupted discovery left; nothing was asked. Give another name, or "
-                "resume=False (`--fresh`) replaces it"
+                Text(
+                    f"{path} is not what an interrupted discovery left; nothing was asked. Give another name, or ",
+                    argument("resume", False),
+                    " replaces it",
+                )
             ) from None
         return cls(path, whose, taken, groups, requests)
 
@@ -128,8 +132,11 @@ class Kept:
                 f"{name} {left.whose.get(name)}" for name in self.whose if left.whose.get(name) != self.whose[name]
             )
             raise WrongDrive(
-                f"{self.path} was begun with another drive ({other}); nothing was asked. Give another name, or "
-                "resume=False (`--fresh`) starts again"
+                Text(
+                    f"{self.path} was begun with another drive ({other}); nothing was asked. Give another name, or ",
+                    argument("resume", False),
+                    " starts again",
+                )
             )
         self.taken, self.requests, self.groups = left.taken, left.requests, left.groups
 

@@ -110,7 +110,7 @@ class DriveExamination:
         try:
             fault = self.drive.fault()
         except NotAllowed as error:
-            return Finding("unit", "fault", Severity.NOTE, str(error), unit=self.drive.unit)
+            return Finding("unit", "fault", Severity.NOTE, error.text, unit=self.drive.unit)
         if fault is None:
             return None
         watchdog = self.drive.profile.watchdog

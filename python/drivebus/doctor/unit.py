@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from drivebus.advice import Text
 from drivebus.bus import Bus
 from drivebus.doctor.drive import DriveExamination
 from drivebus.doctor.echoes import Echoes
@@ -48,13 +49,13 @@ class UnitExamination:
         try:
             yield from self._drive(echoes.turnarounds)
         except NotAllowed as error:
-            yield Finding("unit", "family", Severity.NOTE, str(error), unit=unit)
+            yield Finding("unit", "family", Severity.NOTE, error.text, unit=unit)
         except DrivebusError as error:
             yield Finding(
                 "unit",
                 "settings",
                 Severity.WARNING,
-                f"its settings could not be read: {error}",
+                Text("its settings could not be read: ", error.text),
                 unit=unit,
                 error=type(error),
             )

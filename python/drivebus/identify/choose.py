@@ -8,8 +8,9 @@ import warnings
 from collections.abc import Mapping
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, SharedCodeWarning, WrongDrive, level_of_the_program
-from drivebus.identify.families import one_of, shipped
+from drivebus.identify.families import drive_as, one_of, shipped
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Identification
 from drivebus.line.protocols import AwaitableBus
@@ -61,9 +62,13 @@ def _sure_enough(found: Identification, unverified: bool) -> Profile:
         raise _not_sure(found)
     if found.certainty == "shared":
         warnings.warn(
-            f"unit {found.unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If it is "
-            f'one, say so: bus.drive({found.unit}, profile="{name}") (`--profile {name}`)',
-            SharedCodeWarning,
+            SharedCodeWarning(
+                Text(
+                    f"unit {found.unit} is taken for a {name}, the only one of them with a profile: {found.reason}. If "
+                    "it is one, say so: ",
+                    drive_as(found.unit, name),
+                )
+            ),
             stacklevel=level_of_the_program(),
         )
     return Profile.builtin(name)
@@ -78,13 +83,16 @@ def _not_sure(found: Identification) -> NotAllowed:
         what = f"it may be {one_of(found.candidates)}; "
     else:
         what = ""
-    with_one = (
-        ", or unverified=True (`--unverified`) to take it for that" if len(found.candidates) == len(known) == 1 else ""
-    )
+    is_one = len(found.candidates) == len(known) == 1
+    with_one = Text(", or ", argument("unverified", True), " to take it for that") if is_one else ""
     like = known[0] if len(known) == 1 else f"one of {', '.join(known or profiles())}"
     return WrongDrive(
-        f"unit {found.unit} answers, but could not be identified for sure: {what}{found.reason} ({found.certainty}). "
-        f"Registers and command codes differ between families; if you know that it behaves like {like}, "
-        f"give profile=… (`--profile`){with_one}",
+        Text(
+            f"unit {found.unit} answers, but could not be identified for sure: {what}{found.reason} "
+            f"({found.certainty}). Registers and command codes differ between families; if you know that it behaves "
+            f"like {like}, give ",
+            argument("profile"),
+            with_one,
+        ),
         unit=found.unit,
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from drivebus import places
+from drivebus.advice import Advice, Text, argument
 from drivebus.identify import codes
 from drivebus.identify.answers import NO_FUNCTION, Answer, no_such_address
 from drivebus.identify.families import asked_as, one_of, shipped
@@ -52,13 +53,16 @@ def other_signature(profile: Profile, unit: int, shown: Iterable[str]) -> str | 
         return None
     titles = [f"{Profile.builtin(name).title} ({name})" for name in names]
     then = asked_as(unit, names)
-    return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: {then}")
+    return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: ", then)
 
 
-def _told(profile: Profile, unit: int, against: str) -> str:
-    return (
-        f"unit {unit} was named {profile.name} ({profile.title}), and {against}; or say trust_profile=True "
-        "(`--trust-profile`) if it is meant"
+def _told(profile: Profile, unit: int, *against: str) -> Text:
+    return Text(
+        f"unit {unit} was named {profile.name} ({profile.title}), and ",
+        *against,
+        "; or say ",
+        argument("trust_profile", True),
+        " if it is meant",
     )
 
 
@@ -95,10 +99,11 @@ def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
     titles = [f"{row['title']} ({row['family']})" for row in rows]
     also = [name for name in families if name not in [row["family"] for row in rows]]
     known = shipped(families)
-    then = f"ask for it as that: {asked_as(unit, known)}" if known else "there is no profile of it yet"
+    then = Text("ask for it as that: ", asked_as(unit, known)) if known else "there is no profile of it yet"
     if profile.name not in profiles():
-        then += f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
-    return f"it reports {answer.word:04X}H, the code of {one_of([*titles, *also])}: {then}"
+        more = f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
+        then = Text(then, more)
+    return Text(f"it reports {answer.word:04X}H, the code of {one_of([*titles, *also])}: ", then)
 
 
 def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
@@ -110,9 +115,11 @@ def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
     if not no_function and not no_such_address(profile, answer.exception):
         return None
     what = "function" if no_function else "address"
-    return (
+    return Text(
         f"it refuses {places.shown(answer.address)} (exception {answer.exception:02X}H: there is no such {what}), "
-        f"which each of those answers: see what it is (bus.identify({unit}), `drivebus info`) and name that"
+        "which each of those answers: see what it is (",
+        Advice("identify", unit, f"bus.identify({unit})"),
+        ") and name that",
     )
 
 

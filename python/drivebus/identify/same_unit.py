@@ -16,6 +16,7 @@ import functools
 from collections.abc import Sequence
 
 from drivebus import places
+from drivebus.advice import Text
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, WrongDrive
 from drivebus.identify import codes
 from drivebus.identify.answers import Answer, answer_once, passes, tells_nothing
@@ -157,7 +158,7 @@ class SameUnit:
         known.spoke = any(answer.word is not None for answer in answers) or not _may_be_shown(self._profile)
         known.is_sure = against is None and known.known is not None and self._is_told(answers)
         if against is not None and judged:
-            raise WrongDrive(f"{against}; nothing was written to it", unit=self._unit)
+            raise WrongDrive(Text(against, "; nothing was written to it"), unit=self._unit)
 
     def _compare(self, answers: Sequence[Answer], failure: NoAnswer | BadAnswer | PortError | None, known: str) -> None:
         """Raises where the unit does not say what is *known* of it any more."""

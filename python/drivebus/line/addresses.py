@@ -7,9 +7,12 @@ broadcast. On a serial line 0 is the broadcast, and 248 to 254 are what some uni
 from __future__ import annotations
 
 from drivebus import checks
+from drivebus.advice import Advice, Text
 from drivebus.errors import BadArgument
 
 __all__ = ["EVERYBODY", "Addresses"]
+
+_RESERVED = Advice("reserved", True, "give reserved=True to the bus")
 
 _HIGHEST = 255
 """The highest address that a frame can carry."""
@@ -43,13 +46,17 @@ class Addresses:
         why = self.why_not(value)
         if why and value:
             allowed = f"{checks.UNITS[0]} to {checks.UNITS[-1]}"
-            raise BadArgument(f"unit {value} is out of range; allowed is {allowed}; {why}")
+            raise BadArgument(Text(f"unit {value} is out of range; allowed is {allowed}; ", why))
         if why:
             return checks.unit(value)
         if value == 0 and changes and not self._reserved:
             raise BadArgument(
-                "unit 0 over tcp:// may be a device by itself, and a gateway hands on what is written to it to every "
-                "unit behind it: if it is a device, give reserved=True to the bus; or use broadcast()"
+                Text(
+                    "unit 0 over tcp:// may be a device by itself, and a gateway hands on what is written to it to "
+                    "every unit behind it: if it is a device, ",
+                    _RESERVED,
+                    Advice("broadcast", None, "; or use broadcast()"),
+                )
             )
         return int(value)
 
@@ -65,7 +72,7 @@ class Addresses:
             return f"{_HIGHEST} is a gateway itself, over tcp:// only"
         if self._reserved:
             return ""
-        return "the specification reserves it: give reserved=True to the bus if a unit has it all the same"
+        return Text("the specification reserves it: ", _RESERVED, " if a unit has it all the same")
 
 
 EVERYBODY = Addresses(tcp=True, reserved=True)

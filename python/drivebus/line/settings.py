@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypedDict
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument
 from drivebus.line import ports
 from drivebus.line.addresses import Addresses
@@ -93,7 +94,7 @@ class Opening:
 def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
-        raise BadArgument("trust_profile needs a profile: give profile=… (`--profile`) too")
+        raise BadArgument(Text("trust_profile needs a profile: give ", argument("profile"), " too"))
 
 
 def _wire_file(path: object, port: str, line: SerialFormat) -> WireFile:

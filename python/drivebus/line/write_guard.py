@@ -10,12 +10,13 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 
 from drivebus import places
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
 
 __all__ = ["check_words", "code_text", "prepare_guard"]
 
-_HINT = "nothing was sent; if it is meant, say force=True (`--force`)"
+_HINT = Text("nothing was sent; if it is meant, say ", argument("force", True))
 
 
 def code_text(code: int) -> str:
@@ -39,8 +40,11 @@ def check_words(families: Iterable[Profile], unit: int, address: int, words: int
 def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: int, word: int) -> NotAllowed:
     codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return BadArgument(
-        f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
-        f"{family.title}: its codes are {codes or 'not known'}; {_HINT}",
+        Text(
+            f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
+            f"{family.title}: its codes are {codes or 'not known'}; ",
+            _HINT,
+        ),
         unit=unit,
     )
 
@@ -55,8 +59,11 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
     own = families[0].command_address
     where = "is not known" if own is None else f"is {places.shown(own)}"
     raise BadArgument(
-        f"{places.shown(address)} is the command register of {others}; unit {unit} is known as {families[0].title}, "
-        f"whose command register {where}; {_HINT}",
+        Text(
+            f"{places.shown(address)} is the command register of {others}; unit {unit} is known as "
+            f"{families[0].title}, whose command register {where}; ",
+            _HINT,
+        ),
         unit=unit,
     )
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
+from drivebus.advice import Text, argument
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, WrongDrive
 from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
@@ -173,26 +174,36 @@ def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllo
     named = f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title})"
     if not others:
         return WrongDrive(
-            f"{named}, and what it answers fits neither that nor another family that can be halted over the bus: "
-            f"{command} was not sent, for it may start a drive of another family. If it is meant, say "
-            "trust_profile=True (`--trust-profile`). If a motor must stop now, use the emergency stop",
+            Text(
+                f"{named}, and what it answers fits neither that nor another family that can be halted over the bus: "
+                f"{command} was not sent, for it may start a drive of another family. If it is meant, say ",
+                argument("trust_profile", True),
+                ". If a motor must stop now, use the emergency stop",
+            ),
             unit=unit.address,
         )
-    then = one_of(f'profile="{profile.name}" (`--profile {profile.name}`)' for profile in others)
     return WrongDrive(
-        f"{named}, and by what it answers it may be {_titles(others)}, which want different words: {command} was not "
-        f"sent, for it may start the motor. If you know which it is, say {then}. If it must stop now, use the "
-        "emergency stop",
+        Text(
+            f"{named}, and by what it answers it may be {_titles(others)}, which want different words: {command} was "
+            "not sent, for it may start the motor. If you know which it is, say ",
+            one_of(argument("profile", profile.name) for profile in others),
+            ". If it must stop now, use the emergency stop",
+        ),
         unit=unit.address,
     )
 
 
 def _another(unit: Unit, others: tuple[Profile, ...]) -> NotAllowed:
-    then = asked_as(unit.address, (profile.name for profile in others)) if others else ""
+    then = Text(": ask for it as that: ", asked_as(unit.address, (each.name for each in others))) if others else ""
     return WrongDrive(
-        f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title}), and by what it answers and refuses "
-        f"it may be {_titles(others)}{f': ask for it as that: {then}' if then else ''}; or say trust_profile=True "
-        "(`--trust-profile`) if it is meant; nothing was written to it",
+        Text(
+            f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title}), and by what it answers and "
+            f"refuses it may be {_titles(others)}",
+            then,
+            "; or say ",
+            argument("trust_profile", True),
+            " if it is meant; nothing was written to it",
+        ),
         unit=unit.address,
     )
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from drivebus import checks
+from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameters, registers, sending
 from drivebus.operations.unit import Unit
@@ -68,10 +69,15 @@ async def prepare_control(
             continue
         if item.actual is not None and row["by_hand"]:
             raise NotReady(
-                f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
-                f"({item.label}). prepare_control() (`drivebus prepare`) does not set it: {item.note} "
-                f"Nothing was written. If {int(item.wanted)} is meant, write() {item.code} first, "
-                "with store=True (`--store`)",
+                Text(
+                    f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
+                    f"({item.label}). ",
+                    call("prepare_control"),
+                    f" does not set it: {item.note} Nothing was written. If {int(item.wanted)} is meant, ",
+                    call("write"),
+                    f" {item.code} first, with ",
+                    argument("store", True),
+                ),
                 why="settings",
                 unit=unit.address,
             )
@@ -95,9 +101,14 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
     control = await _check_items(unit, unit.profile.needs(setpoint))
     if not control:
         raise NotReady(
-            f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
-            f'sent. prepare_control(setpoint="{setpoint}") sets it so; write("{register}", …) writes it '
-            "all the same",
+            Text(
+                f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
+                "sent. ",
+                Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
+                " sets it so; ",
+                Advice("write", register, f'write("{register}", …)'),
+                " writes it all the same",
+            ),
             why="settings",
             unit=unit.address,
         )
@@ -112,8 +123,11 @@ async def check_set(unit: Unit, wanted: list[dict[str, Any]], what: str) -> None
     wrong = Control(item for item in await _check_items(unit, sure) if item.actual is not None and not item.ok)
     if len(wrong):
         raise NotReady(
-            f"unit {unit.address} {what}:\n{wrong}\nNothing that moves it was sent. prepare_control() (`drivebus "
-            "prepare`) sets what is needed",
+            Text(
+                f"unit {unit.address} {what}:\n{wrong}\nNothing that moves it was sent. ",
+                call("prepare_control"),
+                " sets what is needed",
+            ),
             why="settings",
             unit=unit.address,
         )

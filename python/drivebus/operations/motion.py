@@ -8,6 +8,7 @@ caller is told so.
 from __future__ import annotations
 
 from drivebus import checks
+from drivebus.advice import Advice, Text, call
 from drivebus.errors import BadArgument, NotReady, Unconfirmed
 from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
@@ -98,8 +99,11 @@ async def jog(
     before = await start_checks.ready_to_start(unit)
     if before.state.running:
         raise NotReady(
-            f"unit {unit.address} turns already ({before.state}); nothing that moves it was sent. stop() it, and "
-            "wait_until_stopped(), before a jog",
+            Text(
+                f"unit {unit.address} turns already ({before.state}); nothing that moves it was sent. ",
+                Advice("stop_and_wait", None, "stop() it, and wait_until_stopped(),"),
+                " before a jog",
+            ),
             why="turning",
             unit=unit.address,
         )
@@ -152,9 +156,14 @@ async def jog_stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, 
     unit = unit.trusting(unverified)
     if "jog_stop" not in unit.profile.commands():
         jogs = "jog_forward" in unit.profile.commands()
-        ends = ": stop() ends it along the ramp, coast() takes the voltage off" if jogs else ", nor one to jog"
+        halts = Text(": ", call("stop"), " ends it along the ramp, ", call("coast"), " takes the voltage off")
+        ends = halts if jogs else ", nor one to jog"
         raise BadArgument(
-            f"{unit.profile.title} has no command that ends a jog alone{ends}; nothing was sent to unit {unit.address}",
+            Text(
+                f"{unit.profile.title} has no command that ends a jog alone",
+                ends,
+                f"; nothing was sent to unit {unit.address}",
+            ),
             unit=unit.address,
         )
     await _halt(unit, "jog_stop", confirm, within)

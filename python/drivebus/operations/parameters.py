@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple, overload
 
 from drivebus import checks
+from drivebus.advice import Advice, Text, argument, call, joined
 from drivebus.errors import BadArgument, DrivebusError, NotReady
 from drivebus.operations import registers, sending, state, variants
 from drivebus.operations.sending import Planned
@@ -163,8 +164,11 @@ def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
         chosen = unit.profile.variants_chosen.get(variant)
         if chosen is not None and unit.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
             raise BadArgument(
-                f"{name} = {checks.shown(wanted[name])} would change the {variant} of unit {unit.address}, which was "
-                f"said to be {chosen}; nothing was sent. Write it by a drive without variants=…",
+                Text(
+                    f"{name} = {checks.shown(wanted[name])} would change the {variant} of unit {unit.address}, which "
+                    f"was said to be {chosen}; nothing was sent. Write it without ",
+                    Advice("variants", variant, "variants=…"),
+                ),
                 unit=unit.address,
             )
 
@@ -176,15 +180,22 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
         raise BadArgument(f"{name} ({known.label}) is read-only; nothing was sent", unit=unit.address)
     if known.place is not None and unit.profile.is_command(known.place):
         raise BadArgument(
-            f"{name} ({known.label}) can move the motor, so write() refuses it; use run(), stop(), coast(), jog() "
-            "or reset_fault(), or for terminals and the special control word their own methods",
+            Text(
+                f"{name} ({known.label}) can move the motor, so write() refuses it; use ",
+                joined(map(call, ("run", "stop", "coast", "jog", "reset_fault")), ", ", " or "),
+                Advice("own_methods", None, ", or for terminals and the special control word their own methods"),
+            ),
             unit=unit.address,
         )
     unit.evidence.writes(name)
     if known.kind == "parameter" and not store and unit.profile.memory() is None:
         raise BadArgument(
-            f"no way to write {name} to RAM alone is known of {unit.profile.title}, so every write may wear its "
-            f"EEPROM; nothing was sent to unit {unit.address}. With store=True (`--store`) it is kept there",
+            Text(
+                f"no way to write {name} to RAM alone is known of {unit.profile.title}, so every write may wear its "
+                f"EEPROM; nothing was sent to unit {unit.address}. With ",
+                argument("store", True),
+                " it is kept there",
+            ),
             unit=unit.address,
         )
     raw = unit.profile.encode(name, value)

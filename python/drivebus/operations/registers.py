@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import overload
 
 from drivebus import places
+from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.operations import variants, words
 from drivebus.operations.unit import Unit
@@ -91,8 +92,10 @@ def readable(unit: Unit, *names: str) -> list[str]:
             variant = unit.profile.describe(name).variant or ""
             rule = variants.rules(unit)[variant]
             raise BadArgument(
-                f"what {name} means depends on {rule['parameter']} of unit {unit.address}: give variants=… to "
-                f"bus.drive() (`--variant {variant}=…`; {', '.join(map(repr, rule['choices']))})",
+                Text(
+                    f"what {name} means depends on {rule['parameter']} of unit {unit.address}: give ",
+                    variants.given(unit, variant),
+                ),
                 unit=unit.address,
             )
     return list(names)

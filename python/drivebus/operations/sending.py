@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from drivebus.advice import Advice, Text
 from drivebus.errors import LINE_ERRORS, Refused, StoreWarning, level_of_the_program
 from drivebus.operations import registers, words
 from drivebus.operations.unit import Unit
@@ -109,9 +110,13 @@ def stored(unit: Unit, known: Description) -> None:
     times = unit.record.stores[name]
     if times >= _STORES_BEFORE_WARNING:
         warnings.warn(
-            f"{name} of unit {unit.address} was stored in EEPROM {times} times by this program; "
-            "its write life is limited: write to RAM (store=False) in a loop",
-            StoreWarning,
+            StoreWarning(
+                Text(
+                    f"{name} of unit {unit.address} was stored in EEPROM {times} times by this program; its write life "
+                    "is limited: ",
+                    Advice("to_ram", None, "write to RAM (store=False) in a loop"),
+                )
+            ),
             stacklevel=level_of_the_program(),
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import BadAnswer, BadLink, NoAnswer, NotReady, Refused
 from drivebus.operations import control, start_sequence, state
 from drivebus.operations.state import Seen
@@ -52,9 +53,13 @@ async def prove_link(unit: Unit, force: bool) -> None:
     link = await unit.bus.link(unit.address)
     if lost > _FAILURES_ALLOWED or link.failed > _FAILURES_ALLOWED:
         raise BadLink(
-            f"the link to unit {unit.address} is bad: {link}, and {lost} of {looks} looks at its state failed; "
-            "nothing that moves it was sent, for its stop might be lost as well. Mend the line (bus.stats() may "
-            "say how), or start all the same with force=True (`--force`)",
+            Text(
+                f"the link to unit {unit.address} is bad: {link}, and {lost} of {looks} looks at its state failed; "
+                "nothing that moves it was sent, for its stop might be lost as well. Mend the line (",
+                Advice("stats", None, "bus.stats()"),
+                " may say how), or start all the same with ",
+                argument("force", True),
+            ),
             unit=unit.address,
         )
 
@@ -65,8 +70,11 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
     seen = await state.glance(unit)
     if seen.tripped:
         raise NotReady(
-            f"unit {unit.address} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
-            "Remove the cause, then reset_fault()",
+            Text(
+                f"unit {unit.address} is in fault {seen.fault or '(not named)'}; nothing that moves it was sent. "
+                "Remove the cause, then ",
+                call("reset_fault"),
+            ),
             why="fault",
             unit=unit.address,
         )
@@ -78,8 +86,12 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
         )
     if by_bus and seen.source not in (ControlSource.COMMUNICATION, None):
         raise NotReady(
-            f"unit {unit.address} takes its commands from the {seen.source}, not from the bus; nothing that moves it "
-            "was sent. prepare_control() (`drivebus prepare`) sets it to obey the bus",
+            Text(
+                f"unit {unit.address} takes its commands from the {seen.source}, not from the bus; nothing that moves "
+                "it was sent. ",
+                call("prepare_control"),
+                " sets it to obey the bus",
+            ),
             why="control_source",
             unit=unit.address,
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.operations import commands, state, words
 from drivebus.operations.state import Seen
@@ -81,7 +82,7 @@ class _Step:
                     raise self._failed(f"it was told to stop when {self._called} had been sent")
                 if seen.tripped:
                     trip = f"it is in fault {seen.fault or '(not named)'} since {self._called} was sent"
-                    raise self._failed(f"{trip}. Remove the cause, then reset_fault()")
+                    raise self._failed(Text(f"{trip}. Remove the cause, then ", call("reset_fault")))
                 if seen.word is not None and seen.word & self._step["mask"] == self._step["value"]:
                     return
                 last = self._told(seen)
@@ -109,7 +110,7 @@ class _Step:
 
     def _failed(self, why: str, error: NoAnswer | BadAnswer | PortError | None = None) -> Unconfirmed:
         return Unconfirmed(
-            f"unit {self._unit.address} was not started: {why}. {self._command} was not sent",
+            Text(f"unit {self._unit.address} was not started: ", why, f". {self._command} was not sent"),
             unit=self._unit.address,
             request=b"" if error is None else error.request,
             started=None if error is None else error.started,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from typing import Any
 
+from drivebus.advice import Advice, Text
 from drivebus.errors import NotReady
 from drivebus.operations.unit import Unit
 from drivebus.operations.words import read_words
@@ -40,16 +41,21 @@ async def settled(unit: Unit, *names: str) -> Unit:
     return unit.under(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
 
 
+def given(unit: Unit, variant: str) -> Text:
+    """How *variant* is given, for people."""
+    choices = ", ".join(map(repr, rules(unit)[variant]["choices"]))
+    return Text(Advice("variants", variant, f"variants={{{variant!r}: …}} for bus.drive()"), f" ({choices})")
+
+
 async def _chosen(unit: Unit, variant: str) -> str:
     """What the drive's own parameter says of *variant*."""
     rule = rules(unit)[variant]
     parameter, choices = rule["parameter"], rule["choices"]
-    which = ", ".join(map(repr, choices))
-    given = f"variants={{{variant!r}: …}} for bus.drive() (`--variant {variant}=…`; {which}) says which"
+    says = Text(given(unit, variant), " says which")
     if not unit.evidence.allows(rule["reason"]):
         raise not_verified(
             f"what {parameter} decides in {unit.profile.title}, and so what the word means (its {variant})",
-            f"{rule['reason'].rstrip('.')}; {given}",
+            Text(f"{rule['reason'].rstrip('.')}; ", says),
             unit.address,
         )
     unit.evidence.reads([parameter])
@@ -59,7 +65,9 @@ async def _chosen(unit: Unit, variant: str) -> str:
         if value == raw:
             return str(choice)
     raise NotReady(
-        f"{parameter} of unit {unit.address} is {raw}, which means nothing known; {given}. Nothing was written",
+        Text(
+            f"{parameter} of unit {unit.address} is {raw}, which means nothing known; ", says, ". Nothing was written"
+        ),
         why="settings",
         unit=unit.address,
     )

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, Unverified
 from drivebus.profile.profile import Profile
 
@@ -19,14 +20,20 @@ __all__ = ["Evidence", "not_verified"]
 _T = TypeVar("_T")
 
 _WHY_UNKNOWN = "no document of this family says so"
+_UNVERIFIED = argument("unverified", True)
 _NO_RANGE = "its range is not printed"
 
 
 def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
     """The error for *what* of *unit*, which is not verified for the *reason* that the profile gives."""
     return Unverified(
-        f"{what} is not verified: {_sentence(reason)} Nothing was sent to unit {unit}; with unverified=True "
-        "(`--unverified`) it is done nevertheless",
+        Text(
+            f"{what} is not verified: ",
+            _sentence(reason),
+            f" Nothing was sent to unit {unit}; with ",
+            _UNVERIFIED,
+            " it is done nevertheless",
+        ),
         unit=unit,
     )
 
@@ -144,8 +151,9 @@ class Evidence:
     def missing(self, what: str, reason: str, better: Callable[[Evidence], str | None]) -> NotAllowed:
         """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
         helps = better(self.trusting(True)) is None
-        hint = "; unverified=True (`--unverified`) uses what is assumed" if helps else ""
-        return Unverified(f"{what}: {_sentence(reason)} Nothing was sent to unit {self.unit}{hint}", unit=self.unit)
+        hint = Text("; ", _UNVERIFIED, " uses what is assumed") if helps else ""
+        told = Text(f"{what}: ", _sentence(reason), f" Nothing was sent to unit {self.unit}", hint)
+        return Unverified(told, unit=self.unit)
 
     def allows(self, reason: str | None) -> bool:
         """Whether what has a *reason* not to be used may be used all the same; with None there is no such reason."""
@@ -163,7 +171,7 @@ class Evidence:
         known = self.profile.describe(name)
         return Unverified(
             f"the address of {self._named(name)} is not known: {_sentence(known.reason or known.note)} Nothing was "
-            f"sent to unit {self.unit}; an overlay on the profile can fill it in (`drivebus profiles new`)",
+            f"sent to unit {self.unit}; an overlay on the profile can fill it in",
             unit=self.unit,
         )
 
@@ -173,6 +181,5 @@ def _all_of_it(evidence: Evidence) -> Evidence:
     return Evidence(evidence.profile, evidence.unit, True)
 
 
-def _sentence(reason: str | None) -> str:
-    text = (reason or _WHY_UNKNOWN).strip().rstrip(".")
-    return f"{text}."
+def _sentence(reason: str | None) -> Text:
+    return Text(Text(reason or _WHY_UNKNOWN).rstrip(" \n."), ".")

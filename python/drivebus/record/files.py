@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
+from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.record.table import Row, Table
 
@@ -88,7 +89,7 @@ def sink_for(path: Path, table: Table, replace: bool) -> Sink:
     """
     known = format_of(path)
     if path.exists() and not replace:
-        raise BadArgument(f"{path} is there already; give another name, or replace=True (`--force`)")
+        raise BadArgument(Text(f"{path} is there already; give another name, or ", argument("replace", True)))
     try:
         make: Callable[[Path, Table], Sink] = import_module(f"drivebus.record.{known}").open_new
         if replace:

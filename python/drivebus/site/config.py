@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
+from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.addresses import Addresses
 
@@ -332,7 +333,8 @@ def _unit_of(line: SiteLine | None) -> Callable[[Any], int]:
             return int(value)
         told = f"not a whole number from {checks.UNITS[0]} to {checks.UNITS[-1]}"
         if line is not None and why:
-            told += f"; {why.replace('give reserved=True to the bus', f'say reserved = true in [lines.{line.name}]')}"
+            here = f"say reserved = true in [lines.{line.name}]"
+            told += "; " + "".join(part if isinstance(part, str) else here for part in Text(why).parts)
         raise _Wrong(told)
 
     return read

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from statistics import median
 
+from drivebus.advice import Advice, Text
 from drivebus.checks import counted
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.line import huanyang
@@ -193,9 +194,10 @@ class Figures:
                 "and look for 120 ohm at both ends and nowhere else"
             )
         if self.noise and not asked:
-            yield (
-                f"{counted(self.noise, 'byte')} came and no frame: another baud rate or parity is used there "
-                "(`drivebus scan --search` finds it where you may ask)"
+            yield Text(
+                f"{counted(self.noise, 'byte')} came and no frame: another baud rate or parity is used there (",
+                Advice("search", None, "drivebus.search()"),
+                " finds it where you may ask)",
             )
         elif self.noise > 20 and self._idle * 2 >= self.noise:
             yield (

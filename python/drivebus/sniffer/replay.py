@@ -12,6 +12,7 @@ from types import TracebackType
 
 from drivebus import checks
 from drivebus._native import SerialFormat, frame_len
+from drivebus.advice import Text, argument
 from drivebus.capture.frame import is_frame
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.sniffer.exchange import Exchange
@@ -104,7 +105,7 @@ class Replay:
 
     def _open_pty(self) -> None:
         if not hasattr(os, "openpty"):
-            raise NotAllowed('this system has no pseudo-terminals; say transport="tcp" (`--transport tcp`)')
+            raise NotAllowed(Text("this system has no pseudo-terminals; say ", argument("transport", "tcp")))
         import tty
 
         ours, theirs = os.openpty()

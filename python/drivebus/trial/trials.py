@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from drivebus import checks
+from drivebus.advice import Text, argument
 from drivebus.drive import Drive, check_drive
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.trial.courses import Change, Wave
@@ -238,8 +239,12 @@ def _roles(drive: Drive, max_current: float | None) -> Roles:
     current = _CURRENT if _CURRENT in profile.names() and _may_be_read(drive, _CURRENT) else None
     if current is None and max_current is not None:
         raise BadArgument(
-            f"no register of the output current of {profile.title} may be read, so {max_current:g} A cannot be "
-            f"watched; nothing was sent to unit {drive.unit}. max_current=None (`--max-current off`) goes without",
+            Text(
+                f"no register of the output current of {profile.title} may be read, so {max_current:g} A cannot be "
+                f"watched; nothing was sent to unit {drive.unit}. ",
+                argument("max_current", written="None"),
+                " goes without",
+            ),
             unit=drive.unit,
         )
     in_hz = setpoint is not None and profile.describe(setpoint).unit == "Hz" and _may_be_read(drive, setpoint)

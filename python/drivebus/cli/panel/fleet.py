@@ -93,7 +93,7 @@ class Member:
         if self.problem is None:
             return ""
         naming = f"give `{self.naming}`" + (" in drivebus.toml" if self.session.name else "")
-        return in_commands(str(self.problem)).replace("give `--profile`", naming)
+        return in_commands(self.problem).replace("give `--profile`", naming)
 
     @property
     def naming(self) -> str:
@@ -202,7 +202,7 @@ class Member:
         try:
             status = self.drive.status()
         except drivebus.DrivebusError as error:
-            return f"what it does now could not be read: {error}"
+            return f"what it does now could not be read: {in_commands(error)}"
         self._slowest = status.time, math.inf if status.frequency is None else abs(status.frequency)
         return on_the_way(status, drivebus.State.STOPPED) or str(status)
 

@@ -52,7 +52,7 @@ class Journal:
     def fail(self, what: str, error: drivebus.DrivebusError) -> None:
         """Tells that *what* failed."""
         notes = getattr(error, "__notes__", ())
-        self.say(f"{what}: {'; '.join(in_commands(str(part)) for part in (error, *notes))}", "bold red")
+        self.say(f"{what}: {'; '.join(in_commands(part) for part in (error, *notes))}", "bold red")
 
     def trace(self, error: Exception) -> None:
         """Has the logger alone keep where *error*, which nobody foresaw, came from."""

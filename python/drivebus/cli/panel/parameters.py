@@ -17,6 +17,7 @@ from textual.screen import Screen
 from textual.widgets import DataTable
 
 import drivebus
+from drivebus.cli.advice import in_commands
 from drivebus.cli.names import evidence
 from drivebus.cli.output import printable
 from drivebus.cli.panel.dialogs import Ask, AskFor, Show
@@ -152,10 +153,10 @@ class Parameters(Screen[None]):
             try:
                 shown = row.text(self._drive.read(_key(row)))
             except (drivebus.NotAllowed, drivebus.Refused) as error:
-                shown = f"not read: {error}"
+                shown = f"not read: {in_commands(error)}"
             except drivebus.DrivebusError as error:
                 self._journal.fail(f"{self._member.called}: read {_key(row)}", error)
-                shown = f"not read: {error}"
+                shown = f"not read: {in_commands(error)}"
             self._values[_key(row)] = shown
             app.call_later(self._put, _key(row), turn)
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import click
 
 import drivebus
+from drivebus.advice import Text
 from drivebus.cli import names
 from drivebus.cli.raw.request import Request, request_of
 from drivebus.cli.types import with_a_point
@@ -85,7 +86,7 @@ def located(where: str) -> Iterator[None]:
     except drivebus.NotAllowed as error:
         if not where:
             raise
-        raise drivebus.BadArgument(f"{where}: {error}") from None
+        raise drivebus.BadArgument(Text(f"{where}: ", error.text)) from None
 
 
 def typed_in(lines: Iterable[str], name: str, unit: int, force: bool, addresses: Addresses = SERIAL) -> Iterator[Typed]:

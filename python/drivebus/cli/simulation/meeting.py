@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import drivebus
+from drivebus.cli.advice import in_commands
 from drivebus.line.run_time import run_time_folder
 
 __all__ = ["Order", "ask", "open_to_orders", "running"]
@@ -92,7 +93,7 @@ class _Visit(socketserver.StreamRequestHandler):
         try:
             return self.server.obey(order)
         except drivebus.DrivebusError as error:
-            return {"error": str(error)}
+            return {"error": in_commands(error)}
 
 
 def _line(answer: Order) -> bytes:
