@@ -19,6 +19,7 @@ from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Found, Identification
+from drivebus.line.asking import asking
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.requests import Requests
 from drivebus.line.samples import Names, Reads, Sample
@@ -158,8 +159,7 @@ class Bus(BusFace, Requests):
         return self._scan(scan.units(units, self._opening.known.addresses), limit, scan.protocol_of(protocol))
 
     def _scan(self, units: Sequence[int], timeout: float, protocol: str) -> Iterator[Found]:
-        async def read(unit: int, address: int, table: str = "holding") -> list[int]:
-            return self._native.read(unit, address, 1, timeout=timeout, retries=0, table=table)
+        read = asking(BlockingBus(self), timeout=timeout, retries=0)
 
         async def ask(unit: int, pdu: bytes, reply_length: int) -> bytes:
             return self._native.transact(unit, pdu, reply_length, timeout=timeout, in_doubt=True)
@@ -184,7 +184,7 @@ class Bus(BusFace, Requests):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
-        return at_once(identify(BlockingBus(self).read, self._opening.known.addresses.unit(unit)))
+        return at_once(identify(BlockingBus(self).ask, self._opening.known.addresses.unit(unit)))
 
     def drive(
         self,

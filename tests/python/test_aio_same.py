@@ -70,7 +70,7 @@ STEPS: dict[str, list[Step]] = {
     "values": [lambda _, drive: drive.read("P00.11"), lambda _, drive: drive.read("P00.11", "P00.12", verify=True)],
     "no value": [lambda _, drive: drive.read()],
     "unknown": [lambda _, drive: drive.read("P99.99")],
-    "setpoint": [lambda _, drive: drive.write("set_frequency", 7.0), lambda _, drive: drive.setpoint],
+    "setpoint": [lambda _, drive: drive.write("set_frequency", 7.0), lambda _, drive: drive.read_setpoint()],
     "prepare": [lambda _, drive: drive.check_control(), *_prepared(lambda _, drive: drive.check_control())],
     "parameters": _prepared(lambda _, drive: drive.write({"P00.11": 2.0, "P00.12": 3.0})),
     "stored": _prepared(lambda _, drive: drive.write("P00.11", 2.0, store=True)),

@@ -19,6 +19,7 @@ from drivebus.cli import cli
 from drivebus.doctor.traffic import heard as heard_by
 from drivebus.identify.scan import look_for
 from drivebus.line import huanyang
+from drivebus.line.asking import Read
 from drivebus.sniffer import Exchange, Families
 from drivebus.sniffer.pairing import Pairing
 
@@ -159,10 +160,10 @@ def test_a_frame_is_sure_only_where_modbus_has_none_like_it() -> None:
 def test_a_scan_names_a_unit_that_answers_so() -> None:
     """Whatever it is asked, such a unit answers in its own frames, or not at all."""
 
-    async def read(unit: int, _address: int, **_table: str) -> list[int]:
-        raise BadAnswer("unit 1 answered otherwise", unit=unit, raw=frame("01 03 01 09"))
+    async def ask(read: Read) -> list[int]:
+        raise BadAnswer("unit 1 answered otherwise", unit=read.unit, raw=frame("01 03 01 09"))
 
-    found = asyncio.run(look_for(read, time.monotonic, 1))
+    found = asyncio.run(look_for(ask, time.monotonic, 1))
     assert found is not None
     assert (found.profile, found.protocol) == (None, "huanyang")
     assert "speaks Huanyang's own protocol" in str(found.problem)

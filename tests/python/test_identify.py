@@ -15,6 +15,7 @@ import drivebus
 import drivebus.aio
 from drivebus import Bus, DrivebusError, Identification, NotAllowed, Simulator
 from drivebus.identify import codes, identify
+from drivebus.line.asking import Read
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
@@ -136,13 +137,13 @@ class TestTheStateBesideTheCode:
     def of(code: int, state: int | Exception) -> Identification:
         """What a unit is taken for that has *code* at 2103H and *state* at 2100H, or refuses that."""
 
-        async def read(_unit: int, address: int) -> list[int]:
-            told = {CODE: code, 0x2100: state}[address]
+        async def ask(read: Read) -> list[int]:
+            told = {CODE: code, 0x2100: state}[read.address]
             if isinstance(told, Exception):
                 raise told
             return [told]
 
-        return asyncio.run(identify(read, 1))
+        return asyncio.run(identify(ask, 1))
 
     @pytest.mark.parametrize("state", [1, 2, 3, 4, 5, 6])
     def test_in_each_state_of_such_a_drive_it_is_one(self, state: int) -> None:

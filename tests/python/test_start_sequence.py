@@ -21,6 +21,7 @@ import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
 from drivebus.cli import rules
+from drivebus.line.asking import Write
 from drivebus.line.trace import meaning
 
 ACME = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/acme"
@@ -309,15 +310,16 @@ def test_a_task_that_is_cancelled_amid_it_stops_the_motor(
     async def main() -> None:
         async with drivebus.aio.Bus(line) as bus:
             drive = await bus.drive(1, profile, variants={"speed_unit": "Hz"})
-            write = bus.write
+            ask = bus.ask
             task: list[asyncio.Task[None]] = []
 
-            async def watched(unit: int, address: int, value: Any, /, **how: Any) -> None:
-                await write(unit, address, value, **how)
-                if address == ORDER and value == WARM:
+            async def watched(request: Any, /) -> Any:
+                answer = await ask(request)
+                if isinstance(request, Write) and (request.address, request.value) == (ORDER, WARM):
                     task[0].cancel()
+                return answer
 
-            monkeypatch.setattr(bus, "write", watched)
+            monkeypatch.setattr(bus, "ask", watched)
 
             async def job() -> None:
                 async with drive.running(20.0):

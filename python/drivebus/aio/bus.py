@@ -23,6 +23,7 @@ from drivebus.identify import scan
 from drivebus.identify.choose import profile_of
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Found, Identification
+from drivebus.line.asking import Read, Stamped, Write, asking
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.requests import Requests
@@ -127,6 +128,18 @@ class Bus(BusFace):
             await line.close()
             self._opening.close()
 
+    @overload
+    async def ask(self, request: Read, /) -> list[int]: ...
+    @overload
+    async def ask(self, request: Write, /) -> None: ...
+    async def ask(self, request: Read | Write, /) -> list[int] | None:
+        """Takes *request* to its unit, as `read` and `write` do: for what asks on behalf of a drive."""
+        return await self._asked().ask(request)
+
+    async def ask_stamped(self, request: Read, /) -> Stamped:
+        """As `ask`, with the Unix times at which the request left and at which the answer was complete."""
+        return await self._asked().ask_stamped(request)
+
     @documented_by(Requests.read)
     async def read(
         self,
@@ -141,9 +154,7 @@ class Bus(BusFace):
         retries: int | None = None,
     ) -> list[int]:
         """See `Requests.read`."""
-        return await self._asked().read(
-            unit, address, count, urgent=urgent, verify=verify, table=table, timeout=timeout, retries=retries
-        )
+        return await self.ask(Read(unit, address, count, table, urgent, verify, timeout, retries))
 
     @documented_by(Requests.read_stamped)
     async def read_stamped(
@@ -157,7 +168,7 @@ class Bus(BusFace):
         table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """See `Requests.read_stamped`."""
-        return await self._asked().read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
+        return await self.ask_stamped(Read(unit, address, count, table, urgent, verify))
 
     @documented_by(Requests.write)
     async def write(
@@ -174,17 +185,7 @@ class Bus(BusFace):
         timeout: float | None = None,
     ) -> None:
         """See `Requests.write`."""
-        await self._asked().write(
-            unit,
-            address,
-            value,
-            urgent=urgent,
-            read_back=read_back,
-            connection=connection,
-            force=force,
-            table=table,
-            timeout=timeout,
-        )
+        await self.ask(Write(unit, address, value, table, urgent, read_back, connection, force, timeout))
 
     @documented_by(Requests.broadcast)
     async def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
@@ -235,8 +236,8 @@ class Bus(BusFace):
     async def _scan(
         self, line: AwaitedRequests, units: Sequence[int], timeout: float, protocol: str
     ) -> AsyncIterator[Found]:
-        read = functools.partial(line.look, timeout=timeout)
-        ask = functools.partial(line.ask, timeout=timeout)
+        read = asking(line, timeout=timeout, retries=0)
+        ask = functools.partial(line.ask_foreign, timeout=timeout)
         found: list[Found] = []
         is_first = protocol == "huanyang" and not self.stats()["requests"]
         for unit, foreign in asked(units, protocol, found):
@@ -251,7 +252,7 @@ class Bus(BusFace):
 
     async def identify(self, unit: int) -> Identification:
         """What the unit is, as far as it tells. As `drivebus.Bus.identify`."""
-        return await identify(self.read, self._opening.known.addresses.unit(unit))
+        return await identify(self.ask, self._opening.known.addresses.unit(unit))
 
     async def drive(
         self,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any, overload
 
 from drivebus.aio.line import Line
+from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.requests import (
     Requests,
@@ -59,11 +61,7 @@ class AwaitedRequests:
         """The same line for who has no event loop: it blocks."""
         return BlockingBus(Requests(self._line.native, self._known))
 
-    async def look(self, unit: int, address: int, timeout: float, table: str = "holding") -> list[int]:
-        """Reads one word, within *timeout* seconds, and not again."""
-        return await self._line.read(unit, address, 1, timeout=timeout, retries=0, table=table)
-
-    async def ask(self, unit: int, pdu: bytes, reply_length: int, timeout: float) -> bytes:
+    async def ask_foreign(self, unit: int, pdu: bytes, reply_length: int, timeout: float) -> bytes:
         """Sends *pdu* within *timeout* seconds, once, also to a unit that may still owe another answer."""
         return await self._line.transact(unit, pdu, reply_length, timeout=timeout, in_doubt=True)
 
@@ -75,60 +73,29 @@ class AwaitedRequests:
         """See `Requests`."""
         return await self._line.listen(seconds_of(seconds))
 
-    async def read(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-        retries: int | None = None,
-    ) -> list[int]:
-        """See `Requests`."""
-        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
-        alone = alone_of(timeout, retries)
-        return await self._line.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
+    @overload
+    async def ask(self, request: Read, /) -> list[int]: ...
+    @overload
+    async def ask(self, request: Write, /) -> None: ...
+    async def ask(self, request: Read | Write, /) -> list[int] | None:
+        """As `Requests.read` and `Requests.write`."""
+        how: dict[str, Any] = {"urgent": request.urgent, "table": request.table}
+        if isinstance(request, Read):
+            how |= {"verify": request.verify, **alone_of(request.timeout, request.retries)}
+            return await self._line.read(*self._checked(request), **how)
+        how |= {"read_back": request.read_back, "connection": request.connection}
+        of = (request.unit, request.address, request.value, request.table, request.urgent)
+        checked = write_of(self._known, *of, request.read_back, request.connection, request.force)
+        await self._line.write(*checked, **how, **alone_of(request.timeout))
+        return None
 
-    async def read_stamped(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-    ) -> tuple[list[int], float, float]:
-        """See `Requests`."""
-        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
-        return await self._line.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
+    async def ask_stamped(self, request: Read, /) -> Stamped:
+        """As `Requests.read_stamped`."""
+        how: dict[str, Any] = {"urgent": request.urgent, "verify": request.verify, "table": request.table}
+        return Stamped(*await self._line.read_stamped(*self._checked(request), **how))
 
-    async def write(
-        self,
-        unit: int,
-        address: int,
-        value: int | Sequence[int],
-        *,
-        urgent: bool = False,
-        read_back: int | None = None,
-        connection: int | None = None,
-        force: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-    ) -> None:
-        """See `Requests`."""
-        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
-        await self._line.write(
-            *checked,
-            urgent=urgent,
-            read_back=read_back,
-            connection=connection,
-            table=table,
-            **alone_of(timeout),
-        )
+    def _checked(self, read: Read) -> tuple[int, int, int]:
+        return read_of(self._known, read.unit, read.address, read.count, read.table, read.urgent, read.verify)
 
     async def link(self, unit: int) -> Link:
         """See `Requests`."""

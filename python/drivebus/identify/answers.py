@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from typing import NamedTuple
 
 from drivebus import places
 from drivebus.errors import BadAnswer, Refused
+from drivebus.line.asking import Ask, Read
 from drivebus.profile import Profile, standard_means
 
 __all__ = [
@@ -14,16 +14,12 @@ __all__ = [
     "NO_FUNCTION",
     "UNREACHED",
     "Answer",
-    "Read",
     "answer_at",
     "answer_once",
     "no_such_address",
     "passes",
     "tells_nothing",
 ]
-
-Read = Callable[..., Awaitable[list[int]]]
-"""Asks a unit for the word at an address; with the keyword `table`, of another one than the holding registers."""
 
 _ILLEGAL_ADDRESS = 0x02
 """In the Modbus specification, and under this name in the profiles that list their exceptions."""
@@ -70,34 +66,33 @@ def tells_nothing(profile: Profile, answer: Answer) -> bool:
     return code is not None and (passes(answer) or profile.exception_means(code) == _ASK_AGAIN)
 
 
-async def answer_once(read: Read, unit: int, place: int) -> Answer:
+async def answer_once(ask: Ask, unit: int, place: int) -> Answer:
     """How *unit* answers one question for the word at *place*, whatever a refusal of it means."""
-    address, table = places.at(place)
     try:
-        [word] = await read(unit, address, **table)
+        [word] = await ask(Read.at(unit, place))
     except Refused as error:
         return Answer(place, None, error.code)
     return Answer(place, word, None)
 
 
-async def answer_at(read: Read, unit: int, place: int) -> Answer:
+async def answer_at(ask: Ask, unit: int, place: int) -> Answer:
     """How *unit*, of which nothing is known, answers the question for the word at *place*.
 
     A refusal by which it decides nothing is no answer: it is asked again. So is one by 01H for holding registers: each
     family reads them, and one says by that code that the request came damaged.
 
     Raises:
-        NoAnswer, BadAnswer, PortError: From *read*; `BadAnswer` also where it says each time that it is busy, or gets
+        NoAnswer, BadAnswer, PortError: From *ask*; `BadAnswer` also where it says each time that it is busy, or gets
             requests damaged.
     """
-    address, table = places.at(place)
+    read = Read.at(unit, place)
     again = 0
     while True:
         try:
-            [word] = await read(unit, address, **table)
+            [word] = await ask(read)
         except Refused as error:
             decides = error.code in UNREACHED or error.means != _ASK_AGAIN
-            odd = error.code == NO_FUNCTION and not table
+            odd = error.code == NO_FUNCTION and read.table == "holding"
             if again < _AGAIN and (odd or not decides):
                 again += 1
                 continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import warnings
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from drivebus.errors import BadArgument, NotAllowed, SharedCodeWarning, WrongDri
 from drivebus.identify.families import drive_as, one_of, shipped
 from drivebus.identify.identify import identify
 from drivebus.identify.results import Identification
+from drivebus.line.asking import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import units_of
 from drivebus.profile import Profile, profiles
@@ -36,8 +36,7 @@ async def profile_of(
     code: int | None = None
     if profile is None:
         connection = bus.reconnects
-        read = functools.partial(bus.read, urgent=True) if checks.flag("urgent", urgent) else bus.read
-        found = await identify(read, unit)
+        found = await identify(asking(bus, urgent=checks.flag("urgent", urgent)), unit)
         known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code
         if found.certainty == "by answers":
             # The whole signature of that family and of no other: a halt need not ask for it again.

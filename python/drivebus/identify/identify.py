@@ -10,17 +10,18 @@ from dataclasses import replace
 from drivebus import places
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
-from drivebus.identify.answers import LOCKED, UNREACHED, Read, answer_at, no_such_address
+from drivebus.identify.answers import LOCKED, UNREACHED, answer_at, no_such_address
 from drivebus.identify.families import all_of, one_of, shipped
 from drivebus.identify.results import Identification
+from drivebus.line.asking import Ask
 from drivebus.profile import Profile
 
-__all__ = ["Read", "identify"]
+__all__ = ["identify"]
 
 _PASSWORD = ", as INVT drives do that a user password locks: type it in at the keypad"
 
 
-async def identify(read: Read, unit: int) -> Identification:
+async def identify(ask: Ask, unit: int) -> Identification:
     """Finds out what *unit* is. *read* asks for one word.
 
     Raises:
@@ -30,7 +31,7 @@ async def identify(read: Read, unit: int) -> Identification:
     told: list[str] = []
     code: int | None = None
     for address in codes.registers():
-        answer = await answer_at(read, unit, address)
+        answer = await answer_at(ask, unit, address)
         code = answer.word
         if answer.exception is not None:
             if answer.exception in UNREACHED:
@@ -43,9 +44,9 @@ async def identify(read: Read, unit: int) -> Identification:
         answered[address] = True
         rows = codes.listed_at(address, code)
         if rows:
-            return await _as_it_behaves(read, _by_code(unit, code, rows), address)
+            return await _as_it_behaves(ask, _by_code(unit, code, rows), address)
         told.append(f"it reports {code:04X}H, which is not a known code")
-    candidates = await signatures.shown_by(read, unit, answered)
+    candidates = await signatures.shown_by(ask, unit, answered)
     if not candidates:
         reason = f"{'; '.join(told)}, and its answers fit no known family"
         return Identification(unit, (), None, code, "", "unknown", reason)
@@ -80,7 +81,7 @@ def _by_code(unit: int, code: int, rows: list[codes.Row]) -> Identification:
     return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
 
 
-async def _as_it_behaves(read: Read, found: Identification, place: int) -> Identification:
+async def _as_it_behaves(ask: Ask, found: Identification, place: int) -> Identification:
     """Gives *found* back, as no more than likely if the unit is in no state of such a drive.
 
     One word is no proof: another maker's drive may keep its speed at *place*, and turn at just that.
@@ -91,7 +92,7 @@ async def _as_it_behaves(read: Read, found: Identification, place: int) -> Ident
     if known is None or about is None or about.place is None or about.evidence == "assumed":
         return found
     try:
-        answer = await answer_at(read, found.unit, about.place)
+        answer = await answer_at(ask, found.unit, about.place)
     except (NoAnswer, BadAnswer):
         return found
     if answer.word is None:

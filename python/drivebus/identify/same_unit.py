@@ -12,7 +12,6 @@ also by what they say where other families have such a code, for that is how one
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 from drivebus import places
@@ -22,6 +21,7 @@ from drivebus.identify import codes
 from drivebus.identify.answers import Answer, answer_once, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
 from drivebus.identify.signatures import shown_by, shows, signature_of
+from drivebus.line.asking import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import UnitRecord
 from drivebus.profile import Profile
@@ -210,8 +210,8 @@ class SameUnit:
             return None
         told = [answer for answer in answers if not tells_nothing(self._profile, answer)]
         answered = {answer.address: answer.word is not None for answer in told}
-        read = functools.partial(bus.read, urgent=True) if urgent else bus.read
-        return other_signature(self._profile, self._unit, await shown_by(read, self._unit, answered))
+        ask = asking(bus, urgent=urgent)
+        return other_signature(self._profile, self._unit, await shown_by(ask, self._unit, answered))
 
     async def _ask(self, bus: AwaitableBus, answers: list[Answer], urgent: bool) -> None:
         """Adds the unit's answers to *answers* as they come, so that a failure of the line leaves the earlier ones."""
@@ -219,7 +219,7 @@ class SameUnit:
             answers += [await self._answer(bus, address, urgent)]
 
     async def _answer(self, bus: AwaitableBus, address: int, urgent: bool) -> Answer:
-        return await answer_once(functools.partial(bus.read, urgent=urgent), self._unit, address)
+        return await answer_once(asking(bus, urgent=urgent), self._unit, address)
 
     def _put_off(self, answers: Sequence[Answer]) -> bool:
         """Whether one of *answers* is a refusal that passes, so that it is not known yet what the unit is."""

@@ -15,10 +15,11 @@ from collections.abc import Awaitable, Callable, Iterable
 from drivebus import checks
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused
 from drivebus.identify.choose import usable
-from drivebus.identify.identify import Read, identify
+from drivebus.identify.identify import identify
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
 from drivebus.line.addresses import Addresses
+from drivebus.line.asking import Ask, Read
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.scan_order import PROTOCOLS
 
@@ -78,14 +79,14 @@ def _foreign(unit: int, took: float) -> Found:
     return Found(unit, None, None, took, _OTHERWISE, protocol="huanyang")
 
 
-async def look_for(read: Read, now: Callable[[], float], unit: int) -> Found | None:
-    """Who answers at *unit*, if somebody does. *read* asks for one word, once; *now* tells the time in seconds."""
+async def look_for(ask: Ask, now: Callable[[], float], unit: int) -> Found | None:
+    """Who answers at *unit*, if somebody does. *ask* asks once; *now* tells the time in seconds."""
     started = now()
     took: list[float] = []
 
-    async def timed(unit: int, address: int, **table: str) -> list[int]:
+    async def timed(read: Read) -> list[int]:
         try:
-            return await read(unit, address, **table)
+            return await ask(read)
         finally:
             took.append(now() - started)
 

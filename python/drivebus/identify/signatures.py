@@ -6,10 +6,11 @@ import functools
 from collections.abc import Iterable
 
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.identify.answers import Answer, Read, answer_at, passes
+from drivebus.identify.answers import Answer, answer_at, passes
+from drivebus.line.asking import Ask
 from drivebus.profile import Profile, profiles
 
-__all__ = ["Read", "Signature", "listed", "shown_by", "shows", "signature_of"]
+__all__ = ["Signature", "listed", "shown_by", "shows", "signature_of"]
 
 Signature = dict[str, list[int]]
 """The addresses that a unit `answers`, and those that it `refuses`: see `Profile.signature`."""
@@ -37,7 +38,7 @@ def shows(signature: Signature | None, answers: Iterable[Answer]) -> bool:
     )
 
 
-async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
+async def shown_by(ask: Ask, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:
     """The families whose signature *unit* shows. What was asked stands in *answered*, and what is asked goes there.
 
     Of a signature no more is asked once the unit does not show it, so that a unit of none of them is asked little.
@@ -49,7 +50,7 @@ async def shown_by(read: Read, unit: int, answered: dict[int, bool]) -> tuple[st
         for place, yes in wanted:
             if place not in answered:
                 try:
-                    answer = await answer_at(read, unit, place)
+                    answer = await answer_at(ask, unit, place)
                 except (NoAnswer, BadAnswer):
                     # Neither, then: no signature has it.
                     break

@@ -6,10 +6,11 @@ its beginning to its end, in the caller's own thread.
 
 from __future__ import annotations
 
-from collections.abc import Coroutine, Sequence
+from collections.abc import Coroutine
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
+from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.protocols import BusProtocol
 from drivebus.line.requests import Requests
 from drivebus.line.stats import Link
@@ -43,55 +44,32 @@ class BlockingBus:
         """See `BusProtocol`."""
         self._bus.sleep(seconds)
 
-    async def read(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        /,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-        retries: int | None = None,
-    ) -> list[int]:
-        """See `BusProtocol`."""
-        alone = self._alone(timeout=timeout, retries=retries)
-        return self._bus.read(unit, address, count, urgent=urgent, verify=verify, **_of(table), **alone)
+    @overload
+    async def ask(self, request: Read, /) -> list[int]: ...
+    @overload
+    async def ask(self, request: Write, /) -> None: ...
+    async def ask(self, request: Read | Write, /) -> list[int] | None:
+        """See `AwaitableBus`."""
+        if isinstance(request, Read):
+            rest = _of(request.table) | self._alone(timeout=request.timeout, retries=request.retries)
+            how = {"urgent": request.urgent, "verify": request.verify, **rest}
+            return self._bus.read(request.unit, request.address, request.count, **how)
+        rest = _of(request.table) | self._alone(timeout=request.timeout) | ({"force": True} if request.force else {})
+        self._bus.write(
+            request.unit,
+            request.address,
+            request.value,
+            urgent=request.urgent,
+            read_back=request.read_back,
+            connection=request.connection,
+            **rest,
+        )
+        return None
 
-    async def read_stamped(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        /,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-    ) -> tuple[list[int], float, float]:
-        """See `BusProtocol`."""
-        return self._bus.read_stamped(unit, address, count, urgent=urgent, verify=verify, **_of(table))
-
-    async def write(
-        self,
-        unit: int,
-        address: int,
-        value: int | Sequence[int],
-        /,
-        *,
-        urgent: bool = False,
-        read_back: int | None = None,
-        connection: int | None = None,
-        force: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-    ) -> None:
-        """See `BusProtocol`."""
-        rest: dict[str, Any] = {"force": True} if force else {}
-        rest |= _of(table) | self._alone(timeout=timeout)
-        self._bus.write(unit, address, value, urgent=urgent, read_back=read_back, connection=connection, **rest)
+    async def ask_stamped(self, request: Read, /) -> Stamped:
+        """See `AwaitableBus`."""
+        how = {"urgent": request.urgent, "verify": request.verify, **_of(request.table)}
+        return Stamped(*self._bus.read_stamped(request.unit, request.address, request.count, **how))
 
     def _alone(self, **wanted: float | None) -> dict[str, Any]:
         """What one call wants otherwise; nothing of a bus of somebody's own, which has time-outs of its own."""

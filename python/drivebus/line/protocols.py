@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol, runtime_checkable
 
+from drivebus.line.asking import Asks
 from drivebus.line.stats import Link
 
 __all__ = ["AwaitableBus", "BusProtocol", "KeepsWills"]
@@ -78,8 +79,8 @@ class BusProtocol(Protocol):
         """Whether the line was closed for good."""
 
 
-class AwaitableBus(Protocol):
-    """A bus as the operations know it: the same calls, to be awaited, and the tables beside the holding registers.
+class AwaitableBus(Asks, Protocol):
+    """A bus as the operations know it: it takes requests as values, and is awaited.
 
     Whatever else an operation awaits is made of them, so that over a bus that blocks nothing is left to wait for.
     """
@@ -89,50 +90,6 @@ class AwaitableBus(Protocol):
 
     async def sleep(self, seconds: float, /) -> None:
         """See `BusProtocol`."""
-
-    async def read(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        /,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-        retries: int | None = None,
-    ) -> list[int]:
-        """See `BusProtocol`. *timeout* and *retries* are for this read alone."""
-
-    async def read_stamped(
-        self,
-        unit: int,
-        address: int,
-        count: int = 1,
-        /,
-        *,
-        urgent: bool = False,
-        verify: bool = False,
-        table: str = "holding",
-    ) -> tuple[list[int], float, float]:
-        """See `BusProtocol`."""
-
-    async def write(
-        self,
-        unit: int,
-        address: int,
-        value: int | Sequence[int],
-        /,
-        *,
-        urgent: bool = False,
-        read_back: int | None = None,
-        connection: int | None = None,
-        force: bool = False,
-        table: str = "holding",
-        timeout: float | None = None,
-    ) -> None:
-        """See `BusProtocol`. *timeout* is for this write alone."""
 
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""

@@ -92,9 +92,9 @@ class Requests:
             PortError: The port is lost, or the bus closed.
             Refused: The unit says no. What its code means in this family, only a `Drive` knows.
         """
-        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
+        checked = read_of(self._known, unit, address, count, table, urgent, verify)
         alone = alone_of(timeout, retries)
-        return self._native.read(unit, address, count, urgent=urgent, verify=verify, table=table, **alone)
+        return self._native.read(*checked, urgent=urgent, verify=verify, table=table, **alone)
 
     def read_stamped(
         self,
@@ -107,8 +107,8 @@ class Requests:
         table: str = "holding",
     ) -> tuple[list[int], float, float]:
         """As `read`, with the Unix times at which the request left and at which the answer was complete."""
-        unit, address, count = read_of(self._known, unit, address, count, urgent=urgent, verify=verify, table=table)
-        return self._native.read_stamped(unit, address, count, urgent=urgent, verify=verify, table=table)
+        checked = read_of(self._known, unit, address, count, table, urgent, verify)
+        return self._native.read_stamped(*checked, urgent=urgent, verify=verify, table=table)
 
     def write(
         self,
@@ -153,7 +153,7 @@ class Requests:
             Refused: The unit did not take it.
             Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
         """
-        checked = write_of(self._known, unit, address, value, urgent, read_back, connection, force, table)
+        checked = write_of(self._known, unit, address, value, table, urgent, read_back, connection, force)
         self._native.write(
             *checked,
             urgent=urgent,
@@ -196,9 +196,9 @@ class Requests:
 
 
 def read_of(
-    known: Units, unit: int, address: int, count: int, *, urgent: object, verify: object, table: object = "holding"
+    known: Units, unit: int, address: int, count: int, table: object, urgent: object, verify: object
 ) -> tuple[int, int, int]:
-    """What a read is of. Raises `NotAllowed` where something is out of range."""
+    """What a read is of: unit, address and count. Raises `NotAllowed` where something is out of range."""
     most = 125 if table == "holding" or checks.one_of("table", table, places.TABLES) not in places.BITS else 2000
     unit, address = known.addresses.unit(unit), checks.address(address)
     count = checks.whole("count", count, 1, most)
@@ -224,13 +224,16 @@ def write_of(
     unit: int,
     address: int,
     value: int | Sequence[int],
-    urgent: bool,
+    table: object,
+    urgent: object,
     read_back: int | None,
     connection: int | None,
-    force: bool,
-    table: object = "holding",
+    force: object,
 ) -> tuple[int, int, int | list[int]]:
-    """What a write is of. Raises `NotAllowed` where something is out of range, or would be an unknown command."""
+    """What a write is of: unit, address and words.
+
+    Raises `NotAllowed` where something is out of range, or would be an unknown command.
+    """
     if read_back is not None:
         checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
     if connection is not None:

@@ -8,7 +8,6 @@ evidence; what it is is then asked behind the halt.
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 from drivebus.advice import Text, argument
@@ -17,6 +16,7 @@ from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.harm import halt_of, harmed, harms
+from drivebus.line.asking import asking
 from drivebus.line.frames import may_be_of
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile, profiles
@@ -75,7 +75,7 @@ class Aim:
         unit = self._unit
         if not self._doubted and goes_out_at_once(unit, command):
             return Target(unit, command)
-        read = functools.partial(unit.bus.read, urgent=True, timeout=ANSWER_WITHIN, retries=0)
+        ask = asking(unit.bus, urgent=True, timeout=ANSWER_WITHIN, retries=0)
         for _ in range(_QUESTIONS):
             verdict = self._apart.verdict(command)
             if verdict.take is not None:
@@ -83,7 +83,7 @@ class Aim:
             if verdict.ask is None:
                 raise _undecided(unit, command, verdict.others)
             try:
-                answer = await answer_once(read, unit.address, verdict.ask)
+                answer = await answer_once(ask, unit.address, verdict.ask)
             except (NoAnswer, BadAnswer) as error:
                 if may_be_of(unit.address, error.raw):
                     self.heard = unit.bus.now()
@@ -157,7 +157,7 @@ async def check_harmless(unit: Unit, what: str | int) -> None:
                 unit.identity.found_harmless(unit.bus, what)
             return
         try:
-            answer = await answer_at(unit.bus.read, unit.address, verdict.ask)
+            answer = await answer_at(unit.bus.ask, unit.address, verdict.ask)
         except LINE_ERRORS as error:
             # `started` stays None: of what was to follow, nothing left.
             raise type(error)(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
-from drivebus import places
 from drivebus.advice import Text
 from drivebus.errors import BadArgument
+from drivebus.line.asking import Read
 from drivebus.operations import variants, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -58,9 +58,8 @@ async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bo
     answers: list[list[int]] = []
     started = ended = 0.0
     for place, count in plan.reads:
-        address, table = places.at(place)
         with words.explained(unit):
-            came, sent, ended = await unit.bus.read_stamped(unit.address, address, count, verify=verify, **table)
+            came, sent, ended = await unit.bus.ask_stamped(Read.at(unit.address, place, count, verify=verify))
         started = started if answers else sent
         answers.append(came)
     values = dict(zip(plan.names, plan.values(answers), strict=True))

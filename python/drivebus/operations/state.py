@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from drivebus import places
 from drivebus.errors import BadArgument
+from drivebus.line.asking import Read
 from drivebus.operations import registers, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
@@ -103,9 +103,8 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     answers: list[list[int]] = []
     first = 0.0
     for place, count in plan.plan.reads:
-        address, table = places.at(place)
         with words.explained(unit):
-            came, time, _ = await unit.bus.read_stamped(unit.address, address, count, urgent=urgent, **table)
+            came, time, _ = await unit.bus.ask_stamped(Read.at(unit.address, place, count, urgent=urgent))
         first = first if answers else time
         answers.append(came)
     values = dict(zip(plan.plan.names, map(int, plan.plan.values(answers)), strict=True))

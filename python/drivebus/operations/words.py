@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from drivebus import _native, checks, places
 from drivebus.errors import PortError, Refused
+from drivebus.line.asking import Read, Write
 from drivebus.line.write_guard import check_words
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.unit import Unit
@@ -32,9 +32,8 @@ async def read_words(
     unit: Unit, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
 ) -> list[int]:
     """Reads words by address or place, as they are. As `Bus.read`, but a refusal says what this family means by it."""
-    first, table = places.at(address)
     with explained(unit):
-        return await unit.bus.read(unit.address, first, count, urgent=urgent, verify=verify, **table)
+        return await unit.bus.ask(Read.at(unit.address, address, count, urgent=urgent, verify=verify))
 
 
 async def write_words(unit: Unit, address: int, value: int | Sequence[int], force: bool = False) -> None:
@@ -127,17 +126,11 @@ async def send(
         Whether the drive confirmed it; False where it only said that it took it and is still at it.
     """
     value = as_written(unit.profile, value)
-    # What a bus of somebody's own need not know: only a raw write is ever forced, and only a halt is in a hurry.
-    rest: dict[str, Any] = {"force": True} if force else {}
-    rest |= {} if timeout is None else {"timeout": timeout}
-    first, table = places.at(address)
-    if read_back is not None:
-        read_back, _ = places.at(read_back)
+    table, first = places.split(address)
+    shown_at = None if read_back is None else places.split(read_back)[1]
     try:
         with explained(unit):
-            await unit.bus.write(
-                unit.address, first, value, urgent=urgent, read_back=read_back, connection=connection, **rest, **table
-            )
+            await unit.bus.ask(Write(unit.address, first, value, table, urgent, shown_at, connection, force, timeout))
     except Refused as error:
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":

@@ -1,0 +1,101 @@
+"""What is asked of a unit: a read or a write, as a value."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, overload
+
+from drivebus import places
+
+__all__ = ["Ask", "Asks", "Read", "Stamped", "Write", "asking"]
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """A read of words, or of bits.
+
+    Attributes:
+        unit: The address of the unit, 1..247.
+        address: The first, in its table: 0..0xFFFF.
+        count: How many.
+        table: Of which table, as `places.TABLES`.
+        urgent: Before all who wait for the line.
+        verify: Until the same came twice in a row.
+        timeout: Seconds that this read alone waits for its answer; None is what the bus has.
+        retries: How often this read alone is repeated; None is what the bus has.
+    """
+
+    unit: int
+    address: int
+    count: int = 1
+    table: str = "holding"
+    urgent: bool = False
+    verify: bool = False
+    timeout: float | None = None
+    retries: int | None = None
+
+    @classmethod
+    def at(cls, unit: int, place: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> Read:
+        """Of *count* from *place* on, which has the table in it."""
+        table, address = places.split(place)
+        return cls(unit, address, count, table, urgent, verify)
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """A write of words, or of one coil. It is sent once.
+
+    Attributes:
+        unit: The address of the unit, 1..247.
+        address: The first, in its table: 0..0xFFFF.
+        value: A word (06H), or several (10H); of a coil 0 or 1 (05H).
+        table: `"holding"` or `"coil"`.
+        urgent: Before all who wait for the line, whatever is in doubt.
+        read_back: The address where the same can be read: there a confirmation that is missing is looked for, and only
+            where the unit shows other words is the write repeated.
+        connection: The `reconnects` at which it was seen who answers: at another nothing is sent. None: at any.
+        force: Also what the family does not define.
+        timeout: Seconds that this write alone waits for its confirmation; None is what the bus has.
+    """
+
+    unit: int
+    address: int
+    value: int | Sequence[int]
+    table: str = "holding"
+    urgent: bool = False
+    read_back: int | None = None
+    connection: int | None = None
+    force: bool = False
+    timeout: float | None = None
+
+
+class Stamped(NamedTuple):
+    """The words that were read, and when, in Unix time: the request had left, and the answer was complete."""
+
+    words: list[int]
+    asked: float
+    answered: float
+
+
+Ask = Callable[[Read], Awaitable[list[int]]]
+"""Asks a unit for words."""
+
+
+class Asks(Protocol):
+    """Whatever takes a request to its unit, and brings what it answers. Errors as `Requests.read` and `write` have."""
+
+    @overload
+    async def ask(self, request: Read, /) -> list[int]: ...
+    @overload
+    async def ask(self, request: Write, /) -> None: ...
+    async def ask(self, request: Read | Write, /) -> list[int] | None:
+        """The words that were read; None where they were written."""
+
+    async def ask_stamped(self, request: Read, /) -> Stamped:
+        """The words that were read, and when."""
+
+
+def asking(bus: Asks, **how: Any) -> Ask:
+    """What asks *bus*, where each read is to be so as *how* says, in the names of its attributes."""
+    return lambda read: bus.ask(replace(read, **how))
