@@ -18,6 +18,8 @@ __all__ = [
     "encode_echo",
     "encode_read",
     "encode_write",
+    "framed",
+    "is_frame",
     "is_write",
     "only_reads",
     "written",
@@ -79,6 +81,9 @@ class Frame:
         return f"Frame({', '.join(shown)})"
 
 
+SHORTEST, LONGEST = 4, 256
+"""Bytes of a frame, its address and its CRC included."""
+
 _FIELDS = frozenset(field.name for field in fields(Frame))
 
 
@@ -90,6 +95,16 @@ def decode(frame: bytes | bytearray | memoryview) -> Frame:
         BadAnswer: It is too short, too long, or no frame.
     """
     return Frame(**_native.decode(frame))
+
+
+def is_frame(data: bytes) -> bool:
+    """Whether *data* is as long as a frame can be (4..256 bytes), and ends with its own CRC."""
+    return SHORTEST <= len(data) <= LONGEST and _native.crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
+
+
+def framed(body: bytes) -> bytes:
+    """*body*, which is a unit and a PDU, with its CRC."""
+    return body + _native.crc16(body).to_bytes(2, "little")
 
 
 def written(pdu: bytes) -> tuple[int, list[int]] | None:

@@ -20,6 +20,8 @@ from hypothesis import strategies as st
 import drivebus
 import drivebus.aio
 from drivebus import Profile, Unconfirmed
+from drivebus.line.asking import Read, Stamped, Write
+from drivebus.line.blocking import BlockingBus
 
 COMMAND, STATE, FREQUENCY = 0x2000, 0x2100, 0x3000
 STOP, COAST = 5, 6
@@ -239,6 +241,12 @@ class Awaited:
             return asked(*what, **how)
 
         return answer
+
+    async def ask(self, request: Read | Write, /) -> Any:
+        return await BlockingBus(self._slave).ask(request)
+
+    async def ask_stamped(self, request: Read, /) -> Stamped:
+        return await BlockingBus(self._slave).ask_stamped(request)
 
     def undisturbed(self) -> AbstractContextManager[Awaited]:
         return nullcontext(self)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from drivebus import Bus, Drive, NoAnswer, NotAllowed, Simulator, State, Unconfirmed
-from drivebus.capture.frame import framed
+from drivebus.rtu import framed
 
 RUN = bytes.fromhex("01 05 00 00 FF 00 8C 3A")
 

@@ -10,9 +10,10 @@ the bytes, `finding` finds the frames, `speakers` says who sent each, and `text`
 `reading` reads any of them, `writer` makes one.
 """
 
-from drivebus.capture.frame import Captured, is_frame
+from drivebus.capture.frame import Captured
 from drivebus.capture.reading import line_of, read
 from drivebus.capture.streams import answers
 from drivebus.capture.writer import Writer
+from drivebus.rtu import is_frame
 
 __all__ = ["Captured", "Writer", "answers", "is_frame", "line_of", "read"]

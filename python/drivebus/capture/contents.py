@@ -8,12 +8,13 @@ from dataclasses import replace
 from itertools import chain
 
 from drivebus.capture import links, network
-from drivebus.capture.frame import Captured, is_frame
+from drivebus.capture.frame import Captured
 from drivebus.capture.modbus_tcp import Found, found_in
 from drivebus.capture.packets import Interface, Packet
 from drivebus.capture.serial_line import SerialLine
 from drivebus.checks import counted
 from drivebus.errors import BadArgument
+from drivebus.rtu import is_frame
 
 __all__ = ["Contents"]
 

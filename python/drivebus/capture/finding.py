@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from drivebus._native import frames_in, judge
-from drivebus.capture.frame import SHORTEST, framed, is_frame
 from drivebus.capture.layout import Beside, body, without_times
 from drivebus.capture.tokens import MAY, READINGS, Reading, Run
 from drivebus.errors import DrivebusError
+from drivebus.rtu import SHORTEST, framed, is_frame
 
 __all__ = ["Piece", "pieces"]
 

@@ -1,15 +1,12 @@
-"""One frame of a capture, whether bytes are one, and what makes them one."""
+"""One frame of a capture."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivebus._native import crc16
+from drivebus.rtu import is_frame
 
-__all__ = ["LONGEST", "SHORTEST", "Captured", "framed", "is_frame"]
-
-SHORTEST, LONGEST = 4, 256
-"""Bytes of a frame, its address and its CRC included."""
+__all__ = ["Captured"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +34,3 @@ class Captured:
     def is_frame(self) -> bool:
         """Whether it is one: its CRC is right."""
         return is_frame(self.data)
-
-
-def is_frame(data: bytes) -> bool:
-    """Whether *data* is as long as a frame can be, and ends with its own CRC."""
-    return SHORTEST <= len(data) <= LONGEST and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
-
-
-def framed(body: bytes) -> bytes:
-    """*body*, which is a unit and a PDU, with its CRC."""
-    return body + crc16(body).to_bytes(2, "little")

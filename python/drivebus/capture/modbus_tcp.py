@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from itertools import chain
 
 from drivebus._native import frame_len
-from drivebus.capture.frame import Captured, framed, is_frame
+from drivebus.capture.frame import Captured
 from drivebus.capture.network import Connection, Side
 from drivebus.capture.streams import Piece, Record, pieces
+from drivebus.rtu import framed, is_frame
 
 __all__ = ["Found", "found_in"]
 

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from itertools import chain, pairwise
 
 from drivebus.capture import links
-from drivebus.capture.frame import Captured, is_frame
+from drivebus.capture.frame import Captured
 from drivebus.capture.packets import Interface, Packet
 from drivebus.capture.streams import Piece, Record, answers, asks, is_mixed, pieces
+from drivebus.rtu import is_frame
 
 __all__ = ["SerialLine"]
 

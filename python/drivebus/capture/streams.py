@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from drivebus._native import decode, decode_answer, frame_len
-from drivebus.capture.frame import LONGEST, SHORTEST, is_frame
 from drivebus.errors import DrivebusError, Refused
+from drivebus.rtu import LONGEST, SHORTEST, is_frame
 
 __all__ = ["Piece", "Record", "answers", "asks", "is_mixed", "pieces"]
 

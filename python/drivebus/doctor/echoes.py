@@ -8,12 +8,12 @@ from statistics import median
 from typing import Any
 
 from drivebus.bus import Bus
-from drivebus.capture.frame import is_frame
 from drivebus.doctor.characters import of_unit
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.seven_bits import agreed, seen_in
+from drivebus.rtu import is_frame
 from drivebus.searching.settings import Settings
 
 __all__ = ["Echoes"]

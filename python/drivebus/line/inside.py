@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivebus._native import judge, misses
-from drivebus.capture.frame import is_frame
+from drivebus.rtu import is_frame
 
 __all__ = ["wrong_inside"]
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from drivebus._native import crc16
-from drivebus.capture.frame import is_frame
+from drivebus.rtu import is_frame
 
 __all__ = ["SevenBits", "agreed", "ascii_in", "seen_in"]
 

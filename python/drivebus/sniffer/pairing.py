@@ -9,11 +9,11 @@ from typing import TypedDict
 
 from drivebus._native import SerialFormat, Sniffer, exception_means, judge, misses
 from drivebus.capture import Captured, answers
-from drivebus.capture.frame import framed
 from drivebus.checks import UNITS, counted
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.inside import wrong_inside
 from drivebus.profile import Profile
+from drivebus.rtu import framed
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.families import Families
 from drivebus.sniffer.foreign import Foreign

@@ -13,8 +13,8 @@ from types import TracebackType
 from drivebus import checks
 from drivebus._native import SerialFormat, frame_len
 from drivebus.advice import Text, argument
-from drivebus.capture.frame import is_frame
 from drivebus.errors import BadArgument, NotAllowed
+from drivebus.rtu import is_frame
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.seen import Seen
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from drivebus.capture.frame import framed
+from drivebus.rtu import framed
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.frames import carried, place_of, written_by
 

@@ -8,11 +8,11 @@ import click
 
 import drivebus
 from drivebus import places
-from drivebus.capture.frame import framed
 from drivebus.cli import names
 from drivebus.cli.advice import in_commands
 from drivebus.line.addresses import Addresses
 from drivebus.line.trace import meaning
+from drivebus.rtu import framed
 
 __all__ = ["Request", "check_commands", "request_of"]
 
