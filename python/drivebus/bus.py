@@ -233,7 +233,7 @@ class Bus(BusFace, Requests):
         interval: float | None = None,
         *,
         size: int = 10_000,
-        callback: Callable[[Sample], object] | None = None,
+        callback: Callable[[Sample[_AnyDrive]], object] | None = None,
     ) -> Poll[_AnyDrive]: ...
     @overload
     def poll(
@@ -242,7 +242,7 @@ class Bus(BusFace, Requests):
         interval: float | None = None,
         *,
         size: int = 10_000,
-        callback: Callable[[Sample], object] | None = None,
+        callback: Callable[[Sample[int]], object] | None = None,
     ) -> Poll[int]: ...
     @overload
     def poll(
@@ -251,7 +251,7 @@ class Bus(BusFace, Requests):
         interval: float | None = None,
         *,
         size: int = 10_000,
-        callback: Callable[[Sample], object] | None = None,
+        callback: Callable[[Sample[Drive | int]], object] | None = None,
     ) -> Poll[Drive | int]: ...
     def poll(
         self,
@@ -259,7 +259,7 @@ class Bus(BusFace, Requests):
         interval: float | None = None,
         *,
         size: int = 10_000,
-        callback: Callable[[Sample], object] | None = None,
+        callback: Callable[[Sample[Any]], object] | None = None,
     ) -> Poll[Any]:
         """Polls drives in a thread of the core's own, and gives the values as samples.
 

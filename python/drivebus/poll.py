@@ -44,7 +44,7 @@ class Poll(Polling[Key]):
         targets: object,
         interval: float | None,
         size: int,
-        callback: Callable[[Sample], object] | None,
+        callback: Callable[[Sample[Key]], object] | None,
     ) -> None:
         if callback is not None and not callable(callback):
             raise BadArgument(
@@ -78,7 +78,7 @@ class Poll(Polling[Key]):
         self._wait(how_many(self, count), seconds(timeout))
         return self.take(count)
 
-    def __iter__(self) -> Iterator[Sample]:
+    def __iter__(self) -> Iterator[Sample[Key]]:
         self._not_called_back()
         # One at a time: who leaves the loop leaves the others where they are.
         while self._wait(1, None):

@@ -57,6 +57,14 @@ class TestSamples:
         assert [sample.drive for sample in samples] == [first, second] * 2
         assert dict(samples[0]) == {"status_word_1": 3, "output_current": 0.0}
         assert isinstance(samples[0]["status_word_1"], Choice)
+        assert (samples[0].key, samples[0].output_current, samples[1].bus_voltage) == (
+            first,
+            0.0,
+            samples[1]["bus_voltage"],
+        )
+        assert {"output_current", "time"} <= set(dir(samples[0]))
+        with pytest.raises(AttributeError, match='does not hold "bus_voltage", only status_word_1, output_c'):
+            samples[0].bus_voltage  # noqa: B018
         assert list(samples[1]) == second.profile.monitor_names()
         assert dict(samples[1]) == dict(second.monitor())
         assert all(sample and sample.missing is None for sample in samples)
@@ -84,7 +92,9 @@ class TestSamples:
     def test_a_unit_without_a_profile_by_its_addresses(self, still: Bus) -> None:
         with still.poll({2: [(0x2100, 2), (0x2103, 1)]}) as poll:
             [sample] = poll.batch(1)
-        assert (sample.unit, sample.drive) == (2, None)
+        assert (sample.unit, sample.key, sample.drive) == (2, 2, None)
+        with pytest.raises(AttributeError, match='does not hold "output_current", only 8448, 8449, 8451'):
+            sample.output_current  # noqa: B018
         assert (sample[0x2100], sample[0x2103]) == (3, 0x01A0)
         assert list(sample) == [0x2100, 0x2101, 0x2103]
 
@@ -97,6 +107,8 @@ class TestSamples:
         assert poll.missing == len(missing) == 30
         with pytest.raises(KeyError, match="this sample is missing: unit 9, read 2100H: no answer within 500 ms"):
             missing[0][0x2100]
+        with pytest.raises(AttributeError, match="sample is missing, and has no output_current: unit 9, read 2100H"):
+            missing[0].output_current  # noqa: B018
         assert missing[0].get(0x2100) is None
 
     def test_a_refusal_says_what_the_family_means_by_it(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
@@ -430,3 +442,9 @@ class TestBadInput:
     def test_what_cannot_be_waited_for(self, count: Any, timeout: Any, still: Bus) -> None:
         with still.poll({1: [(0x2100, 1)]}, size=10) as poll, pytest.raises(NotAllowed):
             poll.batch(count, timeout)
+
+
+@pytest.mark.parametrize("family", drivebus.profiles())
+def test_no_register_is_called_as_what_a_sample_or_a_snapshot_has_beside_its_values(family: str) -> None:
+    names = {name for kind in (drivebus.Sample, drivebus.Snapshot) for name in dir(kind)}
+    assert names & set(drivebus.Profile.builtin(family).names()) == set()

@@ -40,7 +40,7 @@ class Poll(Polling[Key]):
         await self._there(how_many(self, count), seconds(timeout))
         return self.take(count)
 
-    async def __aiter__(self) -> AsyncIterator[Sample]:
+    async def __aiter__(self) -> AsyncIterator[Sample[Key]]:
         while True:
             # One at a time: who leaves the loop leaves the others where they are.
             samples = self.take(1)

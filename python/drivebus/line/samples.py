@@ -95,12 +95,14 @@ class Target(NamedTuple):
         return {name: unit for name, unit in units.items() if unit}
 
 
-class Sample(Mapping[str | int, Value]):
+class Sample(Mapping[str | int, Value], Generic[Key]):
     """The values of one drive in one cycle: a mapping of names (without a profile: of addresses) to values.
 
-    A missing sample is empty, and so it is false.
+    Names are attributes, too: `sample["output_current"]` is `sample.output_current`. A missing sample is empty, and so
+    it is false.
 
     Attributes:
+        key: What was given to the poll: the drive, or where a unit was polled by its address, that.
         unit: Its address, 1..247.
         drive: The drive as it was given, or None where a unit was polled by its address.
         time: Unix time in seconds at which the first request left; of a missing sample, at which it was given up if it
@@ -111,7 +113,15 @@ class Sample(Mapping[str | int, Value]):
         missing: The error that there was instead of an answer, or None. It is not raised.
     """
 
-    __slots__ = ("_values", "answered", "drive", "late", "missing", "time", "unit")
+    __slots__ = ("_values", "answered", "drive", "key", "late", "missing", "time", "unit")
+
+    key: Key
+    unit: int
+    drive: Key | None
+    time: float
+    answered: float
+    late: int
+    missing: DrivebusError | None
 
     def __init__(
         self,
@@ -122,8 +132,9 @@ class Sample(Mapping[str | int, Value]):
         values: list[Value] | None,
         missing: DrivebusError | None,
     ) -> None:
+        self.key = target.key
         self.unit = target.unit
-        self.drive: Any = target.drive
+        self.drive = None if target.drive is None else target.key
         self.time = time
         self.answered = answered
         self.late = late
@@ -138,6 +149,21 @@ class Sample(Mapping[str | int, Value]):
                 raise KeyError(f"{name!r}: this sample is missing: {self.missing}") from None
             raise
 
+    def __getattr__(self, name: str) -> Value:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._values[name]
+        except KeyError:
+            if self.missing is not None:
+                told = f"this sample is missing, and has no {name}: {self.missing}"
+            else:
+                told = f'this Sample does not hold "{name}", only {", ".join(map(str, self._values))}'
+            raise AttributeError(told) from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(name for name in self._values if isinstance(name, str))]
+
     def __iter__(self) -> Iterator[str | int]:
         return iter(self._values)
 
@@ -149,25 +175,25 @@ class Sample(Mapping[str | int, Value]):
         return f"<Sample of unit {self.unit} at {self.time:.3f}: {self.missing or shown}>"
 
 
-class Batch(Sequence[Sample], Generic[Key]):
+class Batch(Sequence[Sample[Key]], Generic[Key]):
     """Samples in the order in which they were taken by the bus. They are decoded when they are first looked at."""
 
     def __init__(self, native: _native.Batch, targets: Sequence[Target]) -> None:
         self._native = native
         self._targets = targets
-        self._samples: list[Sample] | None = None
+        self._samples: list[Sample[Key]] | None = None
 
     def __len__(self) -> int:
         return len(self._native)
 
     @overload
-    def __getitem__(self, index: int) -> Sample: ...
+    def __getitem__(self, index: int) -> Sample[Key]: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Sample]: ...
-    def __getitem__(self, index: int | slice) -> Sample | list[Sample]:
+    def __getitem__(self, index: slice) -> list[Sample[Key]]: ...
+    def __getitem__(self, index: int | slice) -> Sample[Key] | list[Sample[Key]]:
         return self._decoded()[index]
 
-    def __iter__(self) -> Iterator[Sample]:
+    def __iter__(self) -> Iterator[Sample[Key]]:
         return iter(self._decoded())
 
     def __repr__(self) -> str:
@@ -214,7 +240,7 @@ class Batch(Sequence[Sample], Generic[Key]):
             frames[key] = frame
         return frames
 
-    def _decoded(self) -> list[Sample]:
+    def _decoded(self) -> list[Sample[Key]]:
         if self._samples is None:
             self._samples = [self._sample(*row) for row in self._native.samples()]
         return self._samples
@@ -227,7 +253,7 @@ class Batch(Sequence[Sample], Generic[Key]):
         late: int,
         values: list[Value] | None,
         missing: Exception | None,
-    ) -> Sample:
+    ) -> Sample[Key]:
         target = self._targets[index]
         if values is not None and target.plan is not None:
             values = target.plan.named(values)

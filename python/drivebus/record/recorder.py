@@ -237,7 +237,7 @@ class Recorder:
         if len(self._polls) > 1:
             samples.sort(key=lambda sample: sample.time)
         for sample in samples:
-            rows = list(self._witnesses[sample.drive].rows(sample))
+            rows = list(self._witnesses[sample.key].rows(sample))
             self.gaps += sum(row.event == "gap" for row in rows)
             self._series.add(rows)
 

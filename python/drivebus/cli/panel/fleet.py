@@ -296,7 +296,7 @@ class Line:
         while True:
             # In virtual time nothing is asked unless somebody waits for it.
             for sample in poll.batch(len(by_drive), timeout=_INTERVAL):
-                by_drive[sample.drive].put(sample)
+                by_drive[sample.key].put(sample)
             if beats % 4 == 0:
                 units = [member.session.unit for member in self.members]
                 self.links = {unit: self.bus.link(unit) for unit in units}
