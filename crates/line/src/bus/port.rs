@@ -288,11 +288,15 @@ impl Port {
 
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.
     pub(crate) fn now_of(&self, owner: &Owner) -> Instant {
-        self.clock.now().unwrap_or_else(|| {
-            let now = owner.now();
-            self.trace.has_come_to(now);
-            now
-        })
+        let of_line = owner.now();
+        match self.clock.now() {
+            // Who was told the line's own time must not be told an earlier one.
+            Some(now) => now.max(of_line),
+            None => {
+                self.trace.has_come_to(of_line);
+                of_line
+            }
+        }
     }
 
     pub(crate) fn no_turn(&self, why: NoTurn) -> Failure {
