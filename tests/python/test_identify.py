@@ -6,6 +6,7 @@ import asyncio
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import drivebus.aio
 from drivebus import Bus, DrivebusError, Identification, NotAllowed, Simulator
 from drivebus.identify import codes, identify
 from drivebus.line.asking import Read
+from drivebus.profile.facts import IdentificationCode
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
@@ -71,7 +73,7 @@ def test_how_sure_it_is(
 
 
 def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = {**codes.listed()[0x0180][0], "verified": False, "source": "a program"}
+    row = replace(codes.listed()[0x0180][0], verified=False, source="a program")
     monkeypatch.setattr(codes, "listed", lambda: {0x0180: [row]})
     bus.read(1, CODE)  # first contact is over
     answer(simulator, 1, 0x0180)
@@ -196,8 +198,7 @@ def test_a_code_of_several_families_with_profiles_is_not_enough(
     bus: Bus, monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...]
 ) -> None:
     rows = [
-        {"code": 0x010A, "family": name, "title": name.upper(), "shared": [], "verified": True, "source": "a manual"}
-        for name in names
+        IdentificationCode(0x010A, name, name.upper(), (), verified=True, note="", source="a manual") for name in names
     ]
     monkeypatch.setattr("drivebus.identify.codes.listed", lambda: {0x010A: rows})
     found = bus.identify(2)

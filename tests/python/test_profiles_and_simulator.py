@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
+from typing import Any
 
 import pytest
 
@@ -262,3 +263,18 @@ def test_the_functions_of_the_profile_are_there(bench: Bench) -> None:
         except Refused as error:
             refused.append((function, error.code))
     assert [function for function, code in refused if code == 0x01] == []
+
+
+@pytest.mark.parametrize("family", drivebus.profiles())
+def test_what_a_family_tells_is_frozen_and_has_its_attributes_as_keys(family: str) -> None:
+    profile = Profile.builtin(family)
+    told: list[Any] = [profile.requests(), profile.serial(), profile.memory(), *profile.control()]
+    told += [*profile.variants().values(), *profile.start_sequence(), *profile.identifications()]
+    for fact in filter(None, told):
+        for name, value in fact.items():
+            assert getattr(fact, name) == fact[name] == value
+            with pytest.raises(AttributeError):
+                setattr(fact, name, None)
+        with pytest.raises(KeyError):
+            fact["nothing"]
+        assert {**fact} == dict(zip(fact, fact.values(), strict=True))

@@ -344,7 +344,7 @@ def test_its_words_are_commands(drive: Drive, profile: Profile) -> None:
         64: "beep",
         128: "reset_fault",
     }
-    assert profile.start_sequence() == [
+    assert [dict(step) for step in profile.start_sequence()] == [
         {"word": 3, "label": "arm", "until": {"armed": 1, "warm": 0}, "mask": 3, "value": 1},
         {"word": 7, "label": "warm up", "until": {"armed": 1, "warm": 1}, "mask": 3, "value": 3},
     ]

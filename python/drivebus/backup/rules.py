@@ -111,9 +111,9 @@ class Rules:
 
     def last(self) -> list[str]:
         """What is written last, in this order: where the drive takes its commands and its setpoints from."""
-        sources = [item["code"] for item in self.profile.control()]
+        sources = [item.code for item in self.profile.control()]
         for name in self.profile.setpoint_names():
-            sources += [item["code"] for item in self.profile.needs(name)]
+            sources += [item.code for item in self.profile.needs(name)]
         wanted = list(self.profile.last_parameters())
         # What decides who is in command comes after what decides where the setpoint comes from.
         return [*reversed([code for code in dict.fromkeys(sources) if code not in wanted]), *wanted]

@@ -55,9 +55,9 @@ def place(unit: Unit, code: str, *, store: bool) -> int:
     memory = profile.memory()
     address = profile.address(code, store=store)
     plain = store and address == profile.describe(code).place
-    if memory is None or unit.evidence.allows(memory["reason"]) or plain:
+    if memory is None or unit.evidence.allows(memory.reason) or plain:
         return address
-    raise Unverified(f"how {profile.title} keeps a parameter is not verified: {memory['reason']}")
+    raise Unverified(f"how {profile.title} keeps a parameter is not verified: {memory.reason}")
 
 
 async def _look(unit: Unit, code: str) -> int:

@@ -265,7 +265,7 @@ def _load(session: Session, file: Path) -> drivebus.Backup:
 
 def _question(drive: drivebus.Drive, codes: list[str]) -> str:
     text = f"This writes {counted(len(codes), 'parameter')} to the drive's memory"
-    sources = [item["code"] for item in drive.profile.control() if item["code"] in codes]
+    sources = [item.code for item in drive.profile.control() if item.code in codes]
     if sources:
         text += (
             f", and with {', '.join(sources)} where it takes commands from: a drive that is told to run there may start"

@@ -203,6 +203,6 @@ def complete_variant(context: click.Context, _parameter: click.Parameter, incomp
         f"{name}={choice}"
         for profile in _profiles(context)
         for name, variant in profile.variants().items()
-        for choice in variant["choices"]
+        for choice in variant.choices
     )
     return [CompletionItem(text) for text in dict.fromkeys(chosen) if text.startswith(incomplete)]

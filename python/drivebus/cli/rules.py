@@ -5,7 +5,7 @@ Whatever may be used only with `unverified=True` says so, with its reason.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import drivebus
@@ -84,26 +84,26 @@ def _line(profile: drivebus.Profile) -> list[str]:
     functions = ", ".join(f"{function:02X}H" for function in profile.functions)
     words = "1 word" if profile.max_words == 1 else f"{profile.max_words} words"
     requests = profile.requests()
-    lines = [f"functions {functions}; {words} in one request at most{_doubt(requests['verified'], requests['note'])}"]
-    if requests["joined"]:
+    lines = [f"functions {functions}; {words} in one request at most{_doubt(requests.verified, requests.note)}"]
+    if requests.joined:
         lines.append("one request may write several parameters")
-    if not requests["across_groups"]:
+    if not requests.across_groups:
         lines.append("no read leaves its group of parameters")
     serial = profile.serial()
     if serial is None:
         return [*lines, "its factory setting is not known"]
-    unit = "" if serial["unit"] is None else f", unit {serial['unit']}"
-    doubt = "" if serial["verified"] else " [unverified]"
-    return [*lines, f"factory setting: {serial['baud_rate']} bit/s {serial['format']}{unit}{doubt}"]
+    unit = "" if serial.unit is None else f", unit {serial.unit}"
+    doubt = "" if serial.verified else " [unverified]"
+    return [*lines, f"factory setting: {serial.baud_rate} bit/s {serial.format}{unit}{doubt}"]
 
 
 def _identification(profile: drivebus.Profile) -> list[str]:
     lines = []
     for row in profile.identifications():
-        if row["family"] != profile.family:
+        if row.family != profile.family:
             continue
-        shared = f"; shared with {', '.join(row['shared'])}" if row["shared"] else ""
-        lines.append(f"{row['code']:04X}H is {row['title']}{shared}{_doubt(row['verified'], row['note'])}")
+        shared = f"; shared with {', '.join(row.shared)}" if row.shared else ""
+        lines.append(f"{row.code:04X}H is {row.title}{shared}{_doubt(row.verified, row.note)}")
     register = profile.role("identification")
     if lines and register is not None:
         lines.insert(0, f"asked in {_place(profile, register)}")
@@ -133,9 +133,9 @@ def _commands(profile: drivebus.Profile) -> list[str]:
                 doubt = " [unverified]" if command in reasons else ""
                 lines.append(f"{_code(code, command)}{_after(profile, command)}{doubt}")
     for number, step in enumerate(profile.start_sequence()):
-        until = ", ".join(f"{field} = {value}" for field, value in step["until"].items())
+        until = ", ".join(f"{field} = {value}" for field, value in step.until.items())
         when = "before a run or jog from rest:" if number == 0 else "then"
-        lines.append(f"{when} {_code(step['word'], step['label']).lstrip()}, until {until}")
+        lines.append(f"{when} {_code(step.word, step.label).lstrip()}, until {until}")
     why = [f"unverified, so not usable without --unverified: {reason}" for reason in dict.fromkeys(reasons.values())]
     return [*lines, *why]
 
@@ -189,14 +189,14 @@ def memory(profile: drivebus.Profile) -> list[str]:
     rule = profile.memory()
     if rule is None:
         return ["no write to RAM alone is known: every write of a parameter may wear EEPROM, and needs --store"]
-    ram = "RAM only, without it EEPROM too" if rule["means"] == "ram" else "EEPROM too, without it RAM only"
-    lines = [f"a parameter written with bit {rule['bit']} of its address set goes to {ram}"]
-    if rule["reason"] is not None:
-        lines.append(f"not usable without --unverified: {rule['reason']}")
+    ram = "RAM only, without it EEPROM too" if rule.means == "ram" else "EEPROM too, without it RAM only"
+    lines = [f"a parameter written with bit {rule.bit} of its address set goes to {ram}"]
+    if rule.reason is not None:
+        lines.append(f"not usable without --unverified: {rule.reason}")
     return lines
 
 
-def _needs(rows: list[dict[str, Any]]) -> list[str]:
+def _needs(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [
         f"{row['code']} = {row['value']}: {row['label']}{_doubt(row['verified'], row['note'])}" for row in rows
     ] or ["nothing known"]
@@ -215,9 +215,9 @@ def _setpoints(profile: drivebus.Profile) -> list[str]:
 
 def _variants(profile: drivebus.Profile) -> Iterator[str]:
     for name, variant in profile.variants().items():
-        reason = "" if variant["reason"] is None else f" [{variant['reason']}]"
-        yield f"{name}: {variant['parameter']} is one of {', '.join(variant['choices'])}{reason}"
-        yield f"  to say which: --variant {name}={next(iter(variant['choices']))}"
+        reason = "" if variant.reason is None else f" [{variant.reason}]"
+        yield f"{name}: {variant.parameter} is one of {', '.join(variant.choices)}{reason}"
+        yield f"  to say which: --variant {name}={next(iter(variant.choices))}"
 
 
 def _watchdog(profile: drivebus.Profile) -> list[str]:

@@ -404,8 +404,8 @@ def is_another(drive: drivebus.Drive) -> bool:
 
 def _is_told_by_code(profile: drivebus.Profile) -> bool:
     """Whether the family has identification codes, and shares none with another."""
-    own = [row for row in profile.identifications() if row["family"] == profile.family]
-    return bool(own) and not any(row["shared"] for row in own)
+    own = [row for row in profile.identifications() if row.family == profile.family]
+    return bool(own) and not any(row.shared for row in own)
 
 
 pass_session = click.make_pass_decorator(Session)

@@ -96,8 +96,8 @@ def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
     families = codes.families_in(rows)
     if not families or codes.are_own(profile, rows):
         return None
-    titles = [f"{row['title']} ({row['family']})" for row in rows]
-    also = [name for name in families if name not in [row["family"] for row in rows]]
+    titles = [f"{row.title} ({row.family})" for row in rows]
+    also = [name for name in families if name not in [row.family for row in rows]]
     known = shipped(families)
     then = Text("ask for it as that: ", asked_as(unit, known)) if known else "there is no profile of it yet"
     if profile.name not in profiles():

@@ -85,7 +85,7 @@ def _starts_or_keeps(profile: Profile, place: int) -> bool:
     memory = profile.memory()
     if not is_parameter or memory is None:
         return is_parameter
-    return bool(place >> memory["bit"] & 1) is _BIT_OF[memory["means"]]
+    return bool(place >> memory.bit & 1) is _BIT_OF[memory.means]
 
 
 def _both(profile: Profile, place: int) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from drivebus.identify.families import all_of, one_of, shipped
 from drivebus.identify.results import Identification
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile
+from drivebus.profile.facts import IdentificationCode
 
 __all__ = ["identify"]
 
@@ -66,18 +67,18 @@ async def identify(ask: Ask, unit: int) -> Identification:
     )
 
 
-def _by_code(unit: int, code: int, rows: list[codes.Row]) -> Identification:
+def _by_code(unit: int, code: int, rows: list[IdentificationCode]) -> Identification:
     """What *unit* is by the *rows* that are listed for its *code*."""
     families = tuple(codes.families_in(rows))
-    title = one_of(name for row in rows for name in (row["title"], *(row.get("shared") or ())))
-    printed = next((row for row in rows if row["verified"]), None)
+    title = one_of(name for row in rows for name in (row.title, *row.shared))
+    printed = next((row for row in rows if row.verified), None)
     says = f"it reports {code:04X}H"
     if printed is None:
-        certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0]['source']}"
+        certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0].source}"
     elif len(families) > 1:
         certainty, reason = "shared", f"{says}, which {all_of(families)} share"
     else:
-        certainty, reason = "certain", f"{says}, printed for {title} in {printed['source']}"
+        certainty, reason = "certain", f"{says}, printed for {title} in {printed.source}"
     return Identification(unit, families, families[0] if len(families) == 1 else None, code, title, certainty, reason)
 
 

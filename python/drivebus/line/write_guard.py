@@ -79,7 +79,7 @@ def _plain(family: Profile, address: int) -> int:
     if places.split(address)[0] != "holding":
         return address
     memory = family.memory()
-    return address & ~(1 << (15 if memory is None else memory["bit"]))
+    return address & ~(1 << (15 if memory is None else memory.bit))
 
 
 def prepare_guard() -> None:

@@ -6,14 +6,13 @@ written only for who says so.
 
 from __future__ import annotations
 
-from typing import Any
-
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameters, registers, sending
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
+from drivebus.profile.facts import Setting
 from drivebus.values import Control, ControlItem
 
 __all__ = [
@@ -67,7 +66,7 @@ async def prepare_control(
     for row, item in zip(wanted, await _check_items(unit, wanted), strict=True):
         if item.ok and not (store and sending.is_in_ram(unit, item.code)):
             continue
-        if item.actual is not None and row["by_hand"]:
+        if item.actual is not None and row.by_hand:
             raise NotReady(
                 Text(
                     f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
@@ -114,12 +113,12 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
         )
 
 
-async def check_set(unit: Unit, wanted: list[dict[str, Any]], what: str) -> None:
+async def check_set(unit: Unit, wanted: list[Setting], what: str) -> None:
     """Raises `NotAllowed` if one of *wanted* is surely not as it must be: then the unit does *what* is said.
 
     What no document proves, or may not be read, keeps nobody from starting a motor.
     """
-    sure = [row for row in wanted if row["verified"] or unit.unverified]
+    sure = [row for row in wanted if row.verified or unit.unverified]
     wrong = Control(item for item in await _check_items(unit, sure) if item.actual is not None and not item.ok)
     if len(wrong):
         raise NotReady(
@@ -133,41 +132,41 @@ async def check_set(unit: Unit, wanted: list[dict[str, Any]], what: str) -> None
         )
 
 
-def wanted_of_commands(unit: Unit) -> list[dict[str, Any]]:
+def wanted_of_commands(unit: Unit) -> list[Setting]:
     """What must be set for commands alone, whatever the setpoints."""
     names = unit.profile.setpoint_names()
-    of_setpoints = {row["code"] for name in names for row in unit.profile.needs(name)}
-    return [row for row in unit.profile.control() if row["code"] not in of_setpoints]
+    of_setpoints = {row.code for name in names for row in unit.profile.needs(name)}
+    return [row for row in unit.profile.control() if row.code not in of_setpoints]
 
 
-def wanted_always(unit: Unit) -> list[dict[str, Any]]:
+def wanted_always(unit: Unit) -> list[Setting]:
     """What must be set in any case, or the words of the profile are not where it has them."""
-    return [row for row in unit.profile.control() if row["always"]]
+    return [row for row in unit.profile.control() if row.always]
 
 
-def wanted_for(unit: Unit, setpoint: str | None) -> list[dict[str, Any]]:
+def wanted_for(unit: Unit, setpoint: str | None) -> list[Setting]:
     """What must be set for *setpoint*, in the order in which to set it."""
     known = unit.profile.setpoint_names()
     if setpoint is not None:
         checks.one_of("setpoint", setpoint, known)
     of_frequency = unit.profile.needs("frequency") if "frequency" in known else []
     needs = of_frequency if setpoint is None else unit.profile.needs(setpoint)
-    told = {row["code"] for row in (*of_frequency, *needs)}
-    return [*(row for row in unit.profile.control() if row["code"] not in told), *needs]
+    told = {row.code for row in (*of_frequency, *needs)}
+    return [*(row for row in unit.profile.control() if row.code not in told), *needs]
 
 
-async def _check_items(unit: Unit, wanted: list[dict[str, Any]]) -> Control:
-    codes = unit.evidence.readable(row["code"] for row in wanted)
+async def _check_items(unit: Unit, wanted: list[Setting]) -> Control:
+    codes = unit.evidence.readable(row.code for row in wanted)
     actual = await registers.snapshot(unit, *codes) if codes else {}
     return Control(
         ControlItem(
-            code=row["code"],
-            wanted=registers.value(unit, row["code"], row["value"]),
-            actual=actual.get(row["code"]),
-            ok=row["code"] in actual and actual[row["code"]] == row["value"],
-            verified=row["verified"],
-            label=row["label"],
-            note=(None if row["code"] in actual else unit.evidence.unreadable(row["code"])) or row["note"] or "",
+            code=row.code,
+            wanted=registers.value(unit, row.code, row.value),
+            actual=actual.get(row.code),
+            ok=row.code in actual and actual[row.code] == row.value,
+            verified=row.verified,
+            label=row.label,
+            note=(None if row.code in actual else unit.evidence.unreadable(row.code)) or row.note or "",
         )
         for row in wanted
     )

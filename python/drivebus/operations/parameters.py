@@ -118,7 +118,7 @@ def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
     What narrows another one's range does not share its request: in which order a drive checks the words is not printed.
     """
     profile, last = unit.profile, run[-1]
-    if item.address != last.address + 1 or len(run) == profile.max_words or not profile.requests()["joined"]:
+    if item.address != last.address + 1 or len(run) == profile.max_words or not profile.requests().joined:
         return False
     alone = unit.evidence.once(_alone)
     if not all(_is_plain(unit, each) and sending.key(each.known) not in alone for each in (last, item)):
@@ -143,14 +143,14 @@ def _is_plain(unit: Unit, item: Planned) -> bool:
 def _alone(evidence: Evidence) -> frozenset[str]:
     """Parameters that decide who commands the drive, or how the line is set."""
     profile = evidence.profile
-    names = [*profile.serial_parameters(), *(need["code"] for need in profile.control())]
+    names = [*profile.serial_parameters(), *(need.code for need in profile.control())]
     return frozenset(sending.key(profile.describe(name)) for name in names)
 
 
 def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
     """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
     for variant, rule in variants.rules(unit).items():
-        parameter = sending.key(unit.profile.describe(rule["parameter"]))
+        parameter = sending.key(unit.profile.describe(rule.parameter))
         name = next((name for name in wanted if sending.key(unit.profile.describe(name)) == parameter), None)
         if name is None:
             continue
@@ -162,7 +162,7 @@ def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
                 unit=unit.address,
             )
         chosen = unit.profile.variants_chosen.get(variant)
-        if chosen is not None and unit.profile.encode(name, wanted[name]) != rule["choices"][chosen]:
+        if chosen is not None and unit.profile.encode(name, wanted[name]) != rule.choices[chosen]:
             raise BadArgument(
                 Text(
                     f"{name} = {checks.shown(wanted[name])} would change the {variant} of unit {unit.address}, which "
@@ -204,7 +204,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
     if known.kind == "parameter" and (address != known.place or not store):
         memory = unit.profile.memory()
         kept = "EEPROM" if store else "RAM"
-        reason = None if memory is None else memory["reason"]
+        reason = None if memory is None else memory.reason
         unit.evidence.rule(f"how {unit.profile.title} keeps a parameter in {kept}", reason)
     return Planned(known, name, address, raw)
 

@@ -92,7 +92,7 @@ def readable(unit: Unit, *names: str) -> list[str]:
             rule = variants.rules(unit)[variant]
             raise BadArgument(
                 Text(
-                    f"what {name} means depends on {rule['parameter']} of unit {unit.address}: give ",
+                    f"what {name} means depends on {rule.parameter} of unit {unit.address}: give ",
                     variants.given(unit, variant),
                 ),
                 unit=unit.address,

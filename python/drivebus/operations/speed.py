@@ -41,14 +41,14 @@ async def ramp(unit: Unit, *, urgent: bool) -> Ramp:
     """How a stop slows the motor down, and who else may, as the drive's parameters say it."""
     time, start = unit.profile.role("deceleration"), unit.profile.role("ramp_start")
     wanted = control.wanted_for(unit, None)
-    codes = [row["code"] for row in wanted]
+    codes = [row.code for row in wanted]
     readable = unit.evidence.readable([*codes, *(name for name in (time, start) if name)])
     try:
         told = await _told(unit, readable, urgent=urgent)
     except (NoAnswer, BadAnswer, Refused):
         told = {}  # then its standstill has to prove it
     seconds, hz = float(told.get(time or "", 0.0)), float(told.get(start or "", 0.0))
-    only_by_bus = bool(wanted) and all(told.get(row["code"]) == row["value"] for row in wanted)
+    only_by_bus = bool(wanted) and all(told.get(row.code) == row.value for row in wanted)
     return Ramp(hz / seconds if hz > 0 and seconds > 0 else None, only_by_bus)
 
 

@@ -96,7 +96,7 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
             unit=unit.address,
         )
     if by_bus and seen.source is None:
-        left = [row for row in control.wanted_of_commands(unit) if not row["always"]]
+        left = [row for row in control.wanted_of_commands(unit) if not row.always]
         await control.check_set(unit, left, "does not take its commands from the bus")
     return seen
 

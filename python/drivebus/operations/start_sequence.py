@@ -6,15 +6,13 @@ which word it was given last; a start that is always the same costs a few exchan
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
 from drivebus.operations import commands, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
+from drivebus.profile.facts import StartStep
 
 __all__ = ["check_seen", "lead_up"]
 
@@ -58,7 +56,7 @@ class _Step:
         is_first: Whether nothing was sent before it.
     """
 
-    def __init__(self, unit: Unit, command: str, step: Mapping[str, Any], halts_before: int, *, is_first: bool) -> None:
+    def __init__(self, unit: Unit, command: str, step: StartStep, halts_before: int, *, is_first: bool) -> None:
         self._unit, self._command, self._step = unit, command, step
         self._halts_before, self._is_first = halts_before, is_first
         self._called = f"{step['label']} ({step['word']:04X}H)"
@@ -68,7 +66,7 @@ class _Step:
         unit = self._unit
         address, _ = unit.profile.command(self._command)
         try:
-            await words.write(unit, address, self._step["word"])
+            await words.write(unit, address, self._step.word)
         except LINE_ERRORS as error:
             if error.started is None and self._is_first:
                 raise
@@ -83,7 +81,7 @@ class _Step:
                 if seen.tripped:
                     trip = f"it is in fault {seen.fault or '(not named)'} since {self._called} was sent"
                     raise self._failed(Text(f"{trip}. Remove the cause, then ", call("reset_fault")))
-                if seen.word is not None and seen.word & self._step["mask"] == self._step["value"]:
+                if seen.word is not None and seen.word & self._step.mask == self._step.value:
                     return
                 last = self._told(seen)
             except (NoAnswer, BadAnswer, Refused) as error:
@@ -102,7 +100,7 @@ class _Step:
         if name is None or word is None:
             return f"its state is not known: {seen}"
         fields = self._unit.profile.fields(name, word)
-        wanted = {field: self._unit.profile.fields(name, self._step["value"])[field] for field in self._step["until"]}
+        wanted = {field: self._unit.profile.fields(name, self._step.value)[field] for field in self._step.until}
         differ = [
             f"{field} {fields[field]} and not {label}" for field, label in wanted.items() if fields[field] != label
         ]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from typing import Any
 
 from drivebus.advice import Advice, Text
 from drivebus.errors import NotReady
 from drivebus.operations.unit import Unit
 from drivebus.operations.words import read_words
 from drivebus.profile.evidence import Evidence, not_verified
+from drivebus.profile.facts import Variant
 
 __all__ = ["is_open", "rules", "settled", "undecided"]
 
 
-def rules(unit: Unit) -> Mapping[str, dict[str, Any]]:
+def rules(unit: Unit) -> Mapping[str, Variant]:
     """Each variant of the family, with the parameter that decides it and what that may say."""
     return unit.evidence.once(_rules)
 
@@ -50,12 +50,12 @@ def given(unit: Unit, variant: str) -> Text:
 async def _chosen(unit: Unit, variant: str) -> str:
     """What the drive's own parameter says of *variant*."""
     rule = rules(unit)[variant]
-    parameter, choices = rule["parameter"], rule["choices"]
+    parameter, choices = rule.parameter, rule.choices
     says = Text(given(unit, variant), " says which")
-    if not unit.evidence.allows(rule["reason"]):
+    if rule.reason is not None and not unit.evidence.allows(rule.reason):
         raise not_verified(
             f"what {parameter} decides in {unit.profile.title}, and so what the word means (its {variant})",
-            Text(f"{rule['reason'].rstrip('.')}; ", says),
+            Text(f"{rule.reason.rstrip('.')}; ", says),
             unit.address,
         )
     unit.evidence.reads([parameter])
@@ -73,5 +73,5 @@ async def _chosen(unit: Unit, variant: str) -> str:
     )
 
 
-def _rules(evidence: Evidence) -> Mapping[str, dict[str, Any]]:
+def _rules(evidence: Evidence) -> Mapping[str, Variant]:
     return evidence.profile.variants()

@@ -12,6 +12,15 @@ from typing import Any
 
 from drivebus import _native, checks
 from drivebus.errors import BadArgument
+from drivebus.profile.facts import (
+    FactorySerial,
+    IdentificationCode,
+    Memory,
+    RequestRules,
+    Setting,
+    StartStep,
+    Variant,
+)
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
@@ -123,19 +132,14 @@ class Profile:
         """
         return self._native.parameter_groups()
 
-    def requests(self) -> dict[str, Any]:
-        """What else is known of requests: `across_groups`, `verified`, `note`, `source`.
+    def requests(self) -> RequestRules:
+        """What else is known of requests."""
+        return RequestRules(**self._native.requests())
 
-        `joined` is where it is printed that one 10H request may write several parameters; None where it is not.
-        """
-        return self._native.requests()
-
-    def serial(self) -> dict[str, Any] | None:
-        """How the factory sets the line, where that is printed.
-
-        Keys: `baud_rate`, `format`, `unit` (or None), `response_delay` in seconds, `verified`, `source`.
-        """
-        return self._native.serial()
+    def serial(self) -> FactorySerial | None:
+        """How the factory sets the line; None where that is not printed."""
+        known = self._native.serial()
+        return None if known is None else FactorySerial(**known)
 
     def counts(self) -> dict[str, dict[str, int]]:
         """How much is documented: `registers`, `parameters` and `faults`.
@@ -280,26 +284,19 @@ class Profile:
         """
         return self._native.command_registers()
 
-    def start_sequence(self) -> list[dict[str, Any]]:
-        """The words that come, in this order, before one that runs or jogs a motor at rest; none of most families.
-
-        Keys of each: `word`, `label`, `until` (fields of the state word, and what they must be before the next word is
-        sent), and the same as bits: `mask` and `value`.
-        """
-        return self._native.start_sequence()
+    def start_sequence(self) -> list[StartStep]:
+        """The words that come, in this order, before one that runs or jogs a motor at rest; none of most families."""
+        return [StartStep(**step) for step in self._native.start_sequence()]
 
     @property
     def command_address(self) -> int | None:
         """Where commands are written, as `address` tells places; None where the family has none."""
         return self._native.command_address
 
-    def memory(self) -> dict[str, Any] | None:
-        """Where a written parameter is kept: None where every write may wear EEPROM.
-
-        Keys: `bit` of the address, `means` (`"ram"` or `"eeprom"`: what a write with the bit reaches), `reason` (why
-        this is not verified, or None), `source`.
-        """
-        return self._native.memory()
+    def memory(self) -> Memory | None:
+        """Where a written parameter is kept: None where every write may wear EEPROM."""
+        known = self._native.memory()
+        return None if known is None else Memory(**known)
 
     def is_command(self, address: int, /) -> bool:
         """Whether a write to *address* can move a motor."""
@@ -329,17 +326,13 @@ class Profile:
         """What can be given over the bus beside commands, such as `"frequency"` and `"torque"`."""
         return self._native.setpoint_names()
 
-    def needs(self, setpoint: str, /) -> list[dict[str, Any]]:
-        """What must be set before the drive takes *setpoint*; items as of `control`."""
-        return self._native.needs(setpoint)
+    def needs(self, setpoint: str, /) -> list[Setting]:
+        """What must be set before the drive takes *setpoint*."""
+        return [Setting(**row) for row in self._native.needs(setpoint)]
 
-    def variants(self) -> dict[str, dict[str, Any]]:
-        """Parameters that decide what some registers mean, such as `{"speed_unit": {"parameter": "P30.14", …}}`.
-
-        Keys of each: `parameter`, `choices` (name: word of the parameter), `reason` (why those words are not verified,
-        or None), `source`.
-        """
-        return self._native.variants()
+    def variants(self) -> dict[str, Variant]:
+        """Parameters that decide what some registers mean, by what they decide, such as `"speed_unit"`."""
+        return {name: Variant(**row) for name, row in self._native.variants().items()}
 
     @property
     def variants_chosen(self) -> dict[str, str]:
@@ -354,9 +347,9 @@ class Profile:
         """
         return Profile(self._native.with_variants(chosen))
 
-    def control(self) -> list[dict[str, Any]]:
+    def control(self) -> list[Setting]:
         """What must be set before the drive obeys the bus, in the order in which to set it."""
-        return self._native.control()
+        return [Setting(**row) for row in self._native.control()]
 
     def fault_number(self, raw: int, /) -> int:
         """The number in the word of the present fault: its bit field `fault`, where it shares its word with others."""
@@ -390,12 +383,10 @@ class Profile:
         """The family that identification *code* names, as far as this profile knows; None if it does not."""
         return self._native.identify(code)
 
-    def identifications(self) -> list[dict[str, Any]]:
-        """The identification codes that this profile knows.
-
-        Keys of each: `code`, `family`, `title`, `shared` (what else reports it), `verified`, `note`, `source`.
-        """
-        return self._native.identifications()
+    def identifications(self) -> list[IdentificationCode]:
+        """The identification codes that this profile knows."""
+        rows = self._native.identifications()
+        return [IdentificationCode(**{**row, "shared": tuple(row["shared"])}) for row in rows]
 
     def signature(self) -> dict[str, list[int]] | None:
         """How a unit without a code is identified: the addresses that it `answers` and `refuses`, one word each."""

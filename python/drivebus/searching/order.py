@@ -32,7 +32,7 @@ def candidates(given: Settings, full: bool) -> Iterator[Settings]:
 def factory() -> list[Settings]:
     """The settings that drives leave their factories with, by their profiles; those of most families first."""
     each = [
-        Settings(known["baud_rate"], int(known["format"][0]), known["format"][1], int(known["format"][2]))
+        Settings(known.baud_rate, int(known.format[0]), known.format[1], int(known.format[2]))
         for known in (Profile.builtin(name).serial() for name in profiles())
         if known is not None
     ]
@@ -42,4 +42,4 @@ def factory() -> list[Settings]:
 def longest_delay() -> float:
     """Seconds that a drive as it leaves its factory takes at most before it answers."""
     known = (Profile.builtin(name).serial() for name in profiles())
-    return max(serial["response_delay"] or 0.0 for serial in known if serial is not None)
+    return max(serial.response_delay or 0.0 for serial in known if serial is not None)

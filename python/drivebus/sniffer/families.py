@@ -86,7 +86,7 @@ class Families:
             return
         first, count = place
         for address, word in enumerate(carried(answer, request) or [] if answer is not None else [], first):
-            names = shipped(dict.fromkeys(row["family"] for row in listed_at(address, word) if row["verified"]))
+            names = shipped(dict.fromkeys(row.family for row in listed_at(address, word) if row.verified))
             if len(names) == 1:
                 self._told[unit] = Profile.builtin(names[0])
         if answer is None:
