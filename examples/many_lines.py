@@ -24,7 +24,7 @@ async def watch(port: str, units: list[int]) -> None:
                 if isinstance(snapshot, drivebus.DrivebusError):
                     print(f"{port}, unit {drive.unit}: {snapshot}")  # the others go on
         stats = bus.stats()
-        print(f"{bus.port}: {stats['answers']} answers, {stats['timeouts']} time-outs")
+        print(f"{bus.port}: {stats.answers} answers, {stats.timeouts} time-outs")
 
 
 async def main(ports: list[str]) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from errno import EIO
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from drivebus.advice import Advice, Text
 
@@ -37,6 +37,20 @@ __all__ = [
     "Unverified",
     "WrongDrive",
 ]
+
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class Details(TypedDict, total=False):
+    """What every error may have beside its message: see `DrivebusError`."""
+
+    unit: int | None
+    request: bytes
+    raw: bytes
+    started: float | None
+    ended: float | None
 
 
 class DrivebusError(Exception):
@@ -99,7 +113,7 @@ class PortError(DrivebusError, OSError):
             yet. EINVAL: it cannot do what was asked of it. EIO: anything else.
     """
 
-    def __init__(self, message: str = "", *, errno: int | None = EIO, **details: Any) -> None:
+    def __init__(self, message: str = "", *, errno: int | None = EIO, **details: Unpack[Details]) -> None:
         super().__init__(message, **details)
         self.errno = errno
 
@@ -159,7 +173,7 @@ class Refused(DrivebusError):
         name: str = "",
         meaning: str = "",
         means: str = "not_now",
-        **details: Any,
+        **details: Unpack[Details],
     ) -> None:
         super().__init__(message, **details)
         self.code = code
@@ -200,7 +214,9 @@ class NotStopped(Unconfirmed):
 
     failures: dict[int, DrivebusError]
 
-    def __init__(self, message: str = "", *, failures: Mapping[int, DrivebusError] | None = None, **details: Any):
+    def __init__(
+        self, message: str = "", *, failures: Mapping[int, DrivebusError] | None = None, **details: Unpack[Details]
+    ):
         super().__init__(message, **details)
         self.failures = dict(failures or {})
 
@@ -234,7 +250,7 @@ class NotReady(NotAllowed):
 
     why: str
 
-    def __init__(self, message: str = "", *, why: str = "", **details: Any) -> None:
+    def __init__(self, message: str = "", *, why: str = "", **details: Unpack[Details]) -> None:
         super().__init__(message, **details)
         self.why = why
 

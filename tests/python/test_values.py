@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copy
 import pickle
+from typing import get_type_hints
 
 import pytest
 
+import drivebus
 from drivebus import Choice, Control, ControlItem, Fault, Link, Snapshot, State, Stats
 
 
@@ -37,9 +39,20 @@ def test_statistics_nest() -> None:
     stats = Stats({"requests": 3, "units": {1: {"requests": 2}}})
     assert stats.requests == stats["requests"] == 3
     assert stats.units[1].requests == 2
-    assert repr(stats) == "Stats(requests=3, units={1: Stats(requests=2)})"
+    assert repr(stats) == "Stats(requests=3, units={1: UnitStats(requests=2)})"
     with pytest.raises(AttributeError, match='does not hold "answers", only requests, units'):
         _ = stats.answers
+
+
+def test_statistics_have_what_their_types_say() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        bus.read(1, 0x2100)
+        stats = bus.stats()
+    assert set(stats) == {*get_type_hints(type(stats))} - {"_values"}
+    unit = stats.units[1]
+    assert set(unit) == {*get_type_hints(type(unit))} - {"_values"}
+    assert set(unit.round_trip) == {*get_type_hints(type(unit.round_trip))} - {"_values"}
+    assert all(type(unit[name]) is kind for name, kind in get_type_hints(type(unit)).items() if name in unit)
 
 
 @pytest.mark.parametrize(("state", "running"), [(State.FORWARD, True), (State.REVERSE, True), (State.FAULT, False)])

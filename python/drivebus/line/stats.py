@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 from drivebus.named import Named
 
-__all__ = ["Link", "Stats", "noisy"]
+__all__ = ["Latency", "Link", "ProgramStats", "Stats", "UnitStats", "noisy"]
 
 
 @dataclass(frozen=True)
@@ -43,26 +43,131 @@ def noisy(stats: Mapping[str, Any]) -> list[int]:
     return [unit for unit, figures in stats["units"].items() if is_noise(figures)]
 
 
-class Stats(Named[Any]):
-    """Counters and latencies: a mapping whose names are attributes too, nested where it is per unit.
+class Latency(Named[float]):
+    """Seconds that answers took; 0.0 each where none came.
 
-    Counters are ints, latencies seconds. `stats.answers`, `stats.units[1].timeouts`.
+    Attributes: *min*, *mean* and *max*.
     """
 
     __slots__ = ()
 
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        super().__init__(
-            {key: Stats.nested(value) if isinstance(value, Mapping) else value for key, value in values.items()}
-        )
-
-    @staticmethod
-    def nested(values: Mapping[Any, Any]) -> Any:
-        """A mapping by name becomes `Stats`; one by unit stays a dict of `Stats`."""
-        if all(isinstance(key, str) for key in values) and values:
-            return Stats(values)
-        return {key: Stats(value) if isinstance(value, Mapping) else value for key, value in values.items()}
+    min: float
+    mean: float
+    max: float
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={value!r}" for name, value in self.items())
-        return f"Stats({shown})"
+        return _shown(self)
+
+
+class UnitStats(Named[Any]):
+    """Counters of one unit, or of all on a line: a mapping whose names are attributes too.
+
+    Attributes:
+        requests: Requests that went out, probes included.
+        answers: Right answers.
+        refusals: Exceptions.
+        timeouts: Requests without an answer in time.
+        crc_errors: Answers whose CRC was wrong.
+        bad_answers: Whole frames that could not be the answer.
+        retries: Requests sent once more.
+        verified: Reads asked twice, because the answer to another one might have been taken for theirs.
+        not_asked: Calls that were not sent, because the unit was silent before and others use the line.
+        resyncs: Requests that found the way back after one was left open, such as echoes.
+        late_replies: Whole frames that came before the request went out, or that the unit still owed.
+        foreign_frames: Whole frames of others, or of another function, while an answer was waited for.
+        noise_bytes: Bytes that belong to no frame.
+        noise_idle: Those of them that are 00H or FFH.
+        own_echoes: Requests that the adapter sent back.
+        other_answers: Requests without an answer in time, but with something else in its place. They count as
+            time-outs, too.
+        other_functions: Those of them to which the unit sent a whole frame of another function.
+        other_transactions: Those of them that were answered under another transaction number of Modbus TCP.
+        noise_events: How often bytes came that belong to no frame.
+        round_trip: From the first bit of the request to the last byte of the answer.
+        delay: From the last character of the request to the first of the answer: how long unit, adapter and this
+            computer took.
+    """
+
+    __slots__ = ()
+
+    requests: int
+    answers: int
+    refusals: int
+    timeouts: int
+    crc_errors: int
+    bad_answers: int
+    retries: int
+    verified: int
+    not_asked: int
+    resyncs: int
+    late_replies: int
+    foreign_frames: int
+    noise_bytes: int
+    noise_idle: int
+    own_echoes: int
+    other_answers: int
+    other_functions: int
+    other_transactions: int
+    noise_events: int
+    round_trip: Latency
+    delay: Latency
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        super().__init__({key: self._nested(key, value) for key, value in values.items()})
+
+    def _nested(self, name: str, value: Any) -> Any:
+        return Latency(value) if name in ("round_trip", "delay") else value
+
+    def __repr__(self) -> str:
+        return _shown(self)
+
+
+class ProgramStats(TypedDict):
+    """What one program asked of a port that it shares with others.
+
+    Keys: *name*, as it calls itself; *process*, its number in the system; *here*, whether it still uses the port;
+    *calls* that it wanted, and how many of them were *answered*.
+    """
+
+    name: str
+    process: int
+    here: bool
+    calls: int
+    answered: int
+
+
+class Stats(UnitStats):
+    """Counters of a line: those of all its units together, and of each in `units`.
+
+    `stats.answers`, `stats.units[1].timeouts`.
+
+    Attributes:
+        reconnects: How often the port was opened again after it was lost.
+        settings_changed: How often another program had changed the settings of the open port.
+        notes: What the port says of itself, in words.
+        wills: What was halted for programs that are gone, in words.
+        hints: What the counters most likely mean, and what to do, in words.
+        hint_names: The names of the hints.
+        programs: The programs that use the port through the one that has it, since that opened it.
+        units: The counters of each unit, by its address.
+    """
+
+    __slots__ = ()
+
+    reconnects: int
+    settings_changed: int
+    notes: list[str]
+    wills: list[str]
+    hints: list[str]
+    hint_names: list[str]
+    programs: list[ProgramStats]
+    units: dict[int, UnitStats]
+
+    def _nested(self, name: str, value: Any) -> Any:
+        if name == "units":
+            return {address: UnitStats(figures) for address, figures in value.items()}
+        return super()._nested(name, value)
+
+
+def _shown(values: Mapping[str, object]) -> str:
+    return f"{type(values).__name__}({', '.join(f'{name}={value!r}' for name, value in values.items())})"

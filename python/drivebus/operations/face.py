@@ -107,7 +107,7 @@ def blocking(
 
 def awaited(
     operation: Callable[Concatenate[Unit, _P], Coroutine[Any, Any, _R]],
-) -> Callable[Concatenate[Any, _P], Coroutine[Any, Any, _R]]:
+) -> Callable[Concatenate[Any, _P], Coroutine[None, None, _R]]:
     """The method that awaits *operation*, with its name, its signature and its docstring."""
 
     @functools.wraps(operation)
