@@ -289,14 +289,12 @@ impl Port {
     /// As [`now`](Self::now), for who holds the owner; also while no line is open.
     pub(crate) fn now_of(&self, owner: &Owner) -> Instant {
         let of_line = owner.now();
-        match self.clock.now() {
-            // Who was told the line's own time must not be told an earlier one.
-            Some(now) => now.max(of_line),
-            None => {
-                self.trace.has_come_to(of_line);
-                of_line
-            }
+        // Who was told the line's own time must not be told an earlier one.
+        if let Some(now) = self.clock.now() {
+            return now.max(of_line);
         }
+        self.trace.has_come_to(of_line);
+        of_line
     }
 
     pub(crate) fn no_turn(&self, why: NoTurn) -> Failure {
