@@ -18,7 +18,7 @@ class Advice:
 
     Attributes:
         name: What it is called, such as `"force"` or `"reset_fault"`.
-        value: The value of the argument, or the first argument of the call; None where any or none is meant.
+        value: The value of the argument, or what the call is given; None where any or none is meant.
         written: How it is written in Python: `"force=True"`, `"reset_fault()"`.
     """
 
@@ -35,10 +35,9 @@ def argument(name: str, value: object = None, written: str = "") -> Advice:
     return Advice(name, value, f"{name}={written or ('…' if value is None else _quoted(value))}")
 
 
-def call(name: str, *given: object) -> Advice:
+def call(name: str) -> Advice:
     """A call of *name*, as a method of what is talked about."""
-    value = given[0] if given else None
-    return Advice(name, value, f"{name}({', '.join(map(str, given))})")
+    return Advice(name, None, f"{name}()")
 
 
 class Text(str):

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 __all__ = ["Named"]
 
+K = TypeVar("K", bound="str | int")
 T = TypeVar("T")
 
 
-class Named(Mapping[str, T]):
+class Named(Mapping[K, T]):
     """Reads *values*, and never changes them."""
 
     __slots__ = ("_values",)
 
-    def __init__(self, values: Mapping[str, T]) -> None:
-        self._values = dict(values)
+    def __init__(self, values: Mapping[K, T]) -> None:
+        self._values: dict[Any, T] = dict(values)
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: K) -> T:
         return self._values[name]
 
-    def __iter__(self) -> Iterator[str]:
+    def __iter__(self) -> Iterator[K]:
         return iter(self._values)
 
     def __len__(self) -> int:
@@ -33,8 +34,13 @@ class Named(Mapping[str, T]):
         try:
             return self._values[name]
         except KeyError:
-            kind = type(self).__name__
-            raise AttributeError(f'this {kind} does not hold "{name}", only {", ".join(self._values)}') from None
+            raise AttributeError(self._lacks(name)) from None
+
+    def _lacks(self, name: str) -> str:
+        return f'this {type(self).__name__} does not hold "{name}", only {", ".join(map(str, self._values))}'
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._values]
+        return [*super().__dir__(), *(name for name in self._values if isinstance(name, str))]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.items())})"

@@ -6,9 +6,7 @@ of the address: coil 0001H is 0x1_0001, discrete input 0001H 0x2_0001, input reg
 
 from __future__ import annotations
 
-from typing import Any
-
-__all__ = ["BITS", "TABLES", "WRITABLE", "at", "place", "shown", "split"]
+__all__ = ["BITS", "TABLES", "WRITABLE", "place", "shown", "split"]
 
 TABLES = ("holding", "input", "coil", "discrete")
 """The four tables of the Modbus specification, the one that is meant where nothing is said first."""
@@ -34,15 +32,6 @@ def place(table: str | None, address: int) -> int:
 def split(place: int) -> tuple[str, int]:
     """Table and address of *place*."""
     return _NAMES.get(place >> 16, "holding"), place & 0xFFFF
-
-
-def at(place: int) -> tuple[int, dict[str, Any]]:
-    """The address of *place*, and the keyword that names its table to a bus.
-
-    None for holding registers, which a bus reads and writes where nothing is said.
-    """
-    table, address = split(place)
-    return address, {} if table == "holding" else {"table": table}
 
 
 def shown(place: int) -> str:

@@ -365,7 +365,7 @@ class WatchdogSettings:
         return tuple(self.actions) if self.action is not None else ("trip",)
 
 
-class Snapshot(Named[Value]):
+class Snapshot(Named[str, Value]):
     """Values read together: a mapping whose names are attributes too.
 
     Attributes:

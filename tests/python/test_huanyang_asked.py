@@ -244,8 +244,8 @@ class TestTraps:
                 asked |= set() if place is None else {place}
         functions = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
         for place in asked:
-            address, table = places.at(place)
-            function = functions[str(table.get("table", "holding"))]
+            table, address = places.split(place)
+            function = functions[table]
             for unit in range(1, 248):
                 drive = Drive(unit)
                 for count in (1, 2):

@@ -14,6 +14,7 @@ from typing import Any
 import click
 
 import drivebus
+from drivebus.advice import Text
 from drivebus.cli.advice import in_commands
 from drivebus.cli.anywhere import in_front
 from drivebus.cli.choose import chosen, complete_drive, complete_port
@@ -37,8 +38,7 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
     """A warning is one line as well: where in this program it came from helps nobody."""
     # Whoever has gone and reads it no more must not keep a stop from being sent.
     with suppress(OSError):
-        said = message.args[0] if isinstance(message, Warning) and message.args else message
-        remark(f"Warning: {in_commands(str(said) if isinstance(said, Warning) else said)}")
+        remark(in_commands(Text("Warning: ", *(message.args[:1] if isinstance(message, Warning) else [message]))))
 
 
 def _forget_what_is_not_shown() -> None:

@@ -12,6 +12,7 @@ from drivebus import _native, checks
 from drivebus.errors import BadArgument, DrivebusError, Refused
 from drivebus.line.addresses import Addresses
 from drivebus.line.units import units_of
+from drivebus.named import Named
 from drivebus.profile import Profile
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Value
@@ -95,7 +96,7 @@ class Target(NamedTuple):
         return {name: unit for name, unit in units.items() if unit}
 
 
-class Sample(Mapping[str | int, Value], Generic[Key]):
+class Sample(Named[str | int, Value], Generic[Key]):
     """The values of one drive in one cycle: a mapping of names (without a profile: of addresses) to values.
 
     Names are attributes, too: `sample["output_current"]` is `sample.output_current`. A missing sample is empty, and so
@@ -113,7 +114,7 @@ class Sample(Mapping[str | int, Value], Generic[Key]):
         missing: The error that there was instead of an answer, or None. It is not raised.
     """
 
-    __slots__ = ("_values", "answered", "drive", "key", "late", "missing", "time", "unit")
+    __slots__ = ("answered", "drive", "key", "late", "missing", "time", "unit")
 
     key: Key
     unit: int
@@ -132,6 +133,7 @@ class Sample(Mapping[str | int, Value], Generic[Key]):
         values: list[Value] | None,
         missing: DrivebusError | None,
     ) -> None:
+        super().__init__({} if values is None else dict(zip(target.names, values, strict=True)))
         self.key = target.key
         self.unit = target.unit
         self.drive = None if target.drive is None else target.key
@@ -139,36 +141,19 @@ class Sample(Mapping[str | int, Value], Generic[Key]):
         self.answered = answered
         self.late = late
         self.missing = missing
-        self._values = {} if values is None else dict(zip(target.names, values, strict=True))
 
     def __getitem__(self, name: str | int) -> Value:
         try:
-            return self._values[name]
+            return super().__getitem__(name)
         except KeyError:
             if self.missing is not None:
                 raise KeyError(f"{name!r}: this sample is missing: {self.missing}") from None
             raise
 
-    def __getattr__(self, name: str) -> Value:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            if self.missing is not None:
-                told = f"this sample is missing, and has no {name}: {self.missing}"
-            else:
-                told = f'this Sample does not hold "{name}", only {", ".join(map(str, self._values))}'
-            raise AttributeError(told) from None
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(name for name in self._values if isinstance(name, str))]
-
-    def __iter__(self) -> Iterator[str | int]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
+    def _lacks(self, name: str) -> str:
+        if self.missing is None:
+            return super()._lacks(name)
+        return f"this sample is missing, and has no {name}: {self.missing}"
 
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value}" for name, value in self.items())

@@ -43,7 +43,7 @@ def noisy(stats: Mapping[str, Any]) -> list[int]:
     return [unit for unit, figures in stats["units"].items() if is_noise(figures)]
 
 
-class Latency(Named[float]):
+class Latency(Named[str, float]):
     """Seconds that answers took; 0.0 each where none came.
 
     Attributes: *min*, *mean* and *max*.
@@ -55,11 +55,8 @@ class Latency(Named[float]):
     mean: float
     max: float
 
-    def __repr__(self) -> str:
-        return _shown(self)
 
-
-class UnitStats(Named[Any]):
+class UnitStats(Named[str, Any]):
     """Counters of one unit, or of all on a line: a mapping whose names are attributes too.
 
     Attributes:
@@ -118,9 +115,6 @@ class UnitStats(Named[Any]):
     def _nested(self, name: str, value: Any) -> Any:
         return Latency(value) if name in ("round_trip", "delay") else value
 
-    def __repr__(self) -> str:
-        return _shown(self)
-
 
 class ProgramStats(TypedDict):
     """What one program asked of a port that it shares with others.
@@ -167,7 +161,3 @@ class Stats(UnitStats):
         if name == "units":
             return {address: UnitStats(figures) for address, figures in value.items()}
         return super()._nested(name, value)
-
-
-def _shown(values: Mapping[str, object]) -> str:
-    return f"{type(values).__name__}({', '.join(f'{name}={value!r}' for name, value in values.items())})"
