@@ -132,6 +132,56 @@ fn a_late_answer_that_comes_damaged_is_owed_no_more_where_none_comes_again() {
     }
 }
 
+/// The late answer of unit 4 to a read of two words comes as `bytes` while nothing is in flight; `other` is open besides.
+fn owed_after(bytes: &[u8], other: Option<(u8, Request<'_>)>) -> bool {
+    let mut asker = known();
+    asker.leaves_open_for(5_000, unit(4), &read(2), Duration::from_millis(500));
+    if let Some((raw, request)) = other {
+        asker.leaves_open_for(5_000, unit(raw), &request, Duration::from_millis(500));
+    }
+    asker.master.receive(ms(6_000), bytes);
+    let _ = asker.master.poll(ms(6_000 + PAUSE));
+    asker.sends(6_100, unit(9), &read(6), TIMEOUT);
+    asker.master.attribution(ms(6_100), unit(4), &read(2)).may_be_mistaken()
+}
+
+/// Seventeen bytes are too many for the eight that came, and a beginning of which nothing is right is another's.
+#[test]
+fn a_late_answer_is_told_from_others_by_its_length_and_its_beginning() {
+    let of_input = |count| Request::read_of(Table::Input, 0, count).unwrap();
+    for (raw, request, is_owed) in
+        [(5, read(6), false), (5, of_input(3), false), (5, read(3), true), (4, of_input(3), true)]
+    {
+        assert_eq!(owed_after(&damaged(4), Some((raw, request))), is_owed, "{request:?} of unit {raw} is open");
+    }
+}
+
+#[test]
+fn a_late_answer_is_told_by_two_of_the_first_three_of_its_bytes() {
+    let mut bytes = damaged(4);
+    assert!(!owed_after(&bytes, None));
+    bytes[0] = 0x55;
+    assert!(!owed_after(&bytes, None));
+    bytes[1] = 0xAA;
+    assert!(owed_after(&bytes, None));
+}
+
+/// More is open than is kept: what came damaged may be left of what was forgotten, until that cannot come any more.
+#[test]
+fn a_late_answer_that_comes_damaged_stays_owed_while_it_may_be_a_forgotten_one() {
+    for (now, is_owed) in [(before(ms(8_000)), true), (ms(8_000), false)] {
+        let mut asker = known();
+        asker.leaves_open(5_000, unit(1), &read(1));
+        asker.leaves_open(5_001, unit(4), &read(16));
+        for raw in 101..=131 {
+            asker.leaves_open(5_001, unit(raw), &read(1));
+        }
+        asker.master.receive(ms(7_980), &words(unit(4), 16, 7).as_bytes()[..36]);
+        let _ = asker.master.poll(now);
+        assert_eq!(asker.master.attribution(now, unit(4), &read(16)).may_be_mistaken(), is_owed, "at {now:?}");
+    }
+}
+
 /// An answer of which more bytes came than it has is all there.
 #[test]
 fn what_is_longer_than_an_open_answer_leaves_none_of_that_to_come() {
