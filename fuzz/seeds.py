@@ -220,14 +220,14 @@ def buses() -> dict[str, bytes]:
 
 def guests() -> dict[str, bytes]:
     """For `guest`: whether it is greeted rightly, then messages as `postcard` writes them, each behind its length."""
-    calls, listening, overhearing, figures, link, word, reconnects, wills, cancel = range(9)
+    calls, listening, overhearing, figures, link, word, reconnects, wills, cancel, halts = range(10)
     second = b"\x80\x94\xeb\xdc\x03"  # nanoseconds, seven bits a byte
     for_ever = b"\xff" * 9 + b"\x01"
 
     def say(*messages: bytes) -> bytes:
         return b"\1" + b"".join(bytes([len(message)]) + message for message in messages)
 
-    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0\0") -> bytes:
+    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0\0\0") -> bytes:
         request = bytes([calls, unit, len(pdu)]) + pdu
         return request + b"\0" + timeout + b"\0\0\0" + bytes([priority, 2]) + more
 
@@ -243,10 +243,11 @@ def guests() -> dict[str, bytes]:
         "stop": say(call(bytes([6, 0x20, 0, 0, 5]), priority=0)),
         "write-many": say(call(many, priority=1)),
         "echo": say(call(echo)),
-        "read-back": say(call(write, priority=1, more=b"\0\1\x8b\x80\2\0\0")),
-        "on-a-connection": say(call(write, priority=1, more=b"\0\0\1\0\0")),
-        "verified": say(call(read, more=b"\1\0\0\0")),
-        "says-meanings": say(call(read, more=b"\0\0\0\1\2\1\2\6\xff")),
+        "read-back": say(call(write, priority=1, more=b"\0\1\x8b\x80\2\0\0\0")),
+        "on-a-connection": say(call(write, priority=1, more=b"\0\0\1\0\0\0")),
+        "unless-halted": say(bytes([halts, 1]), call(write, priority=1, more=b"\0\0\0\1\0\0")),
+        "verified": say(call(read, more=b"\1\0\0\0\0")),
+        "says-meanings": say(call(read, more=b"\0\0\0\0\1\2\1\2\6\xff")),
         "nobody": say(call(read, unit=9)),
         "broadcast": say(call(write, unit=0, priority=1)),
         "no-unit": say(call(read, unit=250)),

@@ -305,6 +305,7 @@ class Bus:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        halts: int | None = None,
         table: str = "holding",
     ) -> None:
         """06H (int) or 10H (sequence); a `coil` 05H. Sent once, *urgent* before all who wait, whatever is in doubt.
@@ -317,6 +318,9 @@ class Bus:
         """What *unit* needs otherwise than the bus, in seconds; None keeps what the bus has."""
     def set_meanings(self, unit: int, profile: Profile, /) -> None:
         """The exceptions of *unit* mean what *profile* says; until then what the specification does."""
+    def halts(self, unit: int, /) -> int:
+        """A number that is another one each time *unit* is told to halt; see `Requests.halts`."""
+
     def link(self, unit: int, /) -> tuple[int, int]:
         """Of the last exchanges with *unit*, ten at most: how many brought an answer, and how many there were."""
     def leave_will(
@@ -427,6 +431,7 @@ class Requests:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        halts: int | None = None,
         table: str = "holding",
     ) -> Asked[None]: ...
     def broadcast(self, address: int, value: int | Sequence[int], /) -> Asked[None]: ...
@@ -441,6 +446,7 @@ class Requests:
         timeout: float | None = None,
         in_doubt: bool = False,
     ) -> Asked[bytes]: ...
+    def halts(self, unit: int, /) -> Asked[int]: ...
     def link(self, unit: int, /) -> Asked[tuple[int, int]]: ...
     def sleep(self, seconds: float, /) -> Asked[None]: ...
     def listen(self, seconds: float, /) -> Asked[list[tuple[float, bytes]]]: ...

@@ -13,6 +13,7 @@
 //! | `shared` | a port, and with whom it is shared |
 //! | `through` | being served by another program |
 //! | `halts` | halting what a program ran that is gone |
+//! | `halts_told` | how often each unit was told to halt |
 //! | `workers` | the threads that carry out errands |
 
 pub(crate) mod call;
@@ -21,6 +22,7 @@ pub(crate) mod errand;
 mod figures;
 #[cfg(all(unix, feature = "share"))]
 mod halts;
+mod halts_told;
 #[cfg(all(unix, feature = "share"))]
 mod host;
 mod listen;
@@ -216,8 +218,29 @@ impl Bus {
         if !self.shared.port.is_of_this_process() {
             return Some(Link::default());
         }
-        let is_elsewhere = self.shared.sharing.as_ref().is_some_and(|sharing| sharing.is_guest());
-        (!is_elsewhere).then(|| self.shared.port.figures.link(unit))
+        (!self.is_elsewhere()).then(|| self.shared.port.figures.link(unit))
+    }
+
+    /// A number that is another one each time `unit` is told to halt over this line, by whichever program: by a write that is
+    /// a [stop](crate::Priority::Stop). For [`CallOptions::halts`](crate::CallOptions::halts). Where another program has the
+    /// port, it is asked, a second at most.
+    pub fn halts(&self, unit: UnitAddress) -> u64 {
+        if !self.port().is_of_this_process() {
+            return 0;
+        }
+        self.shared.halts(unit)
+    }
+
+    /// As [`halts`](Self::halts), for who waits for nobody: `None` where another program has the port, and would be asked.
+    pub fn halts_if_here(&self, unit: UnitAddress) -> Option<u64> {
+        if !self.port().is_of_this_process() {
+            return Some(0);
+        }
+        (!self.is_elsewhere()).then(|| self.shared.port.halts.of(unit))
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        self.shared.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`]. Where another program has the port, it is asked, a

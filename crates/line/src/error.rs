@@ -197,6 +197,13 @@ pub enum Failure {
         /// The number that it had.
         process: u32,
     },
+    /// The unit was told to halt since the request was decided on, or the port went to another program, which knows nothing of
+    /// that. Nothing was sent.
+    #[error("unit {unit} was told to stop meanwhile, or the port changed hands; nothing was sent")]
+    Halted {
+        /// The unit.
+        unit: u8,
+    },
     /// The request cannot be sent like this. Nothing was sent.
     #[error("{0}")]
     NotBegun(BeginError),

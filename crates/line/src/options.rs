@@ -205,6 +205,10 @@ pub struct CallOptions {
     /// How often the port had been opened again ([`Stats::reconnects`](crate::Stats::reconnects)) when the caller saw who
     /// answers. Where it was opened again since, nothing is sent: another unit may have the address now.
     pub connection: Option<u64>,
+    /// How often the unit had been told to halt ([`Bus::halts`](crate::Bus::halts)) when the caller decided on this request.
+    /// Where it was told to since, nothing is sent ([`Failure::Halted`](crate::Failure::Halted)): for what starts a motor,
+    /// so that a stop which overtook it stays the last word. What is a stop itself goes out in any case.
+    pub halts: Option<u64>,
 }
 
 impl CallOptions {
@@ -253,6 +257,12 @@ impl CallOptions {
     #[must_use]
     pub fn connection(self, connection: impl Into<Option<u64>>) -> Self {
         Self { connection: connection.into(), ..self }
+    }
+
+    /// Sets [`halts`](Self#structfield.halts).
+    #[must_use]
+    pub fn halts(self, halts: impl Into<Option<u64>>) -> Self {
+        Self { halts: halts.into(), ..self }
     }
 }
 

@@ -76,10 +76,11 @@ pub(crate) fn write_options(
     timeout: Option<f64>,
     read_back: Option<&Bound<'_, PyAny>>,
     connection: Option<u64>,
+    halts: Option<u64>,
 ) -> PyResult<CallOptions> {
     let timeout = timeout.map(|time| duration("timeout", time)).transpose()?;
     let read_back = read_back.map(|address| one_word("read_back", address)).transpose()?;
-    Ok(CallOptions::new().timeout(timeout).read_back(read_back).connection(connection))
+    Ok(CallOptions::new().timeout(timeout).read_back(read_back).connection(connection).halts(halts))
 }
 
 /// `options` for `request`, which may be urgent.

@@ -172,7 +172,7 @@ impl Bus {
     }
 
     #[pyo3(signature = (unit, address, value, /, *, timeout = None, urgent = false, read_back = None, connection = None,
-        table = "holding"))]
+        halts = None, table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
         &self,
@@ -183,9 +183,10 @@ impl Bus {
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
+        halts: Option<u64>,
         table: &str,
     ) -> PyResult<()> {
-        let options = write_options(timeout, read_back, connection)?;
+        let options = write_options(timeout, read_back, connection, halts)?;
         self.write_to(any_unit(unit)?.into(), table, address, value, options, urgent)
     }
 
@@ -255,6 +256,12 @@ impl Bus {
         let unit = any_unit(unit)?;
         let link = py.detach(|| self.core.link(unit));
         Ok((link.good, link.asked))
+    }
+
+    #[pyo3(signature = (unit, /))]
+    fn halts(&self, py: Python<'_>, unit: &Bound<'_, PyAny>) -> PyResult<u64> {
+        let unit = any_unit(unit)?;
+        Ok(py.detach(|| self.core.halts(unit)))
     }
 
     /// Leaves what halts a unit when this program is gone without a word; `None` where nobody would find it.

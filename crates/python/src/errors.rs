@@ -170,6 +170,7 @@ pub(crate) fn call_error(error: &CallError, clock: UnixClock) -> PyErr {
         Failure::Refused { code, .. } => return refused(&message, *code, details),
         Failure::ReadOnly { .. } | Failure::NotARead { .. } => return not_ready("read_only"),
         Failure::BeingStopped { .. } => return not_ready("being_stopped"),
+        Failure::Halted { .. } => return not_ready("halted"),
         Failure::Port(error) => error.kind,
         Failure::Closed | Failure::Forked => PortErrorKind::Closed,
         _ if matches!(class, Class::Port) => PortErrorKind::Lost,

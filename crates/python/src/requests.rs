@@ -159,7 +159,7 @@ impl Requests {
     }
 
     #[pyo3(signature = (unit, address, value, /, *, timeout = None, urgent = false, read_back = None, connection = None,
-        table = "holding"))]
+        halts = None, table = "holding"))]
     #[expect(clippy::too_many_arguments, reason = "the keywords of the Python method")]
     fn write(
         &self,
@@ -170,9 +170,10 @@ impl Requests {
         urgent: bool,
         read_back: Option<&Bound<'_, PyAny>>,
         connection: Option<u64>,
+        halts: Option<u64>,
         table: &str,
     ) -> PyResult<Asked> {
-        let options = write_options(timeout, read_back, connection)?;
+        let options = write_options(timeout, read_back, connection, halts)?;
         self.write_to(any_unit(unit)?.into(), table, address, value, options, urgent)
     }
 
@@ -210,13 +211,13 @@ impl Requests {
     #[pyo3(signature = (unit, /))]
     fn link(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
         let unit = any_unit(unit)?;
-        if let Some(link) = self.core.link_if_here(unit) {
-            let number = self.inbox.number();
-            self.inbox.post(number, shown(link));
-            return Ok(Asked { number, how: How::Errand(None) });
-        }
-        let core = Arc::clone(&self.core);
-        apart(&self.inbox, move |_| shown(core.link(unit)))
+        self.here_or_asked(self.core.link_if_here(unit).map(shown), move |core| shown(core.link(unit)))
+    }
+
+    #[pyo3(signature = (unit, /))]
+    fn halts(&self, unit: &Bound<'_, PyAny>) -> PyResult<Asked> {
+        let unit = any_unit(unit)?;
+        self.here_or_asked(self.core.halts_if_here(unit).map(counted), move |core| counted(core.halts(unit)))
     }
 
     #[pyo3(signature = (seconds, /))]
@@ -247,6 +248,20 @@ impl Requests {
 }
 
 impl Requests {
+    /// What is known in this program is told at once; a thread of its own asks another, by `ask`.
+    fn here_or_asked<L>(&self, here: Option<L>, ask: impl FnOnce(&CoreBus) -> L + Send + 'static) -> PyResult<Asked>
+    where
+        L: for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send + 'static,
+    {
+        let Some(known) = here else {
+            let core = Arc::clone(&self.core);
+            return apart(&self.inbox, move |_| ask(&core));
+        };
+        let number = self.inbox.number();
+        self.inbox.post(number, known);
+        Ok(Asked { number, how: How::Errand(None) })
+    }
+
     fn write_to(
         &self,
         to: Destination,
@@ -313,6 +328,10 @@ fn round_trip() -> impl for<'py> FnOnce(Python<'py>, Reply, UnixClock) -> PyResu
 /// A link, as the program gets it.
 fn shown(link: Link) -> impl for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send {
     move |py| Ok((link.good, link.asked).into_pyobject(py)?.into_any())
+}
+
+fn counted(count: u64) -> impl for<'py> FnOnce(Python<'py>) -> PyResult<Bound<'py, PyAny>> + Send {
+    move |py| Ok(count.into_pyobject(py)?.into_any())
 }
 
 /// The words of the reply to a read, as many as were asked for.

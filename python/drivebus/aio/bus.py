@@ -180,12 +180,13 @@ class Bus(BusFace):
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        halts: int | None = None,
         force: bool = False,
         table: str = "holding",
         timeout: float | None = None,
     ) -> None:
         """See `Requests.write`."""
-        await self.ask(Write(unit, address, value, table, urgent, read_back, connection, force, timeout))
+        await self.ask(Write(unit, address, value, table, urgent, read_back, connection, halts, force, timeout))
 
     @documented_by(Requests.broadcast)
     async def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
@@ -223,6 +224,11 @@ class Bus(BusFace):
     async def link(self, unit: int, /) -> Link:
         """See `Requests.link`."""
         return await self._asked().link(unit)
+
+    @documented_by(Requests.halts)
+    async def halts(self, unit: int, /) -> int:
+        """See `Requests.halts`."""
+        return await self._asked().halts(unit)
 
     def scan(
         self, units: Iterable[int] = UNITS, timeout: float | None = None, *, protocol: str = "auto"

@@ -89,6 +89,7 @@ class Line:
     echo = _awaited(_native.Requests.echo)
     transact = _awaited(_native.Requests.transact)
     link = _awaited(_native.Requests.link)
+    halts = _awaited(_native.Requests.halts)
     listen = _awaited(_native.Requests.listen)
     close = _awaited(_native.Requests.close)
     _sleep = _awaited(_native.Requests.sleep)

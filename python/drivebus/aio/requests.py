@@ -83,9 +83,9 @@ class AwaitedRequests:
         if isinstance(request, Read):
             how |= {"verify": request.verify, **alone_of(request.timeout, request.retries)}
             return await self._line.read(*self._checked(request), **how)
-        how |= {"read_back": request.read_back, "connection": request.connection}
+        how |= {"read_back": request.read_back, "connection": request.connection, "halts": request.halts}
         of = (request.unit, request.address, request.value, request.table, request.urgent)
-        checked = write_of(self._known, *of, request.read_back, request.connection, request.force)
+        checked = write_of(self._known, *of, request.read_back, request.connection, request.halts, request.force)
         await self._line.write(*checked, **how, **alone_of(request.timeout))
         return None
 
@@ -100,6 +100,10 @@ class AwaitedRequests:
     async def link(self, unit: int) -> Link:
         """See `Requests`."""
         return Link(*await self._line.link(self._known.addresses.unit(unit)))
+
+    async def halts(self, unit: int) -> int:
+        """See `Requests`."""
+        return await self._line.halts(self._known.addresses.unit(unit))
 
     async def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
         """See `Requests`."""

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar, overload
 
 from drivebus.line.asking import Read, Stamped, Write
-from drivebus.line.protocols import BusProtocol
+from drivebus.line.protocols import BusProtocol, CountsHalts
 from drivebus.line.requests import Requests
 from drivebus.line.stats import Link
 
@@ -55,6 +55,8 @@ class BlockingBus:
             how = {"urgent": request.urgent, "verify": request.verify, **rest}
             return self._bus.read(request.unit, request.address, request.count, **how)
         rest = _of(request.table) | self._alone(timeout=request.timeout) | ({"force": True} if request.force else {})
+        if request.halts is not None:
+            rest["halts"] = request.halts
         self._bus.write(
             request.unit,
             request.address,
@@ -79,6 +81,10 @@ class BlockingBus:
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""
         return self._bus.link(unit)
+
+    async def halts(self, unit: int, /) -> int | None:
+        """See `AwaitableBus`."""
+        return self._bus.halts(unit) if isinstance(self._bus, CountsHalts) else None
 
     @property
     def line(self) -> object:

@@ -12,7 +12,7 @@ from typing import Protocol, runtime_checkable
 from drivebus.line.asking import Asks
 from drivebus.line.stats import Link
 
-__all__ = ["AwaitableBus", "BusProtocol", "KeepsWills"]
+__all__ = ["AwaitableBus", "BusProtocol", "CountsHalts", "KeepsWills"]
 
 
 class BusProtocol(Protocol):
@@ -94,6 +94,9 @@ class AwaitableBus(Asks, Protocol):
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""
 
+    async def halts(self, unit: int, /) -> int | None:
+        """See `CountsHalts`; None where the line does not count them."""
+
     @property
     def reconnects(self) -> int:
         """See `BusProtocol`."""
@@ -111,6 +114,17 @@ class AwaitableBus(Asks, Protocol):
 
     def blocking(self) -> AwaitableBus:
         """The same line for who has no event loop: it blocks."""
+
+
+@runtime_checkable
+class CountsHalts(Protocol):
+    """A line that keeps what was decided on before a stop from being sent after it.
+
+    A bus need not be one: then a stop that comes while a start is under way may be followed by it.
+    """
+
+    def halts(self, unit: int, /) -> int:
+        """A number that is another one each time *unit* is told to halt. `write` takes it, as `halts`."""
 
 
 @runtime_checkable

@@ -119,6 +119,7 @@ class Requests:
         urgent: bool = False,
         read_back: int | None = None,
         connection: int | None = None,
+        halts: int | None = None,
         force: bool = False,
         table: str = "holding",
         timeout: float | None = None,
@@ -143,6 +144,9 @@ class Requests:
         With *connection*, the `reconnects` at which you saw who answers, nothing is sent where the port was opened
         again since, for another unit may have the address now: `PortError`, whose `started` is None.
 
+        With *halts*, what `halts` of the unit was when you decided on this, nothing is sent where a stop was since:
+        `NotReady`, whose `why` is `"halted"`. An urgent write goes out in any case.
+
         *timeout*, in seconds, is how long this write waits for its confirmation; None is what the bus has.
 
         Raises:
@@ -153,12 +157,13 @@ class Requests:
             Refused: The unit did not take it.
             Unconfirmed: With *read_back*: the unit shows other words, however often it was written.
         """
-        checked = write_of(self._known, unit, address, value, table, urgent, read_back, connection, force)
+        checked = write_of(self._known, unit, address, value, table, urgent, read_back, connection, halts, force)
         self._native.write(
             *checked,
             urgent=urgent,
             read_back=read_back,
             connection=connection,
+            halts=halts,
             table=table,
             **alone_of(timeout),
         )
@@ -166,6 +171,14 @@ class Requests:
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
         return Link(*self._native.link(self._known.addresses.unit(unit)))
+
+    def halts(self, unit: int) -> int:
+        """A number that is another one each time *unit* is told to stop over this line, by this program or another.
+
+        What counts is an urgent write, as `Drive.stop` and `coast` send it, from when it begins to wait for the line.
+        Where another program has the port, it is asked, a second at most.
+        """
+        return self._native.halts(self._known.addresses.unit(unit))
 
     def broadcast(self, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
         """Writes to every unit at once; none answers. Returns after the turnaround delay. Sent once.
@@ -228,6 +241,7 @@ def write_of(
     urgent: object,
     read_back: int | None,
     connection: int | None,
+    halts: int | None,
     force: object,
 ) -> tuple[int, int, int | list[int]]:
     """What a write is of: unit, address and words.
@@ -238,6 +252,8 @@ def write_of(
         checks.whole("read_back", read_back, 0, 0xFFFF, hexadecimal=True)
     if connection is not None:
         checks.whole("connection", connection, 0, 2**63)
+    if halts is not None:
+        checks.whole("halts", halts, 0, 2**63)
     unit, address = known.addresses.unit(unit, changes=True), checks.address(address)
     words = checks.of_table(table, value)
     checks.flag("urgent", urgent)

@@ -10,7 +10,16 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from drivebus import places
-from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.errors import (
+    LINE_ERRORS,
+    BadAnswer,
+    DrivebusError,
+    NoAnswer,
+    NotReady,
+    PortError,
+    Refused,
+    Unconfirmed,
+)
 from drivebus.identify.harm import HALTS
 from drivebus.operations import setpoints, state, words
 from drivebus.operations.state import Seen
@@ -83,22 +92,37 @@ async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, in
 async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too."""
     first = unit.profile.command_first(name)
-    if first is not None:
-        before = unit.record.halts_begun
-        await send_once(unit, name, *first)
-        if unit.record.halts_begun != before:
-            raise Unconfirmed(
-                f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
-                f"which comes before {name}; the rest of {name} was not sent",
-                unit=unit.address,
-            )
-    await send_once(unit, name, address, payload)
+    if first is None:
+        await send_once(unit, name, address, payload)
+        return
+    before = unit.record.halts_begun
+    await send_once(unit, name, *first)
+    halted = Unconfirmed(
+        f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
+        f"which comes before {name}; the rest of {name} was not sent",
+        unit=unit.address,
+    )
+    if unit.record.halts_begun != before:
+        raise halted
+    try:
+        await send_once(unit, name, address, payload)
+    except NotReady as error:
+        raise halted from error
 
 
 async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
     try:
         await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
+    except NotReady as error:
+        if error.why != "halted":
+            raise
+        raise NotReady(
+            f"unit {unit.address} was told to stop while {name} was under way, or the port went to another program: "
+            f"{name} was not sent. Give it again if it is to be",
+            why="halted",
+            unit=unit.address,
+        ) from error
     except LINE_ERRORS as error:
         if error.started is None:
             raise

@@ -59,8 +59,11 @@ async def run(
 
     Where two or more of the last ten exchanges failed, the link is proved first, by ten looks at the state.
 
+    A stop wins over it: once the drive was told to stop or coast, by whomever on this line, what is under way here is
+    not sent any more.
+
     Raises:
-        NotAllowed: The drive is in fault, not under bus control, or takes its speed from elsewhere; *hz* is above
+        NotAllowed: It was told to stop meanwhile (`NotReady`, whose `why` is `"halted"`); the drive is in fault, not under bus control, or takes its speed from elsewhere; *hz* is above
             its maximum; the link is bad; another drive answers at this address since the port was opened again; or
             something is not verified for the family: the command, or both ways to stop what it starts. Nothing was
             sent that moves it.
@@ -73,6 +76,7 @@ async def run(
     command = "run_reverse" if reverse else "run_forward"
     unit = unit.trusting(unverified)
     start_checks.may_be_given(unit, command)
+    unit = await unit.unless_halted()
     await start_checks.prove_link(unit, force)
     if hz is not None:
         unit = await setpoints.with_setpoint(unit, "frequency")
@@ -95,6 +99,7 @@ async def jog(
     command = "jog_reverse" if reverse else "jog_forward"
     unit = unit.trusting(unverified)
     start_checks.may_be_given(unit, command)
+    unit = await unit.unless_halted()
     await start_checks.prove_link(unit, force)
     before = await start_checks.ready_to_start(unit)
     if before.state.running:
@@ -198,6 +203,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     unit = unit.trusting(unverified)
     unit.evidence.commands("reset_fault")
+    unit = await unit.unless_halted()
     before = await state.glance(unit)
     untold = "state" in before.missing and "fault" in before.missing
     if not (before.tripped or untold):

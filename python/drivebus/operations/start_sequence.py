@@ -7,7 +7,7 @@ which word it was given last; a start that is always the same costs a few exchan
 from __future__ import annotations
 
 from drivebus.advice import Text, call
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, Refused, Unconfirmed
+from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
 from drivebus.operations import commands, state, words
 from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
@@ -67,6 +67,10 @@ class _Step:
         address, _ = unit.profile.command(self._command)
         try:
             await words.write(unit, address, self._step.word)
+        except NotReady as error:
+            if self._is_first or error.why != "halted":
+                raise
+            raise self._failed(f"it was told to stop before {self._called} was sent") from error
         except LINE_ERRORS as error:
             if error.started is None and self._is_first:
                 raise

@@ -24,6 +24,8 @@ class Unit:
         evidence: Its profile, under one trust.
         record: What the line knows of it.
         identity: Whether it is what its profile says, and still the one it was.
+        halts: How often it had been told to halt when this view was made for a start: where it was told to since, this view
+            writes nothing any more.
     """
 
     bus: AwaitableBus
@@ -31,6 +33,7 @@ class Unit:
     evidence: Evidence
     record: UnitRecord
     identity: SameUnit
+    halts: int | None = None
 
     @classmethod
     def at(
@@ -68,6 +71,10 @@ class Unit:
         if not checks.flag("unverified", unverified) or self.unverified:
             return self
         return replace(self, evidence=self.evidence.trusting(True))
+
+    async def unless_halted(self) -> Unit:
+        """The same unit, for a start: once somebody tells it to halt, nothing is written to it over this view."""
+        return replace(self, halts=await self.bus.halts(self.address))
 
     def taken_for(self, profile: Profile) -> Unit:
         """The same unit, which shows that it is of *profile* and not what it was named as; trusted as that."""

@@ -130,7 +130,10 @@ async def send(
     shown_at = None if read_back is None else places.split(read_back)[1]
     try:
         with explained(unit):
-            await unit.bus.ask(Write(unit.address, first, value, table, urgent, shown_at, connection, force, timeout))
+            halts = None if urgent else unit.halts
+            await unit.bus.ask(
+                Write(unit.address, first, value, table, urgent, shown_at, connection, halts, force, timeout)
+            )
     except Refused as error:
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":

@@ -121,6 +121,30 @@ fn errands_keep_the_order_of_the_queue() {
     holder.join().unwrap();
 }
 
+/// A stop overtakes what waits. The start that it overtook would follow it.
+#[test]
+fn a_stop_takes_back_the_start_that_waits_for_the_line() {
+    let (simulator, bus) = pair();
+    let (to, outcomes) = channel();
+    let (let_go, holder) = hold(&bus);
+    let (start, stop) = (Request::write(0x2000, 1), Request::write(0x2000, 5));
+    let decided = CallOptions::new().halts(bus.halts(unit(1)));
+    send(&bus, 1, &start, decided, &to);
+    send(&bus, 2, &Request::write(ACCELERATION, 20), CallOptions::new(), &to);
+    send(&bus, 3, &stop, CallOptions::new().urgent(&stop), &to);
+    // To read urgently is no stop.
+    send(&bus, 4, &identify(), CallOptions::new().urgent(&identify()), &to);
+    let_go.send(()).unwrap();
+    holder.join().unwrap();
+    let told = || outcomes.recv_timeout(Duration::from_secs(20)).unwrap();
+    let mut told: Vec<_> = (0..4).map(|_| told()).collect();
+    told.sort_unstable_by_key(|&(name, _)| name);
+    let failed: Vec<_> = told.into_iter().map(|(_, outcome)| outcome.err().map(|error| error.failure)).collect();
+    assert_eq!(failed, [Some(Failure::Halted { unit: 1 }), None, None, None]);
+    let values: Vec<u16> = simulator.drive(1).unwrap().writes().iter().map(|write| write.value).collect();
+    assert_eq!(values, [5, 20]);
+}
+
 #[test]
 fn what_is_taken_back_is_neither_sent_nor_told() {
     let (simulator, bus) = pair();

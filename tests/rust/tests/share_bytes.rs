@@ -157,7 +157,15 @@ fn converse(guest: &Bus) {
     guest.configure(unit(2), UnitOptions::new().gap(Duration::from_millis(10)));
     guest.set_meanings(unit(2), Meanings::STANDARD.with(ExceptionCode(4), Meaning::AskAgain));
     let second = Duration::from_secs(1);
-    let all = usual.timeout(second).retries(1).priority(Priority::Poll).verify(true).read_back(0x800B).connection(0);
+    let halts = guest.halts(unit(2));
+    let all = usual
+        .timeout(second)
+        .retries(1)
+        .priority(Priority::Poll)
+        .verify(true)
+        .read_back(0x800B)
+        .connection(0)
+        .halts(halts);
     ask(guest, 2, &Request::write(0x800B, 11), all).unwrap();
 
     for length in [AnswerLength::Bytes(4), AnswerLength::BySilence] {

@@ -12,7 +12,8 @@ use std::time::Duration;
 
 use drivebus_line::url::{Known, PortOptions, PortUrl};
 use drivebus_line::{
-    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Errand, Failure, Poll, PollTarget, PortErrorKind, Share,
+    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Done, Errand, ErrorKind, Failure, Poll, PollTarget,
+    PortErrorKind, Share,
 };
 use drivebus_rtu::{
     Answer, AnswerLength, Destination, ExceptionCode, Meaning, Meanings, Request, SerialFormat, UnitAddress,
@@ -321,4 +322,32 @@ fn each_program_keeps_to_its_own_rules() {
     ask(&writing, 1, &write).unwrap();
     assert!(matches!(ask(&reading, 1, &write).unwrap_err().failure, Failure::ReadOnly { .. }));
     assert_eq!(simulator.drive(1).unwrap().writes().len(), 1);
+}
+
+/// Whichever program starts, and whichever stops.
+#[test]
+fn a_stop_takes_back_what_was_decided_on_before_it() {
+    let (simulator, served) = line();
+    let (owner, guest) = (open(&served), open(&served));
+    let written = || simulator.drive(1).unwrap().writes().len();
+    for (starts, stops) in [(&owner, &guest), (&guest, &owner), (&owner, &owner), (&guest, &guest)] {
+        let before = starts.halts(unit(1));
+        assert_eq!(stops.halts(unit(1)), before, "one number for all");
+        let others = starts.halts(unit(2));
+        let call = |bus: &Bus, request: &Request<'_>, options: CallOptions| {
+            bus.call(unit(1).into(), request, options, &mut || false, &mut |_| ())
+        };
+        let (start, stop) = (Request::write(0x2000, 1), Request::write(0x2000, 5));
+        call(stops, &stop, CallOptions::new().urgent(&stop)).unwrap();
+        let count = written();
+        let error = call(starts, &start, CallOptions::new().halts(before)).unwrap_err();
+        assert_eq!((&error.failure, error.sent), (&Failure::Halted { unit: 1 }, None));
+        assert_eq!((error.kind(), error.may_have_acted()), (ErrorKind::NotAllowed, false));
+        assert_eq!(written(), count);
+        assert_eq!(starts.halts(unit(2)), others);
+        // What was decided on since goes out, and a stop in any case.
+        call(starts, &stop, CallOptions::new().urgent(&stop).halts(before)).unwrap();
+        call(starts, &Request::write(ACCELERATION, 9), CallOptions::new().halts(starts.halts(unit(1)))).unwrap();
+        assert_eq!(written(), count + 2);
+    }
 }

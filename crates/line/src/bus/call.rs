@@ -40,6 +40,8 @@ pub(crate) struct Call<'b, 'r> {
     verify: bool,
     read_back: Option<u16>,
     connection: Option<u64>,
+    /// How often its unit had been told to halt when it was decided on.
+    halts: Option<u64>,
     /// Whether somebody still waits for it; asked wherever nothing of it is on the wire.
     wanted: Option<&'r dyn Wanted>,
 }
@@ -64,15 +66,24 @@ impl<'b, 'r> Call<'b, 'r> {
     #[inline(always)]
     pub(crate) fn new(bus: &'b Port, ask: Ask<'r>, options: CallOptions) -> Self {
         let kind = if ask.request.is_write() { Priority::Write } else { Priority::Read };
+        let (unit, priority) = (ask.unit(), options.priority.unwrap_or(kind));
+        if priority == Priority::Stop
+            && ask.request.is_write()
+            && let Some(unit) = unit
+        {
+            bus.halts.count(unit);
+        }
         Self {
             bus,
-            unit: ask.unit(),
-            priority: options.priority.unwrap_or(kind),
+            unit,
+            priority,
             program: Program::default(),
             retries: options.retries.unwrap_or(bus.options.retries),
             verify: options.verify,
             read_back: options.read_back.filter(|_| ask.request.is_write()),
             connection: options.connection,
+            // Of what halts, whatever else is told to halt takes nothing back.
+            halts: options.halts.filter(|_| priority != Priority::Stop),
             wanted: None,
             ask,
         }
@@ -92,7 +103,12 @@ impl<'b, 'r> Call<'b, 'r> {
     }
 
     fn is_wanted(&self) -> bool {
-        self.wanted.is_none_or(Wanted::is_wanted)
+        self.wanted.is_none_or(Wanted::is_wanted) && self.halted().is_none()
+    }
+
+    /// Its unit, if that was told to halt since the call was decided on.
+    fn halted(&self) -> Option<UnitAddress> {
+        self.unit.filter(|&unit| self.halts.is_some_and(|before| self.bus.halts.of(unit) != before))
     }
 
     /// Asks until it is answered, refused or given up.
@@ -155,7 +171,14 @@ impl<'b, 'r> Call<'b, 'r> {
     fn told(&self, owner: &mut Owner, result: Result<Done, Box<CallError>>) -> Result<Done, Box<CallError>> {
         result.map_err(|mut error| {
             match error.failure {
-                Failure::Interrupted => error.failure = self.bus.given_up(),
+                Failure::Interrupted => {
+                    error.failure = match (self.bus.given_up(), self.halted()) {
+                        (Failure::Interrupted, Some(unit)) if error.sent.is_none() => {
+                            Failure::Halted { unit: unit.get() }
+                        }
+                        (given_up, _) => given_up,
+                    };
+                }
                 Failure::NotAsked { .. } => owner.stats().count(self.unit, |counters| counters.not_asked += 1),
                 _ => {}
             }
@@ -259,6 +282,6 @@ impl<'b, 'r> Call<'b, 'r> {
             return Err(self.bus.given_up());
         }
         *turn = self.bus.queue.turn_again(self.claim(), give_up).map_err(|why| self.bus.no_turn(why))?;
-        Ok(())
+        if self.is_wanted() { Ok(()) } else { Err(self.bus.given_up()) }
     }
 }

@@ -377,6 +377,7 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<
             let link = port.figures.link(UnitAddress::by_name(unit));
             Told::Link { good: link.good, asked: link.asked }
         }
+        Wish::Halts(unit) => Told::Halts(port.halts.of(UnitAddress::by_name(unit))),
         Wish::FreshWord => Told::Word(port.words.next()),
         Wish::Reconnects => {
             visit.watches(&channel.borrow(), &port)?;

@@ -13,6 +13,7 @@ use crate::ask::Ask;
 use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
 use crate::bus::figures::Figures;
+use crate::bus::halts_told::HaltsTold;
 use crate::bus::wills::Wills;
 use crate::error::Failure;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
@@ -39,6 +40,7 @@ pub(crate) struct Port {
     pub(super) queue: Arc<Queue<Errand>>,
     owner: Mutex<Owner>,
     pub(super) figures: Figures,
+    pub(super) halts: HaltsTold,
     /// What its units say by their exceptions.
     pub(crate) meanings: Arc<UnitMeanings>,
     pub(super) words: FreshWords,
@@ -73,6 +75,7 @@ impl Port {
         Self {
             queue: Arc::new(Queue::with_room(options.queue)),
             figures,
+            halts: HaltsTold::new(),
             meanings: Arc::clone(&owner.meanings),
             words,
             notes: Mutex::new(owner.line().map(|line| line.notes()).unwrap_or_default()),

@@ -329,6 +329,14 @@ impl Shared {
         self.told_at_once(&Wish::Link(unit.get()), link).unwrap_or_else(|| self.port.figures.link(unit))
     }
 
+    pub(super) fn halts(&self, unit: UnitAddress) -> u64 {
+        let halts = |_: &Guest, told| match told {
+            Told::Halts(halts) => Some(halts),
+            _ => None,
+        };
+        self.told_at_once(&Wish::Halts(unit.get()), halts).unwrap_or_else(|| self.port.halts.of(unit))
+    }
+
     pub(super) fn fresh_word(&self) -> u16 {
         let word = |_: &Guest, told| match told {
             Told::Word(word) => Some(word),

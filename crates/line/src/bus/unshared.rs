@@ -63,6 +63,10 @@ impl Shared {
         self.port.figures.link(unit)
     }
 
+    pub(super) fn halts(&self, unit: UnitAddress) -> u64 {
+        self.port.halts.of(unit)
+    }
+
     pub(super) fn fresh_word(&self) -> u16 {
         self.port.words.next()
     }

@@ -21,7 +21,7 @@ pub enum ErrorKind {
     Refused,
     /// What was asked was sent, and its effect is not known.
     Unconfirmed,
-    /// Nothing was sent: out of range, read-only, an unknown name, no room in the queue, a unit that is being stopped.
+    /// Nothing was sent: out of range, read-only, an unknown name, no room in the queue, a unit that is being stopped or was told to.
     NotAllowed,
 }
 
@@ -43,7 +43,8 @@ impl Failure {
             | Self::ReadOnly { .. }
             | Self::NotARead { .. }
             | Self::QueueFull { .. }
-            | Self::BeingStopped { .. } => ErrorKind::NotAllowed,
+            | Self::BeingStopped { .. }
+            | Self::Halted { .. } => ErrorKind::NotAllowed,
             Self::Doubtful | Self::NotAsked { .. } | Self::Unreached => ErrorKind::NoAnswer,
             Self::NotTaken { .. } | Self::Limited { .. } | Self::Acknowledged { .. } => ErrorKind::Unconfirmed,
             Self::NoAnswer { .. } if !came => ErrorKind::NoAnswer,

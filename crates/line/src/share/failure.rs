@@ -70,6 +70,9 @@ pub(crate) enum Said {
         function: u8,
         code: u8,
     },
+    Halted {
+        unit: u8,
+    },
     /// What has no form of its own here comes in its words.
     BadAnswer {
         message: String,
@@ -103,6 +106,7 @@ impl From<&Failure> for Said {
             Failure::BeingStopped { unit, program, process } => {
                 Self::BeingStopped { unit: *unit, program: program.clone(), process: *process }
             }
+            Failure::Halted { unit } => Self::Halted { unit: *unit },
             Failure::NotBegun(BeginError::BroadcastRead) => Self::BroadcastRead,
             Failure::NotBegun(BeginError::Quarantine { unit }) => Self::Quarantine { unit: unit.get() },
             Failure::NotBegun(_) => Self::OutOfTurn,
@@ -141,6 +145,7 @@ impl From<Said> for Failure {
             Said::ReadOnly { function } => Self::ReadOnly { function },
             Said::QueueFull { room } => Self::QueueFull { room: length(room) },
             Said::BeingStopped { unit, program, process } => Self::BeingStopped { unit, program, process },
+            Said::Halted { unit } => Self::Halted { unit },
             Said::OutOfTurn => Self::NotBegun(BeginError::OutOfTurn),
             Said::BroadcastRead => Self::NotBegun(BeginError::BroadcastRead),
             Said::Quarantine { unit } => Self::NotBegun(BeginError::Quarantine { unit: UnitAddress::by_name(unit) }),
@@ -215,6 +220,7 @@ mod tests {
             Failure::ReadOnly { function: 6 },
             Failure::QueueFull { room: 9 },
             Failure::BeingStopped { unit: 3, program: "python".to_owned(), process: 4711 },
+            Failure::Halted { unit: 3 },
             Failure::NotBegun(BeginError::OutOfTurn),
             Failure::NotBegun(BeginError::BroadcastRead),
             Failure::NotBegun(BeginError::Quarantine { unit: UnitAddress::new(7).unwrap() }),

@@ -22,7 +22,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 6;
+pub(crate) const VERSION: u8 = 7;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -93,6 +93,8 @@ pub(crate) enum Wish {
     Wills,
     /// The call or the listening under way is not wanted any more.
     Cancel,
+    /// How often a unit was told to halt.
+    Halts(u8),
 }
 
 /// What it is told.
@@ -135,6 +137,7 @@ pub(crate) enum Told {
     Waiting,
     /// So many pieces of what went over the line were left out, because the program did not take what it was told.
     LeftOut(u64),
+    Halts(u64),
 }
 
 /// The statistics of a line.
@@ -188,6 +191,7 @@ pub(crate) struct Order {
     verify: bool,
     read_back: Option<u16>,
     connection: Option<u64>,
+    halts: Option<u64>,
     /// The exceptions by which its unit means something else than the specification has, and the places of that in
     /// [`Meaning::ALL`]; `None` where its program does not know the unit.
     meanings: Option<Vec<(u8, u8)>>,
@@ -217,6 +221,7 @@ impl Order {
             verify: options.verify,
             read_back: options.read_back,
             connection: options.connection,
+            halts: options.halts,
             meanings: None,
         }
     }
@@ -265,7 +270,8 @@ impl Order {
                 .in_doubt(self.in_doubt)
                 .verify(self.verify)
                 .read_back(self.read_back)
-                .connection(self.connection),
+                .connection(self.connection)
+                .halts(self.halts),
         )
     }
 
