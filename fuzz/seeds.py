@@ -227,7 +227,7 @@ def guests() -> dict[str, bytes]:
     def say(*messages: bytes) -> bytes:
         return b"\1" + b"".join(bytes([len(message)]) + message for message in messages)
 
-    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0\0\0\0\0") -> bytes:
+    def call(pdu: bytes, unit: int = 1, timeout: bytes = second, priority: int = 2, more: bytes = b"\0" * 5) -> bytes:
         request = bytes([calls, unit, len(pdu)]) + pdu
         return request + b"\0" + timeout + b"\0\0\0" + bytes([priority, 2]) + more
 

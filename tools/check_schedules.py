@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 QUEUE = "crates/line/src/turns/queue.rs"
 WORK = "crates/line/src/turns/queue/work.rs"
 CREW = "crates/line/src/turns/crew.rs"
+CALL = "crates/line/src/bus/call.rs"
 ERRAND = "crates/line/src/bus/errand.rs"
 HOST = "crates/line/src/bus/host.rs"
 
@@ -50,6 +51,8 @@ BREAKS: list[tuple[str, str, str, str]] = [
         "        drop(state);\n        let back",
     ),
     ("who steps aside is not back", QUEUE, "state.order.step_aside(ticket, Waiter::Thread(thread));", "drop(thread);"),
+    ("a stop is not counted", CALL, "            bus.halts.count(unit);\n", "            let _ = unit;\n"),
+    ("a start that was decided on before a stop is sent", CALL, " && self.halted().is_none()", ""),
     ("a stop is not let pass", QUEUE, "self.ticket.is_stop() || !state.order.has_stop()", "true"),
     (
         "two take the line",

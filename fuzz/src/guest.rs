@@ -267,13 +267,14 @@ mod tests {
     /// Wishes and what is told of them, by their places in the lists of crates/line/src/share/message.rs.
     #[test]
     fn what_the_seeds_say_is_understood() {
-        let read = [0, 1, 5, 3, 0x21, 3, 0, 1, 0, 0x80, 0x94, 0xEB, 0xDC, 3, 0, 0, 0, 2, 2, 0, 0, 0, 0];
-        let [stats, link, word, reconnects] = [3, 4, 5, 6];
+        let read = [0, 1, 5, 3, 0x21, 3, 0, 1, 0, 0x80, 0x94, 0xEB, 0xDC, 3, 0, 0, 0, 2, 2, 0, 0, 0, 0, 0];
+        let [stats, link, word, reconnects, halts] = [3, 4, 5, 6, 9];
         assert_eq!(told(&read), Some(0), "an answer");
         assert_eq!(told(&[stats]), Some(5));
         assert_eq!(told(&[link, 1]), Some(6));
         assert_eq!(told(&[word]), Some(7));
         assert_eq!(told(&[reconnects]), Some(8));
+        assert_eq!(told(&[halts, 1]), Some(12));
         assert_eq!(told(&[1, 1]), Some(4), "nothing was heard in a billionth of a second");
     }
 }

@@ -1,4 +1,4 @@
-"""A stop that is told while a start is under way wins, however the two interleave: the motor does not turn afterwards."""
+"""A stop that is told while a start is under way wins, however the two interleave: the motor rests afterwards."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REQUESTS = {"run": 3, "run_reverse": 3, "jog": 2}
 Start = Callable[[drivebus.aio.Drive], Awaitable[None]]
 STARTS: dict[str, Start] = {
     "run": lambda drive: drive.run(10.0),
-    "run_reverse": lambda drive: drive.run(10.0, True),
+    "run_reverse": lambda drive: drive.run(10.0, reverse=True),
     "jog": lambda drive: drive.jog(),
 }
 
@@ -126,7 +126,11 @@ def test_a_stop_of_one_unit_takes_no_start_of_another_back(virtual_bus: Bus) -> 
 @pytest.mark.usefixtures("folder")
 def test_a_stop_by_one_program_takes_back_the_start_of_another() -> None:
     """Two programs that share a port count together, whichever of them has it."""
-    with Simulator({1: "gd350"}, transport="pty") as simulator, Bus(simulator.port) as owner, Bus(simulator.port) as guest:
+    with (
+        Simulator({1: "gd350"}, transport="pty") as simulator,
+        Bus(simulator.port) as owner,
+        Bus(simulator.port) as guest,
+    ):
         for starter, stopper in ((owner, guest), (guest, owner)):
             halts = starter.halts(1)
             assert stopper.halts(1) == halts

@@ -55,8 +55,8 @@ class Write:
         read_back: The address where the same can be read: there a confirmation that is missing is looked for, and only
             where the unit shows other words is the write repeated.
         connection: The `reconnects` at which it was seen who answers: at another nothing is sent. None: at any.
-        halts: The `halts` of the unit at which this was decided on: where it was told to halt since, nothing is sent. None:
-            it is sent in any case, as an urgent one is.
+        halts: The `halts` of the unit at which this was decided on: where it was told to halt since, nothing is sent.
+            None: it is sent in any case, as an urgent one is.
         force: Also what the family does not define.
         timeout: Seconds that this write alone waits for its confirmation; None is what the bus has.
     """

@@ -24,8 +24,8 @@ class Unit:
         evidence: Its profile, under one trust.
         record: What the line knows of it.
         identity: Whether it is what its profile says, and still the one it was.
-        halts: How often it had been told to halt when this view was made for a start: where it was told to since, this view
-            writes nothing any more.
+        halts: How often it had been told to halt when this view was made for a start: where it was told to since, this
+            view writes nothing any more.
     """
 
     bus: AwaitableBus

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use drivebus_rtu::UnitAddress;
+
 use crate::bus::errand::Errand;
 use crate::bus::host::{Guests, Host};
 use crate::bus::port::Port;
@@ -53,6 +55,10 @@ impl Bus {
 impl Bus {
     pub(crate) fn queue(&self) -> &Queue<Errand> {
         &self.port().queue
+    }
+
+    pub(crate) fn halts(&self, unit: UnitAddress) -> u64 {
+        self.port().halts.of(unit)
     }
 
     pub(crate) fn reconnects(&self) -> u64 {

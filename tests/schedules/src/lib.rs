@@ -83,6 +83,7 @@ mod bus {
     mod clock;
     pub(crate) mod errand;
     pub(crate) mod figures;
+    mod halts_told;
     pub(crate) mod host;
     mod listen;
     mod openings;

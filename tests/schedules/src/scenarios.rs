@@ -38,6 +38,7 @@ pub const ALL: &[(&str, fn())] = &[
     ("errands_and_callers", bus::errands_and_callers),
     ("an_errand_is_abandoned", bus::an_errand_is_abandoned),
     ("an_urgent_errand_is_next", bus::an_urgent_errand_is_next),
+    ("no_start_follows_a_stop", bus::no_start_follows_a_stop),
     ("a_bus_is_closed", bus::a_bus_is_closed),
     ("a_bus_is_closed_by_who_waits", bus::a_bus_is_closed_by_who_waits),
     ("a_bus_is_dropped", bus::a_bus_is_dropped),

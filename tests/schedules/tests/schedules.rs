@@ -2,7 +2,7 @@
 
 use drivebus_schedules::scenarios::ALL;
 
-/// Orders of each scenario, of each kind: with 26 scenarios a hundred and fifty thousand in all.
+/// Orders of each scenario, of each kind: with 26 scenarios a hundred and fifty-six thousand in all.
 const EACH: usize = 3_000;
 
 /// As many as are asked for (`DRIVEBUS_SCHEDULES`), or else [`EACH`].
@@ -47,6 +47,7 @@ explored! {
     errands_and_callers,
     an_errand_is_abandoned,
     an_urgent_errand_is_next,
+    no_start_follows_a_stop,
     a_bus_is_closed,
     a_bus_is_closed_by_who_waits,
     a_bus_is_dropped,

@@ -78,8 +78,12 @@ fn options(priority: Priority) -> CallOptions {
 
 /// Leaves a write to `address` of unit 1.
 fn leave(bus: &Arc<Bus>, address: u16, priority: Priority, tell: &Sender<Told>) -> Option<Running> {
+    leave_with(bus, address, options(priority), tell)
+}
+
+fn leave_with(bus: &Arc<Bus>, address: u16, options: CallOptions, tell: &Sender<Told>) -> Option<Running> {
     let tell = tell.clone();
-    let errand = Errand::new(UnitAddress::MIN.into(), &Request::write(address, 1), options(priority), move |outcome| {
+    let errand = Errand::new(UnitAddress::MIN.into(), &Request::write(address, 1), options, move |outcome| {
         // Who left it may not want to know any more.
         let _ = tell.send((address, outcome.map(drop).map_err(|error| error.failure)));
     });
@@ -93,7 +97,11 @@ pub(super) fn call(
     priority: Priority,
     give_up: &mut dyn FnMut() -> bool,
 ) -> Result<(), Failure> {
-    let (request, options) = (Request::write(address, 1), options(priority));
+    call_with(bus, address, options(priority), give_up)
+}
+
+fn call_with(bus: &Bus, address: u16, options: CallOptions, give_up: &mut dyn FnMut() -> bool) -> Result<(), Failure> {
+    let request = Request::write(address, 1);
     let ask = bus.port().ask(UnitAddress::MIN.into(), &request, &options);
     let mut give_up = || bus.is_shut() || give_up();
     let result = Call::new(bus.port(), ask, options).run(&mut give_up, &mut |_| {});
@@ -188,6 +196,35 @@ pub(super) fn an_urgent_errand_is_next() {
     drop(tell);
     assert_eq!(all(&told), [1, 2, 3].map(|address| (address, Ok(()))));
     assert_eq!(sent_by(&sent), [2, 3, 1]);
+    bus.close();
+}
+
+/// Two starts that were decided on before a stop is told, one left and one called: none of them is sent behind it.
+pub(super) fn no_start_follows_a_stop() {
+    const STOP: u16 = 9;
+    let (bus, sent) = open();
+    let (tell, told) = channel();
+    let start = options(Priority::Write).halts(bus.halts(UnitAddress::MIN));
+    let calls = {
+        let (bus, tell) = (Arc::clone(&bus), tell.clone());
+        thread::spawn(move || {
+            let outcome = call_with(&bus, 1, start, &mut || false);
+            assert!(tell.send((1, outcome)).is_ok());
+        })
+    };
+    let leaves = {
+        let (bus, tell) = (Arc::clone(&bus), tell.clone());
+        thread::spawn(move || assert!(leave_with(&bus, 2, start, &tell).is_some()))
+    };
+    assert_eq!(call(&bus, STOP, Priority::Stop, &mut || false), Ok(()));
+    drop(tell);
+    join([calls, leaves]);
+    let (told, sent) = (all(&told), sent_by(&sent));
+    assert_eq!(sent.last(), Some(&STOP), "{sent:?}");
+    for (address, outcome) in told {
+        let wanted = if sent.contains(&address) { Ok(()) } else { Err(Failure::Halted { unit: 1 }) };
+        assert_eq!(outcome, wanted, "{sent:?}");
+    }
     bus.close();
 }
 
