@@ -160,6 +160,7 @@ OPERATIONS = [
     "last_will",
     "bus_timeout",
     "motor_block",
+    "by_name",
     "face",
     "former_names",
 ]

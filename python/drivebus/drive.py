@@ -19,6 +19,7 @@ from drivebus.errors import BadArgument
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations.by_name import by_name
 from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
 from drivebus.operations.former_names import BlockingFormerNames
 from drivebus.operations.halting import WITHIN
@@ -67,8 +68,8 @@ class Drive(BlockingFormerNames):
         )
 
     # Names that are also rooms come after what is taken from the room.
-    run = blocking(motion.run)
-    jog = blocking(motion.jog)
+    run = by_name("reverse", after=1)(blocking(motion.run))
+    jog = by_name("reverse", after=0)(blocking(motion.jog))
     stop = blocking(motion.stop)
     coast = blocking(motion.coast)
     jog_stop = blocking(motion.jog_stop)
@@ -80,7 +81,7 @@ class Drive(BlockingFormerNames):
     monitor = blocking(registers.monitor)
     snapshot = blocking(registers.snapshot)
     read_words = blocking(words.read_words)
-    write_words = blocking(words.write_words)
+    write_words = by_name("force", after=2)(blocking(words.write_words))
     inputs = blocking(bits.inputs)
     outputs = blocking(bits.outputs)
     set_virtual_inputs = blocking(bits.set_virtual_inputs)
@@ -95,7 +96,7 @@ class Drive(BlockingFormerNames):
     wait_for_speed = blocking(waiting.wait_for_speed)
     wait_until_stopped = blocking(waiting.wait_until_stopped)
     check_control = blocking(control.check_control)
-    prepare_control = blocking(control.prepare_control)
+    prepare_control = by_name("store", after=0)(blocking(control.prepare_control))
     backup = blocking(keeping.backup)
     restore = blocking(keeping.restore)
     diff = blocking(keeping.diff)
@@ -125,30 +126,32 @@ class Drive(BlockingFormerNames):
         return at_once(registers.read(unit_of(self), *names, verify=verify, unverified=unverified))
 
     @overload
-    def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+    def write(self, name: str, value: object, *, store: bool = False, unverified: bool = False) -> None: ...
     @overload
     def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
+    @by_name("store", after=2)
     @documented_by(parameters.write)
     def write(
         self,
         name: str | Mapping[str, object],
         value: object = None,
-        store: bool = False,
         *,
+        store: bool = False,
         unverified: bool = False,
     ) -> None:
         """Writes one value by name, or several from a mapping; see `parameters.write`."""
         if isinstance(name, Mapping):
             at_once(parameters.write(unit_of(self), name, store=store, unverified=unverified))
         else:
-            at_once(parameters.write(unit_of(self), name, value, store, unverified=unverified))
+            at_once(parameters.write(unit_of(self), name, value, store=store, unverified=unverified))
 
+    @by_name("reverse", after=1)
     @contextmanager
     def running(
         self,
         hz: float | None = None,
-        reverse: bool = False,
         *,
+        reverse: bool = False,
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
@@ -178,16 +181,17 @@ class Drive(BlockingFormerNames):
             Unconfirmed: From `run`, after which it is stopped; or from stopping: the motor may still turn. Or it was
                 told to stop, and does not stand when *timeout* is over; the message says what it does.
         """
-        run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
+        run = functools.partial(self.run, hz, reverse=reverse, confirm=confirm, force=force, unverified=unverified)
         standstill = timeout if checks.flag("wait", wait) else None
         with self._moving(run, motion.end_run, unverified, standstill, stop_within):
             yield self
 
+    @by_name("reverse", after=0)
     @contextmanager
     def jogging(
         self,
-        reverse: bool = False,
         *,
+        reverse: bool = False,
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
@@ -197,7 +201,7 @@ class Drive(BlockingFormerNames):
 
         It is ended by the family's jog stop, or where it has none by a stop.
         """
-        jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
+        jog = functools.partial(self.jog, reverse=reverse, confirm=confirm, force=force, unverified=unverified)
         with self._moving(jog, motion.end_jog, unverified, None, stop_within):
             yield self
 

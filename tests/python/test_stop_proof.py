@@ -71,7 +71,7 @@ class TestTheUsualCase:
         self, simulator: Simulator, drive: Drive, reverse: bool
     ) -> None:
         """And by how the drive is set: P00.01, P00.02, P00.03, P00.06 and P00.12."""
-        drive.run(50.0, reverse)
+        drive.run(50.0, reverse=reverse)
         drive.wait_for_speed(timeout=30)
         begun = drive.bus.now()
         drive.stop()
@@ -96,7 +96,7 @@ class TestTheUsualCase:
 
     @pytest.mark.parametrize("reverse", [False, True])
     def test_the_end_of_a_jog(self, drive: Drive, reverse: bool) -> None:
-        drive.jog(reverse)
+        drive.jog(reverse=reverse)
         drive.bus.sleep(3.0)
         drive.jog_stop()
         assert drive.state() is State.STOPPED

@@ -141,19 +141,6 @@ def test_a_state_nobody_knows_is_not_a_stop(virtual_drive: Drive, monkeypatch: p
         virtual_drive.wait_until_stopped(timeout=30)
 
 
-def test_arguments_may_stand_in_the_order_of_the_documentation(virtual: Simulator, virtual_drive: Drive) -> None:
-    virtual_drive.run(5.0, True)
-    assert virtual_drive.wait_for_speed(5.0, 0.1, 30).state is State.REVERSE
-    virtual_drive.stop()
-    virtual_drive.wait_until_stopped(30)
-    virtual_drive.jog(True)
-    virtual_drive.jog_stop()
-    virtual_drive.wait_until_stopped(30)
-    with virtual_drive.running(5.0, True):
-        pass
-    assert [value for value in commands(virtual) if value not in (STOP, 8)] == [2, 4, 2]
-
-
 def test_a_motor_that_turns_is_not_jogged(virtual: Simulator, virtual_drive: Drive) -> None:
     virtual_drive.run(hz=5.0)
     with pytest.raises(drivebus.NotAllowed, match="turns already"):

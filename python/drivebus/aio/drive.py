@@ -15,6 +15,7 @@ from drivebus.backup import keeping
 from drivebus.discovery import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations.by_name import by_name
 from drivebus.operations.face import awaited, documented_by, unit_of
 from drivebus.operations.former_names import AwaitedFormerNames
 from drivebus.operations.halting import WITHIN
@@ -52,8 +53,8 @@ class Drive(AwaitedFormerNames):
         )
 
     # Names that are also rooms come after what is taken from the room.
-    run = awaited(motion.run)
-    jog = awaited(motion.jog)
+    run = by_name("reverse", after=1)(awaited(motion.run))
+    jog = by_name("reverse", after=0)(awaited(motion.jog))
     stop = awaited(motion.stop)
     coast = awaited(motion.coast)
     jog_stop = awaited(motion.jog_stop)
@@ -65,7 +66,7 @@ class Drive(AwaitedFormerNames):
     monitor = awaited(registers.monitor)
     snapshot = awaited(registers.snapshot)
     read_words = awaited(words.read_words)
-    write_words = awaited(words.write_words)
+    write_words = by_name("force", after=2)(awaited(words.write_words))
     inputs = awaited(bits.inputs)
     outputs = awaited(bits.outputs)
     set_virtual_inputs = awaited(bits.set_virtual_inputs)
@@ -80,7 +81,7 @@ class Drive(AwaitedFormerNames):
     wait_for_speed = awaited(waiting.wait_for_speed)
     wait_until_stopped = awaited(waiting.wait_until_stopped)
     check_control = awaited(control.check_control)
-    prepare_control = awaited(control.prepare_control)
+    prepare_control = by_name("store", after=0)(awaited(control.prepare_control))
     backup = awaited(keeping.backup)
     restore = awaited(keeping.restore)
     diff = awaited(keeping.diff)
@@ -98,30 +99,32 @@ class Drive(AwaitedFormerNames):
         return await registers.read(unit_of(self), *names, verify=verify, unverified=unverified)
 
     @overload
-    async def write(self, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+    async def write(self, name: str, value: object, *, store: bool = False, unverified: bool = False) -> None: ...
     @overload
     async def write(self, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
+    @by_name("store", after=2)
     @documented_by(parameters.write)
     async def write(
         self,
         name: str | Mapping[str, object],
         value: object = None,
-        store: bool = False,
         *,
+        store: bool = False,
         unverified: bool = False,
     ) -> None:
         """See `parameters.write`."""
         if isinstance(name, Mapping):
             await parameters.write(unit_of(self), name, store=store, unverified=unverified)
         else:
-            await parameters.write(unit_of(self), name, value, store, unverified=unverified)
+            await parameters.write(unit_of(self), name, value, store=store, unverified=unverified)
 
+    @by_name("reverse", after=1)
     @asynccontextmanager
     async def running(
         self,
         hz: float | None = None,
-        reverse: bool = False,
         *,
+        reverse: bool = False,
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
@@ -135,24 +138,25 @@ class Drive(AwaitedFormerNames):
         the program stops it too, and where the event loop is gone by then, without one. A cancellation is not kept
         waiting by *wait*. Otherwise as `drivebus.Drive.running`.
         """
-        run = functools.partial(self.run, hz, reverse, confirm=confirm, force=force, unverified=unverified)
+        run = functools.partial(self.run, hz, reverse=reverse, confirm=confirm, force=force, unverified=unverified)
         standstill = timeout if checks.flag("wait", wait) else None
         block = MotorBlock(unit_of(self).trusting(unverified), run, motion.end_run, standstill, stop_within)
         async with _block(block):
             yield self
 
+    @by_name("reverse", after=0)
     @asynccontextmanager
     async def jogging(
         self,
-        reverse: bool = False,
         *,
+        reverse: bool = False,
         confirm: float = 1.0,
         force: bool = False,
         unverified: bool = False,
         stop_within: float = WITHIN,
     ) -> AsyncIterator[Drive]:
         """Jogs the motor inside an `async with` block and ends the jog by all means. Otherwise as `running`."""
-        jog = functools.partial(self.jog, reverse, confirm=confirm, force=force, unverified=unverified)
+        jog = functools.partial(self.jog, reverse=reverse, confirm=confirm, force=force, unverified=unverified)
         block = MotorBlock(unit_of(self).trusting(unverified), jog, motion.end_jog, None, stop_within)
         async with _block(block):
             yield self

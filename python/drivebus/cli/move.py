@@ -125,7 +125,7 @@ def jog(session: Session, seconds: float, reverse: bool, force: bool, yes: bool)
     way = "in reverse" if reverse else "forward"
     with session.drive() as drive:
         session.ask(f"This jogs the motor {way} for {seconds:g} s", yes)
-        with drive.jogging(reverse, force=force):
+        with drive.jogging(reverse=reverse, force=force):
             drive.bus.sleep(seconds)
         _done(session, drive, "jog")
 
@@ -155,7 +155,8 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
         session.ask_if_running(drive, OBEYING, yes)
         before = drive.check_control()
         rows = [
-            [item.code, item.actual, item.wanted, item.verified, item.label] for item in drive.prepare_control(store)
+            [item.code, item.actual, item.wanted, item.verified, item.label]
+            for item in drive.prepare_control(store=store)
         ]
         if store:
             _say_kept([item.code for item in before if item.ok])

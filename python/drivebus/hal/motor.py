@@ -134,12 +134,12 @@ class Motor:
 
     def _run(self, hz: float, reverse: bool) -> None:
         if self._block is not None:
-            self._drive.run(hz, reverse)
+            self._drive.run(hz, reverse=reverse)
             return
         self._arm()
 
         async def start() -> None:
-            await motion.run(unit, hz, reverse)
+            await motion.run(unit, hz, reverse=reverse)
 
         unit = unit_of(self._drive)
         self._block = MotorBlock(unit, start, self._end)

@@ -42,7 +42,7 @@ async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: 
 
 
 async def prepare_control(
-    unit: Unit, store: bool = False, *, setpoint: str | None = None, unverified: bool = False
+    unit: Unit, *, store: bool = False, setpoint: str | None = None, unverified: bool = False
 ) -> Control:
     """Sets the drive to obey the bus. Writes only the settings that differ, and returns what `check_control` says then.
 

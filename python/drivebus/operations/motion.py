@@ -37,8 +37,8 @@ __all__ = [
 async def run(
     unit: Unit,
     hz: float | None = None,
-    reverse: bool = False,
     *,
+    reverse: bool = False,
     confirm: float = 1.0,
     force: bool = False,
     unverified: bool = False,
@@ -63,10 +63,10 @@ async def run(
     not sent any more.
 
     Raises:
-        NotAllowed: It was told to stop meanwhile (`NotReady`, whose `why` is `"halted"`); the drive is in fault, not under bus control, or takes its speed from elsewhere; *hz* is above
-            its maximum; the link is bad; another drive answers at this address since the port was opened again; or
-            something is not verified for the family: the command, or both ways to stop what it starts. Nothing was
-            sent that moves it.
+        NotAllowed: It was told to stop meanwhile (`NotReady`, whose `why` is `"halted"`); the drive is in fault, not
+            under bus control, or takes its speed from elsewhere; *hz* is above its maximum; the link is bad; another
+            drive answers at this address since the port was opened again; or something is not verified for the
+            family: the command, or both ways to stop what it starts. Nothing was sent that moves it.
         Refused: The drive did not start.
         NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
         Unconfirmed: The command was sent; the message names the state seen last. It is not repeated. Or the family
@@ -88,7 +88,7 @@ async def run(
 
 
 async def jog(
-    unit: Unit, reverse: bool = False, *, confirm: float = 1.0, force: bool = False, unverified: bool = False
+    unit: Unit, *, reverse: bool = False, confirm: float = 1.0, force: bool = False, unverified: bool = False
 ) -> None:
     """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
 

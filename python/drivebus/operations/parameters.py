@@ -30,15 +30,15 @@ class _Limit(NamedTuple):
 
 
 @overload
-async def write(unit: Unit, name: str, value: object, store: bool = False, *, unverified: bool = False) -> None: ...
+async def write(unit: Unit, name: str, value: object, *, store: bool = False, unverified: bool = False) -> None: ...
 @overload
 async def write(unit: Unit, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
 async def write(
     unit: Unit,
     name: str | Mapping[str, object],
     value: object = None,
-    store: bool = False,
     *,
+    store: bool = False,
     unverified: bool = False,
 ) -> None:
     """Writes one value, or several from a mapping.

@@ -36,7 +36,7 @@ async def read_words(
         return await unit.bus.ask(Read.at(unit.address, address, count, urgent=urgent, verify=verify))
 
 
-async def write_words(unit: Unit, address: int, value: int | Sequence[int], force: bool = False) -> None:
+async def write_words(unit: Unit, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
     """Writes one word (an int: 06H, or 10H where there is no 06H) or several (a sequence: 10H), as they are. Sent once.
 
     As `Bus.write`, but another drive that answers at this address gets nothing, and a refusal says what this family

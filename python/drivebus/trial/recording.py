@@ -76,7 +76,7 @@ class Recording:
             reverse: Turn the other way.
             force: Start although the link is bad.
         """
-        with self._drive.running(self._course.start, reverse, force=force):
+        with self._drive.running(self._course.start, reverse=reverse, force=force):
             self._come_to_the_start(settle)
             if self.aborted is None:
                 self._follow(duration)

@@ -97,11 +97,11 @@ class Motor:
             if self.stops != since:
                 self._journal.say(f"{self.called}: {what}: {_STOPPED}", "yellow")
             elif block is None:
-                self._begin(_Block(False), what, drive, lambda: drive.running(hz, reverse), None)
+                self._begin(_Block(False), what, drive, lambda: drive.running(hz, reverse=reverse), None)
             elif block.over.is_set() or block.jogs:
                 self._journal.say(f"{self.called}: it is still being stopped; give the order again", "yellow")
             else:
-                block.orders.put(lambda: self._do(what, lambda: drive.run(hz, reverse), since))
+                block.orders.put(lambda: self._do(what, lambda: drive.run(hz, reverse=reverse), since))
 
     def jog(self, drive: drivebus.Drive, seconds: float, reverse: bool, since: int) -> None:
         """Jogs it for *seconds*, or until it is stopped; not if it was stopped *since*."""
@@ -110,7 +110,7 @@ class Motor:
             if self.stops != since:
                 self._journal.say(f"{self.called}: {what}: {_STOPPED}", "yellow")
             elif self._block is None:
-                self._begin(_Block(True), what, drive, lambda: drive.jogging(reverse), seconds)
+                self._begin(_Block(True), what, drive, lambda: drive.jogging(reverse=reverse), seconds)
             else:
                 self._journal.say(f"{self.called}: it turns already; stop it before a jog", "yellow")
 

@@ -224,7 +224,7 @@ class Parameters(Screen[None]):
     def _write(self, app: App[object], row: drivebus.Description, value: object, store: bool) -> None:
         """Writes, and reads what is there now. In a thread of its own."""
         key = _key(row)
-        self._drive.write(key, value, store)
+        self._drive.write(key, value, store=store)
         self._values.pop(key, None)
         self._read(app, [row], self._turn)
 
