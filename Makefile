@@ -31,7 +31,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
 	@echo "make test    sets everything up and runs every check"
-	@echo "make lint    format, clippy, rustdoc, ruff, mypy, stubtest, layers"
+	@echo "make lint    format, clippy, rustdoc, ruff, mypy, pyright, stubtest, layers"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
@@ -104,6 +104,7 @@ types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest drivebus._native
+	$(BIN)/basedpyright
 
 rust-test: $(VENV)/.created
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
