@@ -10,6 +10,8 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar, final
 
 from typing_extensions import Buffer
 
+from drivebus.errors import Decision
+
 _T_co = TypeVar("_T_co", covariant=True)
 _Piece: TypeAlias = tuple[str, bytes, float, float, float | None, float, float | None, str | None]
 
@@ -636,7 +638,7 @@ class Profile:
     def exceptions(self) -> dict[int, tuple[str, str]]: ...
     def exception(self, code: int, /) -> tuple[str, str]:
         """Name and meaning of an exception code."""
-    def exception_means(self, code: int, /) -> str:
+    def exception_means(self, code: int, /) -> Decision:
         """Whether it is a decision: `"no_such"`, `"not_now"`, `"ask_again"` or `"taken"`."""
 
 @final
@@ -739,7 +741,7 @@ class Simulator:
     @property
     def line(self) -> SimulatedLine: ...
 
-def exception_means(code: int, /) -> str:
+def exception_means(code: int, /) -> Decision:
     """Whether an exception (0..=255) is a decision by the specification: as `Profile.exception_means`."""
 
 def end_of_program() -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from errno import EIO
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 
 from drivebus.advice import Advice, Text
 
@@ -144,6 +144,24 @@ class CrcError(BadAnswer):
     """
 
 
+Decision: TypeAlias = Literal["no_such", "not_now", "ask_again", "taken"]
+"""What a unit decides by an exception; see `Refused`."""
+
+Why: TypeAlias = Literal[
+    "",
+    "fault",
+    "no_voltage",
+    "turning",
+    "control_source",
+    "settings",
+    "read_only",
+    "being_stopped",
+    "halted",
+    "ending",
+]
+"""What stands against what was asked; see `NotReady`. Empty where nobody said."""
+
+
 class Refused(DrivebusError):
     """The drive refused: an exception answer.
 
@@ -163,7 +181,7 @@ class Refused(DrivebusError):
     code: int
     name: str
     meaning: str
-    means: str
+    means: Decision
 
     def __init__(
         self,
@@ -172,7 +190,7 @@ class Refused(DrivebusError):
         code: int = 0,
         name: str = "",
         meaning: str = "",
-        means: str = "not_now",
+        means: Decision = "not_now",
         **details: Unpack[Details],
     ) -> None:
         super().__init__(message, **details)
@@ -248,9 +266,9 @@ class NotReady(NotAllowed):
             stop meanwhile. `"ending"`: the program ends.
     """
 
-    why: str
+    why: Why
 
-    def __init__(self, message: str = "", *, why: str = "", **details: Unpack[Details]) -> None:
+    def __init__(self, message: str = "", *, why: Why = "", **details: Unpack[Details]) -> None:
         super().__init__(message, **details)
         self.why = why
 

@@ -6,7 +6,11 @@ of the address: coil 0001H is 0x1_0001, discrete input 0001H 0x2_0001, input reg
 
 from __future__ import annotations
 
-__all__ = ["BITS", "TABLES", "WRITABLE", "place", "shown", "split"]
+from typing import Literal, TypeAlias
+
+__all__ = ["BITS", "TABLES", "WRITABLE", "Table", "place", "shown", "split"]
+
+Table: TypeAlias = Literal["holding", "input", "coil", "discrete"]
 
 TABLES = ("holding", "input", "coil", "discrete")
 """The four tables of the Modbus specification, the one that is meant where nothing is said first."""

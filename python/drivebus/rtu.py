@@ -6,9 +6,9 @@ Nothing here opens, sends or waits. Frames are whole: unit, PDU and CRC.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
-from drivebus import _native
+from drivebus import _native, places
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write, is_write, only_reads
 
 __all__ = [
@@ -24,6 +24,12 @@ __all__ = [
     "only_reads",
     "written",
 ]
+
+
+Kind: TypeAlias = Literal[
+    "read", "write", "write_many", "echo", "read_answer", "write_many_answer", "exception", "other"
+]
+"""What a frame is; see `Frame`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,11 +54,11 @@ class Frame:
         pdu: The PDU of a frame that is none of the above.
     """
 
-    kind: str
+    kind: Kind
     unit: int
     function: int
     crc: int
-    table: str | None = None
+    table: places.Table | None = None
     address: int | None = None
     count: int | None = None
     value: int | None = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from drivebus import places
 from drivebus.named import Named
@@ -27,6 +27,15 @@ __all__ = [
     "WatchdogSettings",
     "group_of",
 ]
+
+
+Access: TypeAlias = Literal["rw", "ro", "wo", "run", "stop", "unknown"]
+"""Whether and when something may be written; see `Description`."""
+
+Evidence: TypeAlias = Literal["verified", "unverified", "assumed"]
+"""How well documents prove something; see `Description`."""
+
+Kind: TypeAlias = Literal["register", "parameter"]
 
 
 class Choice(int):
@@ -121,7 +130,7 @@ class Fault:
     cause: str = ""
     remedy: str = ""
     verified: bool = True
-    evidence: str = "verified"
+    evidence: Evidence = "verified"
     note: str = ""
     values: Mapping[str, Value] = field(default_factory=dict, compare=False)
 
@@ -259,7 +268,7 @@ class Description:
     name: str
     code: str | None
     label: str
-    kind: str
+    kind: Kind
     address: int | None
     unit: str
     scale: int | float
@@ -269,19 +278,19 @@ class Description:
     low_from: str | None
     high_from: str | None
     default: Any
-    access: str
+    access: Access
     choices: Mapping[int, str]
     bits: Mapping[str, Mapping[int, str]] | None
     source: str
     verified: bool
     note: str
-    evidence: str = "verified"
+    evidence: Evidence = "verified"
     words: int = 1
     variant: str | None = None
     unverified_bits: tuple[str, ...] = ()
     listed: bool = True
     high_first: bool = False
-    table: str = "holding"
+    table: places.Table = "holding"
 
     @property
     def place(self) -> int | None:

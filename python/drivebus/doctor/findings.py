@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from drivebus.errors import DrivebusError
 
-__all__ = ["Finding", "Severity"]
+__all__ = ["Finding", "Severity", "Step"]
+
+Step: TypeAlias = Literal["adapter", "line", "unit"]
+"""What was examined."""
 
 
 class Severity(str, Enum):
@@ -47,7 +50,7 @@ class Finding:
         error: The kind of error that calls end with because of it; None where none does.
     """
 
-    step: str
+    step: Step
     name: str
     severity: Severity
     text: str

@@ -12,7 +12,7 @@ from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
 from drivebus.identify.answers import LOCKED, UNREACHED, answer_at, no_such_address
 from drivebus.identify.families import all_of, one_of, shipped
-from drivebus.identify.results import Identification
+from drivebus.identify.results import Certainty, Identification
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
@@ -73,6 +73,7 @@ def _by_code(unit: int, code: int, rows: list[IdentificationCode]) -> Identifica
     title = one_of(name for row in rows for name in (row.title, *row.shared))
     printed = next((row for row in rows if row.verified), None)
     says = f"it reports {code:04X}H"
+    certainty: Certainty
     if printed is None:
         certainty, reason = "unverified", f"{says}, which no document prints for {title}, only {rows[0].source}"
     elif len(families) > 1:

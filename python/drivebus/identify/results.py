@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
-__all__ = ["Found", "Identification"]
+__all__ = ["Certainty", "Found", "Identification", "Protocol"]
+
+Certainty: TypeAlias = Literal["certain", "shared", "unverified", "by answers", "unknown"]
+"""How sure it is what a unit is; see `Identification`."""
+
+Protocol: TypeAlias = Literal["modbus", "huanyang"]
+"""What a unit speaks: Modbus RTU, or its maker's own protocol."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +34,9 @@ class Found:
     identification: int | None
     round_trip: float
     problem: str | None = None
-    certainty: str = "unknown"
+    certainty: Certainty = "unknown"
     candidates: tuple[str, ...] = ()
-    protocol: str = "modbus"
+    protocol: Protocol = "modbus"
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ class Identification:
     family: str | None
     code: int | None
     title: str
-    certainty: str
+    certainty: Certainty
     reason: str
 
     def __str__(self) -> str:

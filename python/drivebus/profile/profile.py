@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drivebus import _native, checks
-from drivebus.errors import BadArgument
+from drivebus.errors import BadArgument, Decision
 from drivebus.profile.facts import (
     FactorySerial,
     IdentificationCode,
@@ -375,7 +375,7 @@ class Profile:
         """Name and meaning of an exception code in this family."""
         return self._native.exception(code)
 
-    def exception_means(self, code: int, /) -> str:
+    def exception_means(self, code: int, /) -> Decision:
         """Whether an exception is a decision: see `Refused.means`. Where the profile says nothing, as in Modbus."""
         return self._native.exception_means(code)
 
@@ -451,7 +451,7 @@ def native_of(profile: Profile) -> _native.Profile:
     return profile._native
 
 
-def standard_means(code: int) -> str:
+def standard_means(code: int) -> Decision:
     """Whether an exception is a decision by the Modbus specification: see `Refused.means`."""
     return _native.exception_means(code)
 

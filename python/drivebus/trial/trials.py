@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from drivebus import checks
 from drivebus.advice import Text, argument
@@ -27,6 +28,9 @@ __all__ = ["Trial", "ramp", "sine", "step"]
 
 _CURRENT = "output_current"
 
+Kind: TypeAlias = Literal["step", "ramp", "sine"]
+"""Which trial it was."""
+
 _Told = Callable[[float, Mapping[str, float]], object]
 
 
@@ -47,7 +51,7 @@ class Trial:
         aborted: Why the motor was stopped early; None where it was not.
     """
 
-    kind: str
+    kind: Kind
     course: Change | Wave
     samples: Samples
     roles: Roles
@@ -175,7 +179,7 @@ def sine(
 
 def _run(
     drive: Drive,
-    kind: str,
+    kind: Kind,
     course: Change | Wave,
     duration: float,
     max_current: float | None,
@@ -213,7 +217,7 @@ def _run(
 
 
 def _figures(
-    kind: str, course: Change | Wave, samples: Samples, roles: Roles
+    kind: Kind, course: Change | Wave, samples: Samples, roles: Roles
 ) -> StepFigures | RampFigures | SineFigures | None:
     frequency = samples[roles.frequency]
     if isinstance(course, Wave):
