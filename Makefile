@@ -25,7 +25,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint rust-test counts counts-update python-test interop-parts examples wheel-smoke \
+        machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-test interop-parts examples wheel-smoke \
         pictures matrix semver
 
 help: ## what can be made
@@ -52,7 +52,14 @@ help: ## what can be made
 demo: $(VENV)/.wheel
 	$(BIN)/drivebus demo
 
-test: lint rust-test counts python-test examples wheel-smoke
+# What is downloaded and built goes two at a time: a download, or the end of a link, leaves a core idle. No two of them need
+# the same lock: one target folder of cargo each, and one pip. What is tested goes alone, so that nothing but the test makes
+# it wait.
+TWO := $(MAKE) --no-print-directory --jobs=2
+test:
+	@$(TWO) layers rust-lint $(VENV)/.dev dist/.wheel
+	@$(TWO) rust-build types interop-parts
+	@$(MAKE) --no-print-directory rust-test counts python-test examples wheel-smoke
 	@echo "make test: every check passed"
 
 lint: layers rust-lint types
@@ -105,6 +112,13 @@ types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest drivebus._native
 	$(BIN)/basedpyright
+
+rust-build: $(VENV)/.created
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+	    set -x; $(CARGO) nextest run --no-run $(LOCKED) $(RUST_TESTED); \
+	else \
+	    set -x; $(CARGO) test --no-run $(LOCKED) --quiet $(RUST_TESTED); \
+	fi
 
 rust-test: $(VENV)/.created
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
