@@ -10,7 +10,7 @@ import pytest
 
 import drivebus
 import drivebus.aio
-from drivebus import BadArgument, Bus, NotReady, Simulator, Unconfirmed
+from drivebus import BadArgument, Bus, NotReady, Profile, Simulator, Unconfirmed
 
 from .conftest import NO_PTY
 
@@ -153,3 +153,29 @@ def test_a_port_that_changed_hands_knows_of_no_stop_and_starts_nothing(request: 
         with pytest.raises(NotReady, match="changed hands"):
             guest.write(1, CONTROL, FORWARD, halts=halts)
         assert simulator.drive(1).writes() == []
+
+
+class Own:
+    """A bus of somebody's own, which hands on what it is asked and counts nothing."""
+
+    def __init__(self, bus: drivebus.aio.Bus) -> None:
+        self._bus = bus
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "halts":
+            raise AttributeError(name)
+        return getattr(self._bus, name)
+
+
+def test_a_bus_that_counts_no_stops_starts_all_the_same() -> None:
+    async def main() -> None:
+        with Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator:
+            async with drivebus.aio.Bus(simulator) as bus:
+                await (await bus.drive(1)).prepare_control()
+                own: Any = Own(bus)
+                drive = drivebus.aio.Drive(own, 1, Profile.builtin("gd350"))
+                async with drive.running(5.0):
+                    assert commands(simulator)[-1] == FORWARD
+                assert commands(simulator)[-1] in HALTS
+
+    asyncio.run(main())

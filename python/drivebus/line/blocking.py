@@ -83,7 +83,7 @@ class BlockingBus:
         return self._bus.link(unit)
 
     async def halts(self, unit: int, /) -> int | None:
-        """See `AwaitableBus`."""
+        """See `AwaitsHalts`."""
         return self._bus.halts(unit) if isinstance(self._bus, CountsHalts) else None
 
     @property

@@ -12,7 +12,7 @@ from typing import Protocol, runtime_checkable
 from drivebus.line.asking import Asks
 from drivebus.line.stats import Link
 
-__all__ = ["AwaitableBus", "BusProtocol", "CountsHalts", "KeepsWills"]
+__all__ = ["AwaitableBus", "AwaitsHalts", "BusProtocol", "CountsHalts", "KeepsWills"]
 
 
 class BusProtocol(Protocol):
@@ -94,9 +94,6 @@ class AwaitableBus(Asks, Protocol):
     async def link(self, unit: int, /) -> Link:
         """See `BusProtocol`."""
 
-    async def halts(self, unit: int, /) -> int | None:
-        """See `CountsHalts`; None where the line does not count them."""
-
     @property
     def reconnects(self) -> int:
         """See `BusProtocol`."""
@@ -114,6 +111,14 @@ class AwaitableBus(Asks, Protocol):
 
     def blocking(self) -> AwaitableBus:
         """The same line for who has no event loop: it blocks."""
+
+
+@runtime_checkable
+class AwaitsHalts(Protocol):
+    """What `CountsHalts` is, of a line that is awaited."""
+
+    async def halts(self, unit: int, /) -> int | None:
+        """The number; None where the line behind it does not count them."""
 
 
 @runtime_checkable

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from drivebus import checks
 from drivebus.identify.same_unit import SameUnit
-from drivebus.line.protocols import AwaitableBus
+from drivebus.line.protocols import AwaitableBus, AwaitsHalts
 from drivebus.line.units import UnitRecord, units_of
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
@@ -74,6 +74,8 @@ class Unit:
 
     async def unless_halted(self) -> Unit:
         """The same unit, for a start: once somebody tells it to halt, nothing is written to it over this view."""
+        if not isinstance(self.bus, AwaitsHalts):
+            return self
         return replace(self, halts=await self.bus.halts(self.address))
 
     def taken_for(self, profile: Profile) -> Unit:
