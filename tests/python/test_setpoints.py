@@ -151,7 +151,7 @@ BAD_NAMES: list[Callable[[Any], object]] = [
     lambda drive: drive.write_setpoint("torque", 40.0),
     lambda drive: drive.read_setpoint(None),
     lambda drive: drive.check_control([]),
-    lambda drive: drive.prepare_control("yes"),
+    lambda drive: drive.prepare_control(store="yes"),
     lambda drive: drive.prepare_control(setpoint=5),
     lambda drive: drive.special_control(motor=[1]),
     lambda drive: drive.set_virtual_inputs(S1=2),

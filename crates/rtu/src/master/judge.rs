@@ -233,10 +233,11 @@ impl Master {
     }
 
     /// When nothing more is waited for behind what came in the place of the answer, where that is told, and damaged: at once on a
-    /// line on which such do not come again, if nothing of it is missing. Else the right one may come right behind it.
+    /// line on which such do not come again, if nothing of it is missing. Else the right one may come right behind it; and what
+    /// is missing may be the last lump of it.
     fn ends_at(&self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) -> Option<Instant> {
         let pending = self.framer.pending();
-        self.patience.filter(|_| expected.is_read())?;
+        let pause = self.patience.filter(|_| expected.is_read())?.pause;
         let came = match self.beside.damaged() {
             Some(damaged) if pending.is_empty() => damaged,
             None if !pending.is_empty() && self.beside.is_empty() => pending,
@@ -246,8 +247,14 @@ impl Master {
         if !is_long_enough(expected, came.len()) || !self.is_told(now, unit, expected, came) {
             return None;
         }
-        let is_all = pending.is_empty() && expected.adu_len() == Some(came.len());
-        let behind = if is_all && self.torn.none_comes_again(now, timeout) { Duration::ZERO } else { BEHIND };
+        let len = expected.adu_len();
+        let behind = if pending.is_empty() && len == Some(came.len()) && self.torn.none_comes_again(now, timeout) {
+            Duration::ZERO
+        } else if len.is_some_and(|len| came.len() < len) {
+            BEHIND.max(pause)
+        } else {
+            BEHIND
+        };
         self.framer.last_byte().map(|last| last + behind)
     }
 

@@ -132,6 +132,21 @@ fn a_late_answer_that_comes_damaged_is_owed_no_more_where_none_comes_again() {
     }
 }
 
+/// What an adapter hands over last may be a byte. Of an answer that is all there nothing is waited for so long.
+#[test]
+fn what_lacks_a_byte_is_waited_for_as_long_as_the_line_pauses() {
+    for (pause, missing, over) in [(10, 1, 10), (10, 2, 10), (60, 1, 60), (60, 2, 60), (60, 0, 20)] {
+        let mut asker = Asker::new();
+        asker.master.be_patient(Some(Patience::new(Duration::from_millis(pause), Duration::ZERO)));
+        asker.sends(1_000, unit(4), &read(2), TIMEOUT.max(Duration::from_millis(200)));
+        let mut bytes = words(unit(4), 2, 7).as_bytes().to_vec();
+        bytes[4] ^= u8::from(missing == 0);
+        asker.master.receive(ms(1_010), &bytes[..bytes.len() - missing]);
+        assert!(asker.master.poll(before(ms(1_010 + over))).is_none(), "{missing} are missing, pauses are {pause} ms");
+        assert!(asker.master.poll(ms(1_010 + over)).is_some(), "{missing} are missing, pauses are {pause} ms");
+    }
+}
+
 /// The late answer of unit 4 to a read of two words comes as `bytes` while nothing is in flight; `other` is open besides.
 fn owed_after(bytes: &[u8], other: Option<(u8, Request<'_>)>) -> bool {
     let mut asker = known();
