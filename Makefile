@@ -113,12 +113,9 @@ types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/python -m mypy.stubtest drivebus._native
 	$(BIN)/basedpyright
 
+# What nextest runs is what cargo builds.
 rust-build: $(VENV)/.created
-	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-	    set -x; $(CARGO) nextest run --no-run $(LOCKED) $(RUST_TESTED); \
-	else \
-	    set -x; $(CARGO) test --no-run $(LOCKED) --quiet $(RUST_TESTED); \
-	fi
+	$(CARGO) test --no-run $(LOCKED) --quiet $(RUST_TESTED)
 
 rust-test: $(VENV)/.created
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \

@@ -135,6 +135,7 @@ MOST_ANCESTORS = 2
 
 # The files of `operations`, each of which may import those before it.
 OPERATIONS = [
+    "by_name",
     "interruptions",
     "program_end",
     "stop_proof",
@@ -160,7 +161,6 @@ OPERATIONS = [
     "last_will",
     "bus_timeout",
     "motor_block",
-    "by_name",
     "face",
     "former_names",
 ]

@@ -68,8 +68,8 @@ class Drive(BlockingFormerNames):
         )
 
     # Names that are also rooms come after what is taken from the room.
-    run = by_name("reverse", after=1)(blocking(motion.run))
-    jog = by_name("reverse", after=0)(blocking(motion.jog))
+    run = blocking(motion.run)
+    jog = blocking(motion.jog)
     stop = blocking(motion.stop)
     coast = blocking(motion.coast)
     jog_stop = blocking(motion.jog_stop)
@@ -81,7 +81,7 @@ class Drive(BlockingFormerNames):
     monitor = blocking(registers.monitor)
     snapshot = blocking(registers.snapshot)
     read_words = blocking(words.read_words)
-    write_words = by_name("force", after=2)(blocking(words.write_words))
+    write_words = blocking(words.write_words)
     inputs = blocking(bits.inputs)
     outputs = blocking(bits.outputs)
     set_virtual_inputs = blocking(bits.set_virtual_inputs)
@@ -96,7 +96,7 @@ class Drive(BlockingFormerNames):
     wait_for_speed = blocking(waiting.wait_for_speed)
     wait_until_stopped = blocking(waiting.wait_until_stopped)
     check_control = blocking(control.check_control)
-    prepare_control = by_name("store", after=0)(blocking(control.prepare_control))
+    prepare_control = blocking(control.prepare_control)
     backup = blocking(keeping.backup)
     restore = blocking(keeping.restore)
     diff = blocking(keeping.diff)

@@ -215,10 +215,7 @@ impl Bus {
 
     /// As [`link`](Self::link), for who waits for nobody: `None` where another program has the port, and would be asked.
     pub fn link_if_here(&self, unit: UnitAddress) -> Option<Link> {
-        if !self.shared.port.is_of_this_process() {
-            return Some(Link::default());
-        }
-        (!self.is_elsewhere()).then(|| self.shared.port.figures.link(unit))
+        self.told_here(|port| port.figures.link(unit))
     }
 
     /// A number that is another one each time `unit` is told to halt over this line, by whichever program: by a write that is
@@ -233,14 +230,16 @@ impl Bus {
 
     /// As [`halts`](Self::halts), for who waits for nobody: `None` where another program has the port, and would be asked.
     pub fn halts_if_here(&self, unit: UnitAddress) -> Option<u64> {
-        if !self.port().is_of_this_process() {
-            return Some(0);
-        }
-        (!self.is_elsewhere()).then(|| self.shared.port.halts.of(unit))
+        self.told_here(|port| port.halts.of(unit))
     }
 
-    fn is_elsewhere(&self) -> bool {
-        self.shared.sharing.as_ref().is_some_and(|sharing| sharing.is_guest())
+    /// What the port of this program tells; `None` where another program has it. In a forked child it tells nothing.
+    fn told_here<T: Default>(&self, tell: impl FnOnce(&Port) -> T) -> Option<T> {
+        if !self.port().is_of_this_process() {
+            return Some(T::default());
+        }
+        let is_elsewhere = self.shared.sharing.as_ref().is_some_and(|sharing| sharing.is_guest());
+        (!is_elsewhere).then(|| tell(self.port()))
     }
 
     /// A word that no echo still under way carries: for [`Request::echo`]. Where another program has the port, it is asked, a

@@ -53,8 +53,8 @@ class Drive(AwaitedFormerNames):
         )
 
     # Names that are also rooms come after what is taken from the room.
-    run = by_name("reverse", after=1)(awaited(motion.run))
-    jog = by_name("reverse", after=0)(awaited(motion.jog))
+    run = awaited(motion.run)
+    jog = awaited(motion.jog)
     stop = awaited(motion.stop)
     coast = awaited(motion.coast)
     jog_stop = awaited(motion.jog_stop)
@@ -66,7 +66,7 @@ class Drive(AwaitedFormerNames):
     monitor = awaited(registers.monitor)
     snapshot = awaited(registers.snapshot)
     read_words = awaited(words.read_words)
-    write_words = by_name("force", after=2)(awaited(words.write_words))
+    write_words = awaited(words.write_words)
     inputs = awaited(bits.inputs)
     outputs = awaited(bits.outputs)
     set_virtual_inputs = awaited(bits.set_virtual_inputs)
@@ -81,7 +81,7 @@ class Drive(AwaitedFormerNames):
     wait_for_speed = awaited(waiting.wait_for_speed)
     wait_until_stopped = awaited(waiting.wait_until_stopped)
     check_control = awaited(control.check_control)
-    prepare_control = by_name("store", after=0)(awaited(control.prepare_control))
+    prepare_control = awaited(control.prepare_control)
     backup = awaited(keeping.backup)
     restore = awaited(keeping.restore)
     diff = awaited(keeping.diff)

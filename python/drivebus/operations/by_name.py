@@ -21,10 +21,10 @@ _R = TypeVar("_R")
 
 
 def by_name(name: str, *, after: int) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
-    """Has a method take *name*, one of its keywords, by its place too: behind the *after* arguments that have one."""
+    """Has a method, or its operation, take *name* by its place too: behind the *after* arguments that have one."""
 
     def named(method: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        # Besides them, the drive.
+        # Besides them, the drive or its unit.
         if len(args) != after + 2 or name in kwargs:
             return args, kwargs
         value = args[-1]

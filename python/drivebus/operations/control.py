@@ -10,6 +10,7 @@ from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameters, registers, sending
+from drivebus.operations.by_name import by_name
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.profile.facts import Setting
@@ -41,6 +42,7 @@ async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: 
     return await _check_items(unit, wanted_for(unit, setpoint))
 
 
+@by_name("store", after=0)
 async def prepare_control(
     unit: Unit, *, store: bool = False, setpoint: str | None = None, unverified: bool = False
 ) -> Control:

@@ -12,6 +12,7 @@ from drivebus.advice import Advice, Text, call
 from drivebus.errors import BadArgument, NotReady, Unconfirmed
 from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
+from drivebus.operations.by_name import by_name
 from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.program_end import before_start
 from drivebus.operations.state import Seen
@@ -34,6 +35,7 @@ __all__ = [
 ]
 
 
+@by_name("reverse", after=1)
 async def run(
     unit: Unit,
     hz: float | None = None,
@@ -87,6 +89,7 @@ async def run(
     await _start(unit, command, raw, reverse, before, confirm)
 
 
+@by_name("reverse", after=0)
 async def jog(
     unit: Unit, *, reverse: bool = False, confirm: float = 1.0, force: bool = False, unverified: bool = False
 ) -> None:

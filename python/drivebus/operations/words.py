@@ -10,6 +10,7 @@ from drivebus.errors import PortError, Refused
 from drivebus.line.asking import Read, Write
 from drivebus.line.write_guard import check_words
 from drivebus.operations.aim import check_harmless
+from drivebus.operations.by_name import by_name
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import State
@@ -36,6 +37,7 @@ async def read_words(
         return await unit.bus.ask(Read.at(unit.address, address, count, urgent=urgent, verify=verify))
 
 
+@by_name("force", after=2)
 async def write_words(unit: Unit, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
     """Writes one word (an int: 06H, or 10H where there is no 06H) or several (a sequence: 10H), as they are. Sent once.
 
@@ -130,9 +132,8 @@ async def send(
     shown_at = None if read_back is None else places.split(read_back)[1]
     try:
         with explained(unit):
-            halts = None if urgent else unit.halts
             await unit.bus.ask(
-                Write(unit.address, first, value, table, urgent, shown_at, connection, halts, force, timeout)
+                Write(unit.address, first, value, table, urgent, shown_at, connection, unit.halts, force, timeout)
             )
     except Refused as error:
         # Where the words can be read, the bus has looked whether they are there.
