@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from drivebus.line.listing import SerialPort, ports
     from drivebus.line.samples import Batch, Sample
     from drivebus.line.stats import Link, Stats
+    from drivebus.look import Look
+    from drivebus.motor import Motor
+    from drivebus.operations.setpoints import SetpointRange
     from drivebus.poll import Poll
     from drivebus.profile import Profile, profiles
     from drivebus.record import Recorder
@@ -91,6 +94,8 @@ __all__ = [
     "Identification",
     "Link",
     "Located",
+    "Look",
+    "Motor",
     "NoAnswer",
     "NotAllowed",
     "NotReached",
@@ -109,6 +114,7 @@ __all__ = [
     "Search",
     "SerialFormat",
     "SerialPort",
+    "SetpointRange",
     "Settings",
     "SharedCodeWarning",
     "Simulator",
@@ -167,6 +173,9 @@ if not TYPE_CHECKING:
             "line.listing": ("SerialPort", "ports"),
             "line.samples": ("Batch", "Sample"),
             "line.stats": ("Link", "Stats"),
+            "look": ("Look",),
+            "motor": ("Motor",),
+            "operations.setpoints": ("SetpointRange",),
             "poll": ("Poll",),
             "record": ("Recorder",),
             "profile": ("Profile", "profiles"),

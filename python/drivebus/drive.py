@@ -18,6 +18,7 @@ from drivebus.discovery import asking
 from drivebus.errors import BadArgument
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
+from drivebus.motor import Motor
 from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
 from drivebus.operations.by_name import by_name
 from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
@@ -80,6 +81,7 @@ class Drive(BlockingFormerNames):
     fault_history = blocking(state.fault_history)
     monitor = blocking(registers.monitor)
     snapshot = blocking(registers.snapshot)
+    settled_profile = blocking(registers.settled_profile)
     read_words = blocking(words.read_words)
     write_words = blocking(words.write_words)
     inputs = blocking(bits.inputs)
@@ -90,6 +92,7 @@ class Drive(BlockingFormerNames):
     bits = blocking(bits.bits)
     read_setpoint = blocking(setpoints.read_setpoint)
     write_setpoint = blocking(setpoints.write_setpoint)
+    check_setpoints = blocking(setpoints.check_setpoints)
     ping = blocking(state.ping)
     state = blocking(state.state)
     contradiction = blocking(registers.contradiction)
@@ -204,6 +207,23 @@ class Drive(BlockingFormerNames):
         jog = functools.partial(self.jog, reverse=reverse, confirm=confirm, force=force, unverified=unverified)
         with self._moving(jog, motion.end_jog, unverified, None, stop_within):
             yield self
+
+    def motor(self, *, unverified: bool = False, stop_within: float = WITHIN) -> Motor:
+        """The motor, for a block that starts and stops it more than once. It is stopped when the block ends.
+
+            with drive.motor() as motor:
+                motor.run(10.0)
+                motor.stop()
+                motor.run(20.0, reverse=True)
+
+        What `running` promises for its block holds here from each start on. Nothing is sent before the first one.
+
+        Args:
+            unverified: Also where command, states or setpoint are not verified for the family.
+            stop_within: Seconds, 0..3600, for which a stop is sent until the drive takes it; every fourth time it is
+                told to coast instead.
+        """
+        return Motor(unit_of(self).trusting(unverified), stop_within)
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
         """Makes the drive act by itself after *timeout* seconds of silence. Inside the block it is asked often enough.

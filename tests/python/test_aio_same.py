@@ -71,6 +71,11 @@ STEPS: dict[str, list[Step]] = {
     "no value": [lambda _, drive: drive.read()],
     "unknown": [lambda _, drive: drive.read("P99.99")],
     "setpoint": [lambda _, drive: drive.write("set_frequency", 7.0), lambda _, drive: drive.read_setpoint()],
+    "checked setpoints": [
+        lambda _, drive: drive.check_setpoints(5.0, 30.0),
+        lambda _, drive: drive.check_setpoints(5.0, 500.0),
+        lambda _, drive: drive.settled_profile("set_frequency"),
+    ],
     "prepare": [lambda _, drive: drive.check_control(), *_prepared(lambda _, drive: drive.check_control())],
     "parameters": _prepared(lambda _, drive: drive.write({"P00.11": 2.0, "P00.12": 3.0})),
     "stored": _prepared(lambda _, drive: drive.write("P00.11", 2.0, store=True)),
@@ -174,7 +179,12 @@ def test_a_scan_finds_the_same() -> None:
 
 def test_every_name_of_the_synchronous_faces_is_there() -> None:
     """And a method's arguments are the same."""
-    for face, other in ((drivebus.Bus, drivebus.aio.Bus), (drivebus.Drive, drivebus.aio.Drive)):
+    faces = (
+        (drivebus.Bus, drivebus.aio.Bus),
+        (drivebus.Drive, drivebus.aio.Drive),
+        (drivebus.Motor, drivebus.aio.Motor),
+    )
+    for face, other in faces:
         for name in dir(face):
             if name.startswith("_") or name in ("around", "poll"):
                 continue

@@ -30,7 +30,7 @@ def refuse(thing: object, name: str, meant: str) -> None:
 def test_a_misspelt_attribute_is_refused(bus: drivebus.Bus) -> None:
     drive = bus.drive(1)
     refuse(drive, "setpont", "setpoint")
-    refuse(drive, "tork", "torque")
+    refuse(drive, "torqe", "torque")
     refuse(drive, "profil", "profile")
     refuse(bus, "time_out", "timeout")
     refuse(bus, "fromat", "format")

@@ -11,7 +11,7 @@ import math
 import pytest
 
 from drivebus import State
-from drivebus.hal.core import Action, Coast, Course, Look, Reset, Run, Scale, Speed, Spindle, Stop
+from drivebus.hal.core import Action, Coast, Course, Reset, Run, Scale, Shown, Speed, Spindle, Stop
 from drivebus.hal.pins import PINS, Asked
 
 OFF = Asked(enable=True)
@@ -26,7 +26,7 @@ class Machine:
     def __init__(self, **scale: float) -> None:
         self.spindle = Spindle(Scale(60.0, **scale))
         self.now = 0.0
-        self.shows = Look(0.0, State.STOPPED, 0.0, ready=True)
+        self.shows = Shown(0.0, State.STOPPED, 0.0, ready=True)
         self.answers = self.heeds = True
         self.cycle(OFF)
 
@@ -357,9 +357,9 @@ def test_hours_count_while_the_motor_turns() -> None:
 
 def test_a_family_without_a_state_stands_when_its_frequency_does() -> None:
     machine = Machine()
-    machine.shows = Look(0.0, State.UNKNOWN, 0.0)
+    machine.shows = Shown(0.0, State.UNKNOWN, 0.0)
     machine.cycle(OFF)
     assert machine.shown("stopped") is True
-    machine.shows = Look(0.0, State.UNKNOWN, None)
+    machine.shows = Shown(0.0, State.UNKNOWN, None)
     machine.cycle(OFF)
     assert machine.shown("stopped") is False

@@ -6,6 +6,7 @@ P09.00 = 6 and P09.02 = 4 are what sister series print for a PID whose setpoint 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -305,3 +306,69 @@ def test_no_start_by_the_bus_where_only_a_parameter_tells_who_commands() -> None
             drive.run(5.0)
         drive.prepare_control(store=True)
         drive.run(5.0)
+
+
+class TestCheckedBefore:
+    """Setpoints that the drive was asked for once: each write is one request then."""
+
+    def test_a_write_is_one_request_and_goes_to_the_nearest_count(
+        self, virtual: Simulator, virtual_drive: Drive
+    ) -> None:
+        allowed = virtual_drive.check_setpoints(10.0, 30.0)
+        virtual.drive(1).take_writes()
+        before = virtual.line.requests
+        for hz in (10.0, 12.3449, 12.346, 30.0):
+            virtual_drive.write_setpoint(hz, checked=allowed)
+        assert virtual.line.requests - before == 4
+        assert [word for _, _, word in virtual.drive(1).take_writes()] == [1000, 1234, 1235, 3000]
+        assert (allowed.nearest(12.3449), allowed.address, allowed.low, allowed.high) == (12.34, 1, 10.0, 30.0)
+
+    @pytest.mark.parametrize(
+        ("low", "high"), [(10.0, 60.0), (10.0, 700.0), (30.0, 10.0), (-1.0, 10.0), (0.0, math.nan)]
+    )
+    def test_what_the_drive_would_not_take_is_told_and_nothing_is_sent(
+        self, virtual: Simulator, virtual_drive: Drive, low: float, high: float
+    ) -> None:
+        virtual.drive(1).take_writes()
+        with pytest.raises(NotAllowed):
+            virtual_drive.check_setpoints(low, high)
+        assert virtual.drive(1).take_writes() == []
+
+    @pytest.mark.parametrize("hz", [9.99, 30.01, math.inf, math.nan, "10", True])
+    def test_what_was_not_checked_is_not_sent(self, virtual: Simulator, virtual_drive: Drive, hz: Any) -> None:
+        allowed = virtual_drive.check_setpoints(10.0, 30.0)
+        virtual.drive(1).take_writes()
+        with pytest.raises(NotAllowed):
+            virtual_drive.write_setpoint(hz, checked=allowed)
+        assert virtual.drive(1).take_writes() == []
+
+    def test_what_was_checked_of_another_drive_is_not_taken(self, virtual: Simulator, virtual_bus: Bus) -> None:
+        one, two = virtual_bus.drive(1), virtual_bus.drive(2)
+        allowed = two.check_setpoints(10.0, 30.0)
+        wrong: list[tuple[Any, str, str]] = [
+            (allowed, "frequency", "the frequency of unit 2.*was checked, and not the frequency of unit 1"),
+            (one.check_setpoints(10.0, 30.0), "torque", "and not the torque of unit 1"),
+            (30.0, "frequency", "checked takes what check_setpoints gave"),
+        ]
+        for checked, name, message in wrong:
+            with pytest.raises(NotAllowed, match=message):
+                one.write_setpoint(20.0, name, checked=checked)
+        assert virtual.drive(1).take_writes() == []
+
+
+def test_a_profile_as_the_drive_is_set() -> None:
+    """VFD500: P30.14 says whether the speed is in Hz or in hundredths of a percent (instruction manual, p. 135)."""
+    with Simulator({1: "vfd500"}, transport="process", clock="virtual") as simulator, Bus(simulator) as bus:
+        drive = bus.drive(1, unverified=True)
+        name = drive.profile.role("setpoints.frequency") or ""
+        seen = []
+        for word in (0, 1):
+            drive.write("P30.14", word)
+            before = simulator.line.requests
+            profile = drive.settled_profile(name)
+            assert simulator.line.requests - before == 1
+            seen.append((profile.describe(name).unit, profile.decode(name, 5000)))
+        assert seen == [("%", 50.0), ("Hz", 50.0)]
+        before = simulator.line.requests
+        assert drive.settled_profile("P00.13").name == "vfd500"
+        assert simulator.line.requests == before

@@ -19,10 +19,11 @@ polls nothing. Works with any event loop of asyncio, uvloop's too, and so under 
 
 from drivebus.aio.bus import Bus
 from drivebus.aio.drive import Drive
+from drivebus.aio.motor import Motor
 from drivebus.aio.poll import Poll
 from drivebus.aio.watchdog import Watchdog
 
-__all__ = ["Bus", "Drive", "Poll", "Watchdog"]
+__all__ = ["Bus", "Drive", "Motor", "Poll", "Watchdog"]
 
 
 def __dir__() -> list[str]:

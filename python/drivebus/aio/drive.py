@@ -9,6 +9,7 @@ from typing import overload
 
 from drivebus import checks
 from drivebus.aio.awake import Awake
+from drivebus.aio.motor import Motor
 from drivebus.aio.watchdog import Watchdog
 from drivebus.attributes import known_only
 from drivebus.backup import keeping
@@ -65,6 +66,7 @@ class Drive(AwaitedFormerNames):
     fault_history = awaited(state.fault_history)
     monitor = awaited(registers.monitor)
     snapshot = awaited(registers.snapshot)
+    settled_profile = awaited(registers.settled_profile)
     read_words = awaited(words.read_words)
     write_words = awaited(words.write_words)
     inputs = awaited(bits.inputs)
@@ -75,6 +77,7 @@ class Drive(AwaitedFormerNames):
     bits = awaited(bits.bits)
     read_setpoint = awaited(setpoints.read_setpoint)
     write_setpoint = awaited(setpoints.write_setpoint)
+    check_setpoints = awaited(setpoints.check_setpoints)
     ping = awaited(state.ping)
     state = awaited(state.state)
     contradiction = awaited(registers.contradiction)
@@ -160,6 +163,10 @@ class Drive(AwaitedFormerNames):
         block = MotorBlock(unit_of(self).trusting(unverified), jog, motion.end_jog, None, stop_within)
         async with _block(block):
             yield self
+
+    def motor(self, *, unverified: bool = False, stop_within: float = WITHIN) -> Motor:
+        """The motor, for an `async with` block that starts and stops it more than once. See `drivebus.Drive.motor`."""
+        return Motor(unit_of(self).trusting(unverified), stop_within)
 
     def watchdog(self, timeout: float, action: str = "coast", *, unverified: bool = False) -> Watchdog:
         """Makes the drive act by itself when it hears nothing for *timeout* seconds, and keeps it from that until then.

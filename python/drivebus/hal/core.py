@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivebus.hal.pins import Asked
-from drivebus.operations.speed import STANDSTILL
+from drivebus.look import STANDSTILL
 from drivebus.values import State
 
-__all__ = ["Action", "Coast", "Course", "Look", "Reset", "Run", "Scale", "Speed", "Spindle", "Stop"]
+__all__ = ["Action", "Coast", "Course", "Reset", "Run", "Scale", "Shown", "Speed", "Spindle", "Stop"]
 
 PATIENCE = 3.0
 """Seconds for which the frequency of a motor that was told to stop may stay as it is."""
@@ -57,7 +57,7 @@ class Reset(NamedTuple):
 Action = Run | Speed | Stop | Coast | Reset
 
 
-class Look(NamedTuple):
+class Shown(NamedTuple):
     """What the drive showed, at a moment of the line's clock."""
 
     time: float
@@ -114,7 +114,7 @@ class Spindle:
         self.trouble = ""
         self.errors = 0
         self.hours = 0.0
-        self._look: Look | None = None
+        self._look: Shown | None = None
         self._seen_off = False
         self._wanted: Course | None = None
         self._refused: int | None = None
@@ -165,7 +165,7 @@ class Spindle:
         self.told = None
         self._not_heard |= isinstance(action, (Stop, Coast)) or (isinstance(action, Run) and sent)
 
-    def saw(self, look: Look) -> None:
+    def saw(self, look: Shown) -> None:
         """The drive showed *look*."""
         before, self._look = self._look, look
         self._is_fresh = True
@@ -187,7 +187,7 @@ class Spindle:
     def shown(self, now: float) -> dict[str, bool | float]:
         """The pins that tell how the spindle is."""
         linked = self.linked(now)
-        look = self._look or Look(now)
+        look = self._look or Shown(now)
         frequency = abs(look.frequency or 0.0)
         speed = math.copysign(frequency, -1.0 if look.state is State.REVERSE else 1.0) * self._scale.rpm_per_hz
         stopped = linked and look.stands
@@ -286,7 +286,7 @@ class Spindle:
         """For how many seconds the drive has shown itself at rest."""
         return 0.0 if self._rests_since is None else now - self._rests_since
 
-    def _is_deaf(self, look: Look) -> bool:
+    def _is_deaf(self, look: Shown) -> bool:
         """Whether the motor turns on as if nobody had told it to stop."""
         if self._falling is None:
             return False
@@ -299,7 +299,7 @@ class Spindle:
             return False
         return look.time - since > PATIENCE
 
-    def _is_at_speed(self, look: Look) -> bool:
+    def _is_at_speed(self, look: Shown) -> bool:
         if self.told is None or self.told != self._wanted or look.frequency is None:
             return False
         if look.state is not (State.REVERSE if self.told.reverse else State.FORWARD):

@@ -10,14 +10,9 @@ from collections.abc import Callable
 from types import TracebackType
 
 from drivebus.drive import Drive
-from drivebus.errors import BadArgument, DrivebusError, NotAllowed, Unverified
-from drivebus.hal.core import Action, Coast, Look, Reset, Run, Speed
-from drivebus.line.blocking import at_once
-from drivebus.operations import motion, setpoints
-from drivebus.operations.face import unit_of
-from drivebus.operations.halting import WITHIN
-from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.unit import Unit
+from drivebus.errors import BadArgument, NotAllowed, Unverified
+from drivebus.hal.core import Action, Coast, Reset, Run, Shown, Speed
+from drivebus.profile import Profile
 from drivebus.values import State
 from drivebus.watchdog import Watchdog
 
@@ -37,9 +32,6 @@ class Motor:
         watchdog: Seconds of silence after which the drive is to act by itself; None sets nothing.
         say: Is told what people have to know.
 
-    Attributes:
-        unstopped: Why the last stop was not confirmed, after which the drive was told to coast; empty where it was.
-
     Raises:
         NotAllowed: The drive's watchdog is not verified for the family, or takes no such time. Nothing was sent.
     """
@@ -50,11 +42,14 @@ class Motor:
         self._silence = watchdog
         self._action = None if watchdog is None else self._own_action()
         self._watchdog: Watchdog | None = None
-        self._block: MotorBlock | None = None
-        self._leaving = False
-        self._settled = unit_of(drive)
-        self.unstopped = ""
+        self._motor = drive.motor()
+        self._counted: Profile | None = None
         self._has_current = _CURRENT in drive.profile.monitor_names() and self._is_readable(_CURRENT)
+
+    @property
+    def unstopped(self) -> str:
+        """Why the last stop was not confirmed, after which the drive was told to coast; empty where it was."""
+        return str(self._motor.unstopped or "")
 
     def counts(self) -> float:
         """What the drive counts for one hertz of its setpoint. May ask it what its setpoint means.
@@ -62,23 +57,15 @@ class Motor:
         Raises:
             NotAllowed: It takes no setpoint in Hz over the bus.
         """
-        unit = self._settled = at_once(setpoints.with_setpoint(unit_of(self._drive), "frequency"))
-        register = setpoints.register_of(unit, "frequency")
-        described = unit.profile.describe(register)
-        if described.unit != "Hz":
-            raise BadArgument(
-                f"the setpoint of unit {unit.address} is in {described.unit or 'a unit that is not known'}, and a "
-                "spindle needs one in Hz",
-                unit=unit.address,
-            )
-        return float(described.scale)
+        register, profile = self._setpoint()
+        return float(profile.describe(register).scale)
 
-    def look(self) -> Look:
+    def look(self) -> Shown:
         """What the drive shows, read now."""
         status = self._drive.status()
         current = float(self._drive.read(_CURRENT)) if self._has_current else None
         link = self._drive.bus.link(self._drive.unit)
-        return Look(
+        return Shown(
             self._drive.bus.now(),
             status.state,
             status.frequency,
@@ -92,7 +79,8 @@ class Motor:
     def carry_out(self, action: Action) -> None:
         """Tells the drive, once. Raises what came of it; a start of which nothing is known was then stopped."""
         if isinstance(action, Run):
-            self._run(self._hertz(action.course.word), action.course.reverse)
+            self._arm()
+            self._motor.run(self._hertz(action.course.word), reverse=action.course.reverse)
         elif isinstance(action, Speed):
             self._drive.setpoint = self._hertz(action.word)
         elif isinstance(action, Reset):
@@ -100,11 +88,32 @@ class Motor:
         elif isinstance(action, Coast):
             self._drive.coast()
         else:
-            self._stop()
+            # While the program goes on, its own looks prove the stop: the pins are not to wait for that.
+            self._motor.stop(confirm=0)
 
     def _hertz(self, word: int) -> float:
         """The frequency that the drive counts so: given back, it is the same word."""
-        return float(self._settled.profile.decode(setpoints.register_of(self._settled, "frequency"), word))
+        register, profile = self._setpoint()
+        return float(profile.decode(register, word))
+
+    def _setpoint(self) -> tuple[str, Profile]:
+        """The register of the setpoint, and what the drive counts in it; that is asked once."""
+        register, unit = self._drive.profile.role("setpoints.frequency"), self._drive.unit
+        if register is None:
+            raise BadArgument(
+                f"no frequency setpoint of {self._drive.profile.title} is known, and a spindle needs one", unit=unit
+            )
+        if self._counted is None:
+            profile = self._drive.settled_profile(register)
+            described = profile.describe(register)
+            if described.unit != "Hz":
+                raise BadArgument(
+                    f"the setpoint of unit {unit} is in {described.unit or 'a unit that is not known'}, and a spindle "
+                    "needs one in Hz",
+                    unit=unit,
+                )
+            self._counted = profile
+        return register, self._counted
 
     def forget_watchdog(self) -> None:
         """Takes the drive's time-out for forgotten, as it is by one that was switched off: the next start sets it."""
@@ -118,53 +127,14 @@ class Motor:
             self._watchdog.close()
 
     def __enter__(self) -> Motor:
+        self._motor.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Stops what was started here, and proves it; also what was told to stop before and did not confirm it."""
-        self._leaving = True
-        block, self._block = self._block, None
-        unstopped, self.unstopped = self.unstopped, ""
-        if block is not None:
-            at_once(block.finish() if error is None else block.fail(error))
-        elif unstopped:
-            at_once(self._end(unit_of(self._drive)))
-
-    def _run(self, hz: float, reverse: bool) -> None:
-        if self._block is not None:
-            self._drive.run(hz, reverse=reverse)
-            return
-        self._arm()
-
-        async def start() -> None:
-            await motion.run(unit, hz, reverse=reverse)
-
-        unit = unit_of(self._drive)
-        self._block = MotorBlock(unit, start, self._end)
-        try:
-            at_once(self._block.begin())
-        except DrivebusError as reason:
-            block, self._block = self._block, None
-            at_once(block.fail(reason))
-            raise
-
-    def _stop(self) -> None:
-        block, self._block = self._block, None
-        if block is None:
-            self._drive.stop(confirm=0)
-        else:
-            at_once(block.finish())
-
-    async def _end(self, unit: Unit, within: float = WITHIN) -> None:
-        """While the program goes on, its own looks prove the stop: the pins are not to wait for that."""
-        try:
-            await motion.end_run(unit, within, confirm=1.0 if self._leaving else 0.0)
-        except DrivebusError as error:
-            self.unstopped = str(error)
-            raise
-        self.unstopped = ""
+        self._motor.__exit__(kind, error, trace)
 
     def _own_action(self) -> str | None:
         """What the drive will do by itself; None where its family has no watchdog that can be set."""

@@ -21,8 +21,8 @@ from drivebus.errors import (
     Unconfirmed,
 )
 from drivebus.identify.harm import HALTS
+from drivebus.look import Look
 from drivebus.operations import setpoints, state, words
-from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
@@ -148,7 +148,7 @@ async def state_afterwards(unit: Unit, *, urgent: bool = False) -> str:
 
 
 async def confirm(
-    unit: Unit, command: str, shows: Callable[[Seen], Awaitable[bool]], within: float, fall: Fall | None = None
+    unit: Unit, command: str, shows: Callable[[Look], Awaitable[bool]], within: float, fall: Fall | None = None
 ) -> None:
     """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
     proof = Proof(unit, command, shows, within, fall)
@@ -171,7 +171,7 @@ class Proof:
         self,
         unit: Unit,
         command: str,
-        shows: Callable[[Seen], Awaitable[bool]],
+        shows: Callable[[Look], Awaitable[bool]],
         within: float,
         fall: Fall | None = None,
     ) -> None:

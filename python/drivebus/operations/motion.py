@@ -10,12 +10,12 @@ from __future__ import annotations
 from drivebus import checks
 from drivebus.advice import Advice, Text, call
 from drivebus.errors import BadArgument, NotReady, Unconfirmed
+from drivebus.look import Look
 from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
 from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.program_end import before_start
-from drivebus.operations.state import Seen
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource, State
@@ -212,7 +212,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     if not (before.tripped or untold):
         return
 
-    async def shows(seen: Seen) -> bool:
+    async def shows(seen: Look) -> bool:
         return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
 
     await check_harmless(unit, "reset_fault")
@@ -220,7 +220,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     await commands.confirm(unit, "reset_fault", shows, confirm)
 
 
-async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, before: Seen, confirm: float) -> None:
+async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, before: Look, confirm: float) -> None:
     wanted = State.REVERSE if reverse else State.FORWARD
     turning_round = before.state.running and before.state is not wanted
     frequency = await speed.output_frequency(unit) if turning_round else None
@@ -236,7 +236,7 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
         await start_sequence.lead_up(unit, command, confirm)
     await commands.send_whole(unit, command, address, payload)
 
-    async def shows(seen: Seen) -> bool:
+    async def shows(seen: Look) -> bool:
         if "state" in seen.missing:
             return seen.fault is None
         if seen.state is wanted:
@@ -296,7 +296,7 @@ def _proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, with
     by_ramp = command == "stop"
     ramp: speed.Ramp | None = None
 
-    async def shows(seen: Seen) -> bool:
+    async def shows(seen: Look) -> bool:
         nonlocal by_ramp, ramp
         asked = unit.bus.now()
         turns = await speed.turns_in_spite_of(unit, seen.state, urgent=True)

@@ -10,11 +10,12 @@ from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
 from drivebus.operations import variants, words
 from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import labelled
 from drivebus.values import Snapshot, Value
 
-__all__ = ["contradiction", "monitor", "read", "readable", "snapshot", "value"]
+__all__ = ["contradiction", "monitor", "read", "readable", "settled_profile", "snapshot", "value"]
 
 
 def value(unit: Unit, name: str, raw: int) -> Value:
@@ -98,6 +99,22 @@ def readable(unit: Unit, *names: str) -> list[str]:
                 unit=unit.address,
             )
     return list(names)
+
+
+async def settled_profile(unit: Unit, *names: str, unverified: bool = False) -> Profile:
+    """What the words of *names* mean as this drive is set, where one of its parameters decides their unit or scale.
+
+    The drive is asked for that parameter; where none decides, nothing is sent. Afterwards somebody may set it anew.
+
+    Args:
+        names: Registers or parameters, by name.
+        unverified: Also where that is not verified for the family.
+
+    Raises:
+        NotAllowed: An unknown name; or what decides its meaning is not verified, or says nothing known.
+        NoAnswer, BadAnswer, Refused, PortError: The drive was only asked; nothing changed.
+    """
+    return (await variants.settled(unit.trusting(unverified), *names)).profile
 
 
 async def contradiction(unit: Unit) -> str | None:

@@ -7,14 +7,18 @@ before; the frequency, whose source a start depends on anyway, goes out at once.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from drivebus import checks
 from drivebus.errors import BadArgument
 from drivebus.operations import control, parameters, registers, sending, variants, words
 from drivebus.operations.unit import Unit
+from drivebus.profile import Profile
 from drivebus.values import Value
 
 __all__ = [
+    "SetpointRange",
+    "check_setpoints",
     "read_setpoint",
     "register_of",
     "with_setpoint",
@@ -22,6 +26,51 @@ __all__ = [
     "write_setpoint",
     "write_word",
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class SetpointRange:
+    """Frequency setpoints that one drive takes, from *low* to *high* Hz, as `Drive.check_setpoints` found out.
+
+    Attributes:
+        address: The drive's address.
+        low: The lowest, in Hz.
+        high: The highest, in Hz.
+        profile: What the drive's words mean, as it is set.
+    """
+
+    address: int
+    low: float
+    high: float
+    profile: Profile
+
+    def nearest(self, hz: float) -> float:
+        """The frequency nearest to *hz* that the drive can count.
+
+        Raises:
+            NotAllowed: It is not from `low` to `high`.
+        """
+        register = self._register
+        described = self.profile.describe(register)
+        return float(self.profile.decode(register, round(self._within(hz) * described.scale)))
+
+    def word_of(self, hz: float) -> int:
+        """*hz*, or what is nearest to it, as the drive counts it. Errors as of `nearest`."""
+        return self.profile.encode(self._register, self.nearest(hz))
+
+    @property
+    def _register(self) -> str:
+        return self.profile.role("setpoints.frequency") or ""
+
+    def _within(self, hz: float) -> float:
+        hz = checks.number("setpoint", hz, 0.0)
+        if not self.low <= hz <= self.high:
+            raise BadArgument(
+                f"a setpoint of {hz:g} Hz was not checked: allowed is {self.low:g} to {self.high:g} Hz. No setpoint "
+                f"was sent to unit {self.address}",
+                unit=self.address,
+            )
+        return hz
 
 
 async def read_setpoint(unit: Unit, name: str = "frequency", *, unverified: bool = False) -> float:
@@ -41,7 +90,39 @@ async def read_setpoint(unit: Unit, name: str = "frequency", *, unverified: bool
     return float(await registers.read(unit, register))
 
 
-async def write_setpoint(unit: Unit, value: float, name: str = "frequency", *, unverified: bool = False) -> None:
+async def check_setpoints(unit: Unit, low: float, high: float, *, unverified: bool = False) -> SetpointRange:
+    """Asks the drive once whether it takes frequency setpoints from *low* to *high*. None is sent.
+
+        allowed = drive.check_setpoints(10.0, 30.0)
+        drive.write_setpoint(12.3456, checked=allowed)      # one request; the nearest that the drive can count
+
+    Args:
+        low: In Hz, from 0.
+        high: In Hz, up to the drive's own maximum.
+        unverified: Also where the setpoint is not verified for the family.
+
+    Raises:
+        NotAllowed: Above the drive's own maximum, out of range, not verified, or not counted in Hz.
+        NoAnswer, BadAnswer, Refused, PortError: The drive was only asked; nothing changed.
+    """
+    unit = await with_setpoint(unit.trusting(unverified), "frequency")
+    if checks.number("low", low, 0.0) > checks.number("high", high, 0.0):
+        raise BadArgument(
+            f"setpoints from {low:g} to {high:g} Hz are none; give the lower one first", unit=unit.address
+        )
+    for hz in (low, high):
+        await word_of(unit, hz)
+    return SetpointRange(unit.address, low, high, unit.profile)
+
+
+async def write_setpoint(
+    unit: Unit,
+    value: float,
+    name: str = "frequency",
+    *,
+    checked: SetpointRange | None = None,
+    unverified: bool = False,
+) -> None:
     """Gives a setpoint, the frequency or another, if the drive would follow it. A running motor follows it at once.
 
     Whether the drive takes the frequency over the bus is not looked at: a start depends on that, and looks at it.
@@ -49,6 +130,8 @@ async def write_setpoint(unit: Unit, value: float, name: str = "frequency", *, u
     Args:
         value: In Hz for the frequency, else in the unit of its register (`describe`): percent or Hz.
         name: One of the family's `Profile.setpoint_names()`, such as `"torque"`.
+        checked: What `check_setpoints` gave for this drive: it is not asked again for its maximum, and a frequency
+            between two that it counts goes to the nearest.
         unverified: Also where that is not verified for the family.
 
     Raises:
@@ -61,7 +144,11 @@ async def write_setpoint(unit: Unit, value: float, name: str = "frequency", *, u
         Unconfirmed: The drive shows another setpoint, however often it was written.
         Refused: The drive kept the old one.
     """
-    unit = await with_setpoint(unit.trusting(unverified), name)
+    unit = unit.trusting(unverified)
+    if checked is not None:
+        await write_word(_as_checked(unit, name, checked), checked.word_of(value))
+        return
+    unit = await with_setpoint(unit, name)
     if name == "frequency":
         await write_word(unit, await word_of(unit, value))
         return
@@ -70,6 +157,23 @@ async def write_setpoint(unit: Unit, value: float, name: str = "frequency", *, u
     await control.check_heeded(unit, name, register)
     await parameters.check_now(unit, [planned])
     await sending.write(unit, [planned], False)
+
+
+def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
+    """The same unit, as it was set when its setpoints were *checked*. Raises `NotAllowed` where another was."""
+    if not isinstance(checked, SetpointRange):
+        raise BadArgument(
+            f"checked takes what check_setpoints gave, and was given {checks.shown(checked)}; nothing was sent",
+            unit=unit.address,
+        )
+    if name != "frequency" or (checked.address, checked.profile.name) != (unit.address, unit.profile.name):
+        raise BadArgument(
+            f"the frequency of unit {checked.address}, {checked.profile.title}, was checked, and not the {name} of "
+            f"unit {unit.address}, {unit.profile.title}; nothing was sent",
+            unit=unit.address,
+        )
+    unit.evidence.writes(register_of(unit, name))
+    return unit.under(checked.profile)
 
 
 async def with_setpoint(unit: Unit, setpoint: str) -> Unit:

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
+from drivebus.look import STANDSTILL
 from drivebus.operations import control, registers, words
 from drivebus.operations.unit import Unit
 from drivebus.values import State, Value
 
-__all__ = ["STANDSTILL", "Ramp", "frequencies", "output_frequency", "ramp", "turns_in_spite_of"]
-
-STANDSTILL = 0.05
-"""Output frequency in Hz up to which a drive that has stopped counts as stopped."""
+__all__ = ["Ramp", "frequencies", "output_frequency", "ramp", "turns_in_spite_of"]
 
 
 class Ramp(NamedTuple):

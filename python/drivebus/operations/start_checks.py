@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import BadAnswer, BadLink, NoAnswer, NotReady, Refused
+from drivebus.look import Look
 from drivebus.operations import control, start_sequence, state
-from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import ControlSource, State
@@ -64,7 +64,7 @@ async def prove_link(unit: Unit, force: bool) -> None:
         )
 
 
-async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Seen:
+async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
     """How the drive stands. Raises `NotAllowed` where it would not start, or not obey the bus (*by_bus*)."""
     await control.check_set(unit, control.wanted_always(unit), "has its words elsewhere")
     seen = await state.glance(unit)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
+from drivebus.look import Look
 from drivebus.operations import commands, state, words
-from drivebus.operations.state import Seen
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.facts import StartStep
@@ -98,7 +98,7 @@ class _Step:
                 )
             await unit.bus.sleep(commands.POLL_INTERVAL)
 
-    def _told(self, seen: Seen) -> str:
+    def _told(self, seen: Look) -> str:
         """What the state word shows, and where that is not what is waited for."""
         name, word = self._unit.profile.role("state"), seen.word
         if name is None or word is None:

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
+from drivebus.look import Look
 from drivebus.operations import registers, words
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import ReadPlan
-from drivebus.values import ControlSource, Fault, State, Status
+from drivebus.values import Fault, State, Status
 
 __all__ = [
-    "Seen",
     "fault",
     "fault_history",
     "glance",
@@ -35,43 +35,7 @@ __all__ = [
 ]
 
 
-class Seen(NamedTuple):
-    """The status words of one look, decoded.
-
-    What the family's words do not tell, or may not be asked for, stands in *missing*, with the reason.
-    """
-
-    state: State
-    fields: Mapping[str, str]
-    fault: Fault | None
-    time: float
-    missing: Mapping[str, str]
-    in_fault: bool
-    """Whether the state word says that the drive is in fault, or where it cannot, the fault number. It may run all the
-    same."""
-    word: int | None
-    """The state word itself."""
-
-    @property
-    def source(self) -> ControlSource | None:
-        """Where the drive takes its commands from, if its words tell."""
-        channel = self.fields.get("control_channel")
-        return next((source for source in ControlSource if source.value == channel), None)
-
-    @property
-    def tripped(self) -> bool:
-        """Whether the drive is in fault: by its state word, or where that is not known by its fault number."""
-        return self.in_fault or ("state" in self.missing and self.fault is not None)
-
-    def __str__(self) -> str:
-        if "state" in self.missing:
-            return f"state not known, {self.fault or ('fault not known' if 'fault' in self.missing else 'no fault')}"
-        if self.in_fault and self.state is not State.FAULT:
-            return f"{self.state}, in fault: {self.fault or 'not named'}"
-        return f"{self.state}, {self.fault}" if self.fault else str(self.state)
-
-
-class _Look(NamedTuple):
+class _Plan(NamedTuple):
     """What a look reads, worked out once for each profile."""
 
     plan: ReadPlan | None
@@ -81,7 +45,7 @@ class _Look(NamedTuple):
     missing: Mapping[str, str]
 
 
-async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Seen:
+async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Look:
     """Reads the drive's status words, in one read where they stand side by side.
 
     Raises:
@@ -95,11 +59,11 @@ async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) ->
     return seen
 
 
-async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
+async def glance(unit: Unit, *, urgent: bool = False) -> Look:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
     plan = planned(unit)
     if plan.plan is None:
-        return Seen(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
+        return Look(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
     answers: list[list[int]] = []
     first = 0.0
     for place, count in plan.plan.reads:
@@ -116,7 +80,7 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Seen:
     in_fault = told is not None and (
         unit.profile.is_in_fault(told) or (number != 0 and not unit.profile.state_tells_fault())
     )
-    seen = Seen(
+    seen = Look(
         State.UNKNOWN if told is None else state_of(unit, told),
         fields,
         unit.profile.fault(number) if number else None,
@@ -159,12 +123,12 @@ async def ping(unit: Unit) -> None:
     raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
 
-def planned(unit: Unit) -> _Look:
+def planned(unit: Unit) -> _Plan:
     """What a look at the unit reads."""
     return unit.evidence.once(_plan)
 
 
-def _plan(evidence: Evidence) -> _Look:
+def _plan(evidence: Evidence) -> _Plan:
     missing: dict[str, str] = {}
     profile = evidence.profile
     state, fault = profile.role("state"), profile.role("fault")
@@ -177,7 +141,7 @@ def _plan(evidence: Evidence) -> _Look:
     names = [*([state] if state else []), *others, *([fault] if fault else [])]
     in_status = [state] if state is not None and state in profile.status_words else []
     plan = profile.compile(names) if names else None
-    return _Look(plan, state, [*in_status, *others], fault, missing)
+    return _Plan(plan, state, [*in_status, *others], fault, missing)
 
 
 async def status(unit: Unit, *, unverified: bool = False) -> Status:
@@ -193,7 +157,7 @@ async def status(unit: Unit, *, unverified: bool = False) -> Status:
     return await _status(unit, await glance(unit))
 
 
-async def _status(unit: Unit, seen: Seen) -> Status:
+async def _status(unit: Unit, seen: Look) -> Status:
     missing = dict(seen.missing)
     names = {}
     for role in ("frequency", "setpoint"):

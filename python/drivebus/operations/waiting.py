@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from drivebus import checks
 from drivebus.errors import BadArgument, NotReached, Unconfirmed
+from drivebus.look import STANDSTILL
 from drivebus.operations import state
 from drivebus.operations.commands import POLL_INTERVAL
-from drivebus.operations.speed import STANDSTILL
 from drivebus.operations.unit import Unit
 from drivebus.values import State, Status
 

@@ -1,7 +1,6 @@
 """Moves the setpoint along a course and records what the drive does, inside the block that stops the motor.
 
-Every request goes out from here, one after the other: what is read is looked at before anything else is written. A
-setpoint is written as `Drive.setpoint` writes it.
+Every request goes out from here, one after the other: what is read is looked at before anything else is written.
 """
 
 from __future__ import annotations
@@ -9,9 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from drivebus.drive import Drive
-from drivebus.line.blocking import at_once
-from drivebus.operations import setpoints
-from drivebus.operations.face import unit_of
 from drivebus.trial.courses import Course, Wave
 from drivebus.trial.samples import Samples
 from drivebus.trial.watching import Bounds
@@ -58,13 +54,9 @@ class Recording:
         self._bounds = bounds
         self._names = names
         self._told = told
-        self._unit = at_once(setpoints.with_setpoint(unit_of(drive), "frequency"))
-        self._register = setpoints.register_of(self._unit, "frequency")
-        self._counts = self._unit.profile.describe(self._register).scale
         self._looked = 0.0
-        for hz in (course.low, course.high):
-            # Both, before anything moves: the drive's own maximum may be lower.
-            at_once(setpoints.word_of(self._unit, hz))
+        # Before anything moves: the drive's own maximum may be lower.
+        self._allowed = drive.check_setpoints(course.low, course.high)
         drive.look()
 
     def run(self, duration: float, settle: float, reverse: bool, force: bool) -> None:
@@ -116,10 +108,7 @@ class Recording:
             self.samples.shift(zero)
 
     def _set(self, hz: float) -> None:
-        # A sine falls between what the drive counts.
-        profile = self._unit.profile
-        nearest = profile.decode(self._register, round(hz * self._counts))
-        at_once(setpoints.write_word(self._unit, profile.encode(self._register, nearest)))
+        self._drive.write_setpoint(hz, checked=self._allowed)
 
     def _sample(self, moving: bool) -> tuple[float, Mapping[str, float]]:
         """Reads all once, keeps and judges it; its moment on the line's clock, and the values."""

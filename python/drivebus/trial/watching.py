@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drivebus.operations.state import Seen
+from drivebus.look import Look
 from drivebus.trial.courses import Course
 
 __all__ = ["Bounds", "Roles"]
@@ -81,7 +81,7 @@ class Bounds:
         return None
 
     @staticmethod
-    def ended(seen: Seen) -> str | None:
+    def ended(seen: Look) -> str | None:
         """Why the motor no longer runs as it was told to, by the drive's own state; None while it does."""
         if seen.tripped or seen.fault is not None:
             return f"the drive tripped: {seen.fault or seen.state}"
