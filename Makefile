@@ -25,7 +25,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-test interop-parts examples wheel-smoke \
+        machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
         pictures matrix semver
 
 help: ## what can be made
@@ -58,7 +58,7 @@ demo: $(VENV)/.wheel
 TWO := $(MAKE) --no-print-directory --jobs=2
 test:
 	@$(TWO) layers rust-lint $(VENV)/.dev dist/.wheel
-	@$(TWO) rust-build types interop-parts
+	@$(TWO) rust-build types interop-parts python-collect
 	@$(MAKE) --no-print-directory rust-test counts python-test examples wheel-smoke
 	@echo "make test: every check passed"
 
@@ -138,10 +138,16 @@ schema: $(VENV)/.created ## changes a file
 interop-parts:
 	@sh tools/debian_parts.sh
 
+# What pytest makes of each file takes longer than to import it; it is made once here, and not by each of those who run tests.
+PYTEST := env PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -p no:benchmark
+
+python-collect: $(VENV)/.dev $(VENV)/.wheel
+	@$(PYTEST) --quiet --collect-only >/dev/null
+
 # Most of these tests wait for a line and not for a core, so four files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
 python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
-	$(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile -p no:benchmark
+	$(PYTEST) -n $(TEST_JOBS) --dist loadfile
 
 examples: $(VENV)/.wheel
 	$(BIN)/python tools/run_examples.py

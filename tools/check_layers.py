@@ -185,6 +185,12 @@ def _code_of(text: str) -> str:
     return text.partition("#[cfg(test)]")[0]
 
 
+@functools.cache
+def forbidden(code: str, pattern: re.Pattern[str]) -> tuple[str, ...]:
+    """What of *code* the pattern finds."""
+    return tuple(match[0] for match in pattern.finditer(code))
+
+
 def package(crate: str) -> str:
     """What the crate in the folder *crate* is called."""
     return crate if crate == "drivebus" else f"drivebus-{crate}"
@@ -219,8 +225,8 @@ def crate_findings(root: Path) -> Iterator[str]:
         for path in sorted((root / "crates" / crate / "src").rglob("*.rs")):
             if path.relative_to(root).as_posix() in UNSAFE_ALLOWED:
                 continue
-            for match in pattern.finditer(code_of(path)):
-                yield f"{path.relative_to(root)}: must not use `{match[0]}`"
+            for wrong in forbidden(code_of(path), pattern):
+                yield f"{path.relative_to(root)}: must not use `{wrong}`"
     if "#![no_std]" not in (root / "crates/rtu/src/lib.rs").read_text(encoding="utf-8"):
         yield "crates/rtu/src/lib.rs: lacks #![no_std]"
     if 'unsafe_code = "deny"' not in (root / "Cargo.toml").read_text(encoding="utf-8"):
@@ -260,17 +266,16 @@ def nodes_of(text: str) -> tuple[ast.AST, ...]:
     return tuple(ast.walk(ast.parse(text)))
 
 
-def nodes(path: Path) -> tuple[ast.AST, ...]:
-    """All that is in the Python file at *path*."""
-    return nodes_of(path.read_text(encoding="utf-8"))
+@functools.cache
+def imports_of(text: str) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """The imports of a Python file."""
+    return tuple(node for node in nodes_of(text) if isinstance(node, (ast.Import, ast.ImportFrom)))
 
 
 def imports(path: Path, package: Path) -> Iterator[tuple[int, list[str]]]:
     """Each module of ours that *path* imports: its names below the package, or `drivebus` for the package."""
     here = list(path.relative_to(package).with_suffix("").parts)
-    for node in nodes(path):
-        if not isinstance(node, (ast.Import, ast.ImportFrom)):
-            continue
+    for node in imports_of(path.read_text(encoding="utf-8")):
         dotted = [alias.name for alias in node.names]
         if isinstance(node, ast.ImportFrom):
             base = node.module or ""
@@ -321,7 +326,6 @@ def python_findings(root: Path) -> Iterator[str]:
                     yield f"{path.relative_to(root)}:{line}: {inside[0]} must not import {file[0]}"
 
 
-@functools.cache
 def own_names(nodes: tuple[ast.AST, ...]) -> set[str]:
     """The names with an underscore that a file defines: functions, classes, variables, attributes and slots."""
     names: set[str] = set()
@@ -342,18 +346,36 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__") and name != "_"
 
 
-def borrowed(path: Path) -> Iterator[tuple[int, str]]:
-    """Each name with an underscore that *path* uses and does not define: it belongs to another file."""
-    here = nodes(path)
+@functools.cache
+def borrowed(text: str) -> tuple[tuple[int, str], ...]:
+    """Each name with an underscore that a file uses and does not define, with its line: it belongs to another file."""
+    here, found = nodes_of(text), []
     own = own_names(here)
     for node in here:
         if isinstance(node, ast.Attribute) and is_private(node.attr) and node.attr not in own:
             if ast.unparse(node) not in PYTHONS_OWN:
-                yield node.lineno, node.attr
+                found.append((node.lineno, node.attr))
         elif isinstance(node, ast.ImportFrom):
-            for alias in node.names:
-                if is_private(alias.name) and alias.name != "_native":
-                    yield node.lineno, alias.name
+            private = (alias.name for alias in node.names if is_private(alias.name) and alias.name != "_native")
+            found.extend((node.lineno, name) for name in private)
+    return tuple(found)
+
+
+@functools.cache
+def classes(text: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The classes of a file, each with its bases; one that is imported by its whole name."""
+    imported = {
+        alias.asname or alias.name: f"{node.module}.{alias.name}"
+        for node in imports_of(text)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    found = []
+    for node in nodes_of(text):
+        if isinstance(node, ast.ClassDef):
+            named = (ast.unparse(base).partition("[")[0] for base in node.bases)
+            found.append((node.name, tuple(imported.get(base, base) for base in named)))
+    return tuple(found)
 
 
 def ancestors(package: Path) -> Iterator[tuple[Path, str, int]]:
@@ -362,18 +384,9 @@ def ancestors(package: Path) -> Iterator[tuple[Path, str, int]]:
     where: dict[str, tuple[Path, str]] = {}
     for path in sorted(package.rglob("*.py")):
         module = ".".join(["drivebus", *path.relative_to(package).with_suffix("").parts])
-        here = nodes(path)
-        imported = {
-            alias.asname or alias.name: f"{node.module}.{alias.name}"
-            for node in here
-            if isinstance(node, ast.ImportFrom)
-            for alias in node.names
-        }
-        for node in here:
-            if isinstance(node, ast.ClassDef):
-                named = [ast.unparse(base).partition("[")[0] for base in node.bases]
-                bases[f"{module}.{node.name}"] = [imported.get(base, f"{module}.{base}") for base in named]
-                where[f"{module}.{node.name}"] = (path, node.name)
+        for name, named in classes(path.read_text(encoding="utf-8")):
+            bases[f"{module}.{name}"] = [base if "." in base else f"{module}.{base}" for base in named]
+            where[f"{module}.{name}"] = (path, name)
 
     def depth(name: str) -> int:
         return max((1 + depth(base) for base in bases[name] if base in bases), default=0)
@@ -387,7 +400,7 @@ def habit_findings(root: Path) -> Iterator[str]:
     """Rules for every file of the Python package: what is private stays so, and nothing is a tower."""
     package = root / "python/drivebus"
     for path in sorted(package.rglob("*.py")):
-        for line, name in borrowed(path):
+        for line, name in borrowed(path.read_text(encoding="utf-8")):
             yield f"{path.relative_to(root)}:{line}: {name} belongs to another file"
     for path, name, depth in ancestors(package):
         if depth > MOST_ANCESTORS:
