@@ -147,7 +147,7 @@ python-collect: $(VENV)/.dev $(VENV)/.wheel
 # Most of these tests wait for a line and not for a core, so four files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
 python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
-	$(PYTEST) -n $(TEST_JOBS) --dist loadfile
+	$(PYTEST) -n $(TEST_JOBS) --dist loadfile --no-loadscope-reorder
 
 examples: $(VENV)/.wheel
 	$(BIN)/python tools/run_examples.py

@@ -6,6 +6,7 @@ The simulator runs in this process, the program that drives the motor in another
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import os
 import signal
 import subprocess
@@ -60,7 +61,9 @@ def run(simulator: Simulator, inside: str, loop: str) -> subprocess.CompletedPro
 
 
 def commands(simulator: Simulator) -> list[int]:
-    return [value for _, address, value in simulator.drive(1).writes() if address == CONTROL]
+    """What it was told; a stop that was answered late, as on a busy machine, goes out again and counts once."""
+    told = [value for _, address, value in simulator.drive(1).writes() if address == CONTROL]
+    return [command for command, _ in itertools.groupby(told)]
 
 
 ENDS = {
@@ -85,7 +88,7 @@ def test_the_motor_is_stopped(simulator: Simulator, end: str, loop: str) -> None
     done = run(simulator, inside, loop)
     assert done.stdout == "running\n"
     assert done.returncode == code, done.stderr
-    assert commands(simulator) in ([FORWARD, STOP], [FORWARD, STOP, STOP]), done.stderr
+    assert commands(simulator) == [FORWARD, STOP], done.stderr
     assert simulator.drive(1).state in ("forward", "stopped")
 
 
@@ -115,4 +118,4 @@ def test_a_signal_that_does_not_wake_the_loop_is_heard_all_the_same(simulator: S
 """
     ended = run(simulator, inside.strip(), loop)
     assert ended.returncode == 128 + signal.SIGTERM, ended.stderr
-    assert [value for _, address, value in simulator.drive(1).writes() if address == CONTROL] == [FORWARD, STOP]
+    assert commands(simulator) == [FORWARD, STOP]

@@ -76,7 +76,7 @@ def test_what_somebody_else_started_may_be_stopped_too(virtual: Simulator, drive
 def test_outside_its_block_nothing_is_started(virtual: Simulator, drive: Drive) -> None:
     motor = drive.motor()
     for _ in range(2):
-        with pytest.raises(drivebus.NotAllowed, match=r"with drive\.motor\(\) as motor.*Nothing was sent"):
+        with pytest.raises(drivebus.NotAllowed, match=r"inside its block.*nothing was sent"):
             motor.run(10.0)
         with motor, pytest.raises(drivebus.NotAllowed, match="entered already"):
             motor.__enter__()

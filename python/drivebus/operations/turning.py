@@ -49,8 +49,7 @@ class Turning:
         """Starts it; one that turns already gets another speed or direction."""
         if not self._entered:
             raise BadArgument(
-                f"the motor of unit {self._unit.address} is run inside a block, which stops it in the end: "
-                "with drive.motor() as motor: … Nothing was sent",
+                f"the motor of unit {self._unit.address} is run inside its block, whose end stops it; nothing was sent",
                 unit=self._unit.address,
             )
         if self._block is not None:
