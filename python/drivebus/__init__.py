@@ -14,7 +14,7 @@ This is not a safety function. An emergency stop is a wire.
 
 from typing import TYPE_CHECKING
 
-from drivebus.later import later
+from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus import doctor, record, rtu, sim, trial
@@ -45,16 +45,16 @@ if TYPE_CHECKING:
         WrongDrive,
     )
     from drivebus.identify.results import Found, Identification
-    from drivebus.line.listing import SerialPort, ports
-    from drivebus.line.samples import Batch, Sample
+    from drivebus.line.poll_samples import Batch, Sample
+    from drivebus.line.serial_ports import SerialPort, ports
     from drivebus.line.stats import Link, Stats
+    from drivebus.line_search import Located, Progress, Search, Settings, search
     from drivebus.look import Look
     from drivebus.motor import Motor
     from drivebus.operations.setpoints import SetpointRange
     from drivebus.poll import Poll
     from drivebus.profile import Profile, profiles
     from drivebus.record import Recorder
-    from drivebus.searching import Located, Progress, Search, Settings, search
     from drivebus.sim import Simulator
     from drivebus.sniffer import Exchange, sniff
     from drivebus.values import (
@@ -170,8 +170,8 @@ if not TYPE_CHECKING:
                 "WrongDrive",
             ),
             "identify.results": ("Found", "Identification"),
-            "line.listing": ("SerialPort", "ports"),
-            "line.samples": ("Batch", "Sample"),
+            "line.serial_ports": ("SerialPort", "ports"),
+            "line.poll_samples": ("Batch", "Sample"),
             "line.stats": ("Link", "Stats"),
             "look": ("Look",),
             "motor": ("Motor",),
@@ -179,7 +179,7 @@ if not TYPE_CHECKING:
             "poll": ("Poll",),
             "record": ("Recorder",),
             "profile": ("Profile", "profiles"),
-            "searching": ("Located", "Progress", "Search", "Settings", "search"),
+            "line_search": ("Located", "Progress", "Search", "Settings", "search"),
             "sim": ("Simulator",),
             "sniffer": ("Exchange", "sniff"),
             "values": (

@@ -12,26 +12,26 @@ from types import TracebackType
 from typing import Any, TypeVar, overload
 
 from drivebus import _native
-from drivebus.attributes import known_only
 from drivebus.checks import UNITS
 from drivebus.drive import Drive
 from drivebus.identify import scan
-from drivebus.identify.choose import profile_of
 from drivebus.identify.identify import identify
+from drivebus.identify.profile_choice import profile_of
 from drivebus.identify.results import Found, Identification
 from drivebus.line.asking import asking
 from drivebus.line.blocking import BlockingBus, at_once
-from drivebus.line.requests import Requests
-from drivebus.line.samples import Names, Reads, Sample
+from drivebus.line.blocking_requests import Requests
+from drivebus.line.poll_samples import Names, Reads, Sample
 from drivebus.line.scan_order import asked
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.units import belongs
-from drivebus.operations.face import views
+from drivebus.operations.drive_base import views
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.poll import Poll
 from drivebus.profile import Profile, native_of
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Bus"]
 

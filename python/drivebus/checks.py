@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import SupportsIndex
 
-from drivebus import places
+from drivebus import tables
 from drivebus.advice import Advice, Text
 from drivebus.errors import BadArgument, NotAllowed
 
@@ -86,8 +86,8 @@ def of_table(table: object, value: object) -> int | list[int]:
     """What a write to *table* carries: words, or of a coil 0 or 1."""
     if table == "holding":
         return payload(value)
-    if one_of("table", table, places.TABLES) not in places.WRITABLE:
-        raise BadArgument(f"table {shown(table)} can only be read; {' and '.join(places.WRITABLE)} can be written")
+    if one_of("table", table, tables.TABLES) not in tables.WRITABLE:
+        raise BadArgument(f"table {shown(table)} can only be read; {' and '.join(tables.WRITABLE)} can be written")
     if isinstance(value, Iterable):
         raise BadArgument(f"value {shown(value)} is not allowed: one coil is written at a time, to 0 or 1")
     return int(value) if isinstance(value, bool) else whole("value of a coil", value, 0, 1)

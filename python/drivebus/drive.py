@@ -12,21 +12,31 @@ from contextlib import contextmanager
 from typing import Any, overload
 
 from drivebus import checks
-from drivebus.attributes import known_only
-from drivebus.backup import keeping
-from drivebus.discovery import asking
+from drivebus.backup import drive_backup
+from drivebus.discovery import drive_discovery
 from drivebus.errors import BadArgument
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.protocols import BusProtocol
 from drivebus.motor import Motor
-from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations import (
+    bit_words,
+    bus_control,
+    motion,
+    parameters,
+    raw_words,
+    registers,
+    setpoints,
+    state,
+    waiting,
+)
 from drivebus.operations.by_name import by_name
-from drivebus.operations.face import DriveFace, blocking, documented_by, unit_of
+from drivebus.operations.drive_base import DriveFace, blocking, documented_by, unit_of
 from drivebus.operations.former_names import BlockingFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
+from drivebus.strict_attributes import known_only
 from drivebus.values import Value
 from drivebus.watchdog import Watchdog
 
@@ -82,14 +92,14 @@ class Drive(BlockingFormerNames):
     monitor = blocking(registers.monitor)
     snapshot = blocking(registers.snapshot)
     settled_profile = blocking(registers.settled_profile)
-    read_words = blocking(words.read_words)
-    write_words = blocking(words.write_words)
-    inputs = blocking(bits.inputs)
-    outputs = blocking(bits.outputs)
-    set_virtual_inputs = blocking(bits.set_virtual_inputs)
-    set_virtual_outputs = blocking(bits.set_virtual_outputs)
-    special_control = blocking(bits.special_control)
-    bits = blocking(bits.bits)
+    read_words = blocking(raw_words.read_words)
+    write_words = blocking(raw_words.write_words)
+    inputs = blocking(bit_words.inputs)
+    outputs = blocking(bit_words.outputs)
+    set_virtual_inputs = blocking(bit_words.set_virtual_inputs)
+    set_virtual_outputs = blocking(bit_words.set_virtual_outputs)
+    special_control = blocking(bit_words.special_control)
+    bits = blocking(bit_words.bits)
     read_setpoint = blocking(setpoints.read_setpoint)
     write_setpoint = blocking(setpoints.write_setpoint)
     check_setpoints = blocking(setpoints.check_setpoints)
@@ -98,12 +108,12 @@ class Drive(BlockingFormerNames):
     contradiction = blocking(registers.contradiction)
     wait_for_speed = blocking(waiting.wait_for_speed)
     wait_until_stopped = blocking(waiting.wait_until_stopped)
-    check_control = blocking(control.check_control)
-    prepare_control = blocking(control.prepare_control)
-    backup = blocking(keeping.backup)
-    restore = blocking(keeping.restore)
-    diff = blocking(keeping.diff)
-    discover = blocking(asking.discover)
+    check_control = blocking(bus_control.check_control)
+    prepare_control = blocking(bus_control.prepare_control)
+    backup = blocking(drive_backup.backup)
+    restore = blocking(drive_backup.restore)
+    diff = blocking(drive_backup.diff)
+    discover = blocking(drive_discovery.discover)
 
     @property
     def setpoint(self) -> float:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from types import TracebackType
 
-from drivebus.attributes import known_only
 from drivebus.errors import DrivebusError
 from drivebus.line.blocking import at_once
 from drivebus.operations.turning import Turning
 from drivebus.operations.unit import Unit
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Motor"]
 

@@ -16,9 +16,9 @@ from types import TracebackType
 from typing import Any
 
 from drivebus import _native, checks
-from drivebus.attributes import known_only
 from drivebus.errors import BadArgument, DrivebusWarning, level_of_the_program
-from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
+from drivebus.line.poll_samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Poll"]
 

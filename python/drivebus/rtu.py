@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Literal, TypeAlias
 
-from drivebus import _native, places
+from drivebus import _native, tables
 from drivebus._native import decode_answer, encode_echo, encode_read, encode_write, is_write, only_reads
 
 __all__ = [
@@ -58,7 +58,7 @@ class Frame:
     unit: int
     function: int
     crc: int
-    table: places.Table | None = None
+    table: tables.Table | None = None
     address: int | None = None
     count: int | None = None
     value: int | None = None

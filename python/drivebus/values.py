@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Literal, TypeAlias
 
-from drivebus import places
-from drivebus.named import Named
+from drivebus import tables
+from drivebus.attribute_mapping import Named
 
 __all__ = [
     "Choice",
@@ -290,12 +290,12 @@ class Description:
     unverified_bits: tuple[str, ...] = ()
     listed: bool = True
     high_first: bool = False
-    table: places.Table = "holding"
+    table: tables.Table = "holding"
 
     @property
     def place(self) -> int | None:
         """Table and address as one number: of a holding register its address, of a coil 0x1_0000 above it."""
-        return None if self.address is None else places.place(self.table, self.address)
+        return None if self.address is None else tables.place(self.table, self.address)
 
     def number(self, words: Sequence[int]) -> int:
         """What *words* are together, as they stand one behind the other: the raw number that `decode` takes."""

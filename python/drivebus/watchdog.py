@@ -11,10 +11,10 @@ import atexit
 import threading
 from types import TracebackType
 
-from drivebus.attributes import known_only
 from drivebus.line.blocking import at_once
 from drivebus.operations.bus_timeout import BusTimeout
 from drivebus.operations.unit import Unit
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Watchdog"]
 

@@ -13,7 +13,7 @@ import pytest
 import drivebus
 from drivebus import Bus, Drive, NoAnswer, NotAllowed, Profile, Simulator
 from drivebus.backup.unread import Unread
-from drivebus.discovery.walk import LAST, Walk
+from drivebus.discovery.group_scan import LAST, Walk
 from drivebus.sim import FAULT_KINDS
 
 FAMILIES = [name for name in sorted(drivebus.profiles()) if Profile.builtin(name).parameter_groups()]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from fuzz.drive import drive
 
-from drivebus.operations import commands, sending
+from drivebus.operations import commands, parameter_writes
 from drivebus.operations.halting import Halt
 from drivebus.operations.unit import Unit
 
@@ -66,11 +66,11 @@ def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_write_that_is_reported_done_and_was_not_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = sending.write
+    write = parameter_writes.write
 
-    async def loses(unit: Unit, run: Sequence[sending.Planned], store: bool) -> None:
+    async def loses(unit: Unit, run: Sequence[parameter_writes.Planned], store: bool) -> None:
         if all(item.raw <= MOST_AT_FIRST for item in run):
             await write(unit, run, store)
 
-    monkeypatch.setattr(sending, "write", loses)
+    monkeypatch.setattr(parameter_writes, "write", loses)
     assert any("was there" in said and "is;" in said for said in found())

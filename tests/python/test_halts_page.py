@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from pathlib import Path
 
-from drivebus import Profile, places, profiles
+from drivebus import Profile, profiles, tables
 from drivebus.identify.harm import harmed
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/halts.md"
@@ -29,7 +29,7 @@ def table() -> str:
                 harms.update(each.name for each in harmed(profile, command))
     lines = ["| word | is | starts, reverses or sets something in |", "| --- | --- | --- |"]
     for (place, word), (means, harms) in sorted(rows.items()):
-        kind, address = places.split(place)
+        kind, address = tables.split(place)
         where = f"{address:04X}H = {word:04X}H" if kind == "holding" else f"{kind} {address:04X}H = {word}"
         meant = "; ".join(f"{called}: {', '.join(sorted(names))}" for called, names in means.items())
         lines.append(f"| {where} | {meant} | {', '.join(sorted(harms)) or 'none'} |")

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from drivebus import BadAnswer, Bus, SerialFormat, Simulator
 from drivebus.cli import cli
-from drivebus.doctor.traffic import heard as heard_by
+from drivebus.doctor.bus_noise import heard as heard_by
 from drivebus.identify.scan import look_for
 from drivebus.line import huanyang
 from drivebus.line.asking import Read

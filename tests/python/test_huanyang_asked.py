@@ -17,14 +17,14 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from drivebus import Bus, Found, NotAllowed, Profile, Simulator, aio, places, profiles
+from drivebus import Bus, Found, NotAllowed, Profile, Simulator, aio, profiles, tables
 from drivebus.cli import cli
 from drivebus.doctor import Finding, examine
 from drivebus.identify import codes, signatures
 from drivebus.line import huanyang
 from drivebus.line.scan_order import PROTOCOLS
-from drivebus.searching.order import candidates
-from drivebus.searching.settings import Settings
+from drivebus.line_search.order import candidates
+from drivebus.line_search.settings import Settings
 
 from .odd_slave import framed, good, on_a_socket, on_a_terminal
 from .serial_server import crc
@@ -244,13 +244,13 @@ class TestTraps:
                 asked |= set() if place is None else {place}
         functions = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
         for place in asked:
-            table, address = places.split(place)
+            table, address = tables.split(place)
             function = functions[table]
             for unit in range(1, 248):
                 drive = Drive(unit)
                 for count in (1, 2):
                     drive.answer(bytes([unit, function]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
-                assert drive.commands == [], f"{places.shown(place)} of unit {unit}"
+                assert drive.commands == [], f"{tables.shown(place)} of unit {unit}"
 
 
 @needs_terminals

@@ -16,8 +16,8 @@ import drivebus
 from drivebus import NotAllowed, Recorder, Simulator
 from drivebus.cli import cli
 from drivebus.plot import Picture, draw, of_recording, of_samples
+from drivebus.plot.downsample import thinned
 from drivebus.plot.picture import Curve, from_zero
-from drivebus.plot.thin import thinned
 from drivebus.record import Recording, read
 from drivebus.trial.samples import Samples
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 import drivebus
 from drivebus import BadAnswer, Bus, NotAllowed, PortError, Settings, Simulator
 from drivebus.cli import cli
-from drivebus.searching.order import candidates, factory
+from drivebus.line_search.order import candidates, factory
 
 READ = bytes.fromhex("01 03 00 04 00 02 85 CA")  # GD350 manual, chapter 9.4.1
 PORT = "/dev/line"  # has settings, as far as its name tells; what opens it is a Wire

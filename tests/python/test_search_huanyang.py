@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 import drivebus
 from drivebus import Bus, Found, Settings
 from drivebus.cli import cli
-from drivebus.searching.order import candidates
+from drivebus.line_search.order import candidates
 
 from .odd_slave import framed, good, on_a_terminal
 from .test_huanyang_asked import Drive

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from drivebus import Bus, Simulator
 from drivebus.cli import cli
 from drivebus.doctor import Finding, Severity, examine
-from drivebus.doctor.echoes import Echoes
-from drivebus.doctor.traffic import heard
+from drivebus.doctor.bus_noise import heard
+from drivebus.doctor.echo_test import Echoes
 from drivebus.line.seven_bits import SevenBits, agreed, ascii_in, seen_in
 
 from .odd_slave import framed, good, on_a_socket, on_a_terminal

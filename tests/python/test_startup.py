@@ -78,7 +78,7 @@ def slow(modules: Iterable[str]) -> set[str]:
 
 def test_importing_the_package_loads_next_to_nothing() -> None:
     modules = loaded("import sys, drivebus; before = set(sys.modules)")
-    assert ours(modules) == {"drivebus", "drivebus.later"}
+    assert ours(modules) == {"drivebus", "drivebus.lazy_names"}
     assert not slow(modules)
 
 
@@ -86,9 +86,9 @@ def test_a_name_loads_what_it_stands_on() -> None:
     modules = loaded("import sys; from drivebus import State; before = set(sys.modules)")
     assert ours(modules) == {
         "drivebus",
-        "drivebus.later",
-        "drivebus.named",
-        "drivebus.places",
+        "drivebus.lazy_names",
+        "drivebus.attribute_mapping",
+        "drivebus.tables",
         "drivebus.values",
     }
 
@@ -96,7 +96,7 @@ def test_a_name_loads_what_it_stands_on() -> None:
 def test_the_version_is_told_without_the_commands() -> None:
     program = "import sys; sys.argv[1:] = ['--version']; from drivebus.cli import main; main()"
     modules = loaded(f"{program}; before = set(sys.modules)")
-    assert ours(modules) == {"drivebus", "drivebus._native", "drivebus.cli", "drivebus.later"}
+    assert ours(modules) == {"drivebus", "drivebus._native", "drivebus.cli", "drivebus.lazy_names"}
     assert "click" not in modules
     assert not slow(modules)
 
@@ -131,7 +131,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
             )
         ),
     }
-    assert ours(modules, "drivebus.backup") == {"drivebus.backup", "drivebus.backup.keeping"}
+    assert ours(modules, "drivebus.backup") == {"drivebus.backup", "drivebus.backup.drive_backup"}
     assert not ours(modules, "drivebus.aio") | ours(modules, "drivebus.doctor")
 
 

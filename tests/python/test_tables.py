@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivebus import Bus, NotAllowed, Profile, Simulator, places
+from drivebus import Bus, NotAllowed, Profile, Simulator, tables
 from drivebus.rtu import written as written_to
 from drivebus.sniffer.frames import carried, place_of, written_by
 
@@ -92,7 +92,7 @@ def test_one_address_is_another_place_in_each_table(tmp_path: Path) -> None:
     found = {name: profile.address(name) for name in ("wanted", "run_command", "door", "speed")}
     assert found == {"wanted": 0x10, "run_command": 0x1_0010, "door": 0x2_0010, "speed": 0x4_0010}
     assert {profile.name_at(place): name for name, place in found.items()} == {name: name for name in found}
-    assert [places.shown(place) for place in found.values()] == [
+    assert [tables.shown(place) for place in found.values()] == [
         "0010H",
         "coil 0010H",
         "discrete input 0010H",

@@ -9,13 +9,13 @@ import pytest
 import tomli
 
 from drivebus import Bus, NotAllowed, _native
-from drivebus.line import ports
+from drivebus.line import port_urls
 from drivebus.profile import profiles
 from drivebus.sim import FAULT_KINDS
 
 VECTORS = Path(__file__).resolve().parent.parent / "vectors" / "urls.toml"
 URLS = tomli.loads(VECTORS.read_text(encoding="utf-8"))["url"]
-FOREIGN = ports._PYSERIAL_SCHEMES
+FOREIGN = port_urls._PYSERIAL_SCHEMES
 OPTIONS = ("clock", "seed", "strict_silence", "echo", "faults", *FAULT_KINDS)
 NAMES = {
     "{families}": ", ".join(profiles()),

@@ -15,28 +15,28 @@ from drivebus.aio.drive import Drive
 from drivebus.aio.line import Line
 from drivebus.aio.poll import Poll
 from drivebus.aio.requests import AwaitedRequests
-from drivebus.attributes import known_only
 from drivebus.bus import Bus as BlockingFace
 from drivebus.checks import UNITS
 from drivebus.errors import PortError
 from drivebus.identify import scan
-from drivebus.identify.choose import profile_of
 from drivebus.identify.identify import identify
+from drivebus.identify.profile_choice import profile_of
 from drivebus.identify.results import Found, Identification
 from drivebus.line.asking import Read, Stamped, Write, asking
 from drivebus.line.blocking import BlockingBus
+from drivebus.line.blocking_requests import Requests
+from drivebus.line.poll_samples import Names, Reads
 from drivebus.line.protocols import AwaitableBus
-from drivebus.line.requests import Requests
-from drivebus.line.samples import Names, Reads
 from drivebus.line.scan_order import asked
 from drivebus.line.settings import BusFace, BusOptions, Opening, check_trust
 from drivebus.line.stats import Link
 from drivebus.line.units import belongs
-from drivebus.operations.face import documented_by, views
+from drivebus.operations.drive_base import documented_by, views
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
 from drivebus.profile import Profile, native_of
+from drivebus.strict_attributes import known_only
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -11,18 +11,28 @@ from drivebus import checks
 from drivebus.aio.awake import Awake
 from drivebus.aio.motor import Motor
 from drivebus.aio.watchdog import Watchdog
-from drivebus.attributes import known_only
-from drivebus.backup import keeping
-from drivebus.discovery import asking
+from drivebus.backup import drive_backup
+from drivebus.discovery import drive_discovery
 from drivebus.line.protocols import AwaitableBus
-from drivebus.operations import bits, control, motion, parameters, registers, setpoints, state, waiting, words
+from drivebus.operations import (
+    bit_words,
+    bus_control,
+    motion,
+    parameters,
+    raw_words,
+    registers,
+    setpoints,
+    state,
+    waiting,
+)
 from drivebus.operations.by_name import by_name
-from drivebus.operations.face import awaited, documented_by, unit_of
+from drivebus.operations.drive_base import awaited, documented_by, unit_of
 from drivebus.operations.former_names import AwaitedFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
+from drivebus.strict_attributes import known_only
 from drivebus.values import Value
 
 __all__ = ["Drive"]
@@ -67,14 +77,14 @@ class Drive(AwaitedFormerNames):
     monitor = awaited(registers.monitor)
     snapshot = awaited(registers.snapshot)
     settled_profile = awaited(registers.settled_profile)
-    read_words = awaited(words.read_words)
-    write_words = awaited(words.write_words)
-    inputs = awaited(bits.inputs)
-    outputs = awaited(bits.outputs)
-    set_virtual_inputs = awaited(bits.set_virtual_inputs)
-    set_virtual_outputs = awaited(bits.set_virtual_outputs)
-    special_control = awaited(bits.special_control)
-    bits = awaited(bits.bits)
+    read_words = awaited(raw_words.read_words)
+    write_words = awaited(raw_words.write_words)
+    inputs = awaited(bit_words.inputs)
+    outputs = awaited(bit_words.outputs)
+    set_virtual_inputs = awaited(bit_words.set_virtual_inputs)
+    set_virtual_outputs = awaited(bit_words.set_virtual_outputs)
+    special_control = awaited(bit_words.special_control)
+    bits = awaited(bit_words.bits)
     read_setpoint = awaited(setpoints.read_setpoint)
     write_setpoint = awaited(setpoints.write_setpoint)
     check_setpoints = awaited(setpoints.check_setpoints)
@@ -83,12 +93,12 @@ class Drive(AwaitedFormerNames):
     contradiction = awaited(registers.contradiction)
     wait_for_speed = awaited(waiting.wait_for_speed)
     wait_until_stopped = awaited(waiting.wait_until_stopped)
-    check_control = awaited(control.check_control)
-    prepare_control = awaited(control.prepare_control)
-    backup = awaited(keeping.backup)
-    restore = awaited(keeping.restore)
-    diff = awaited(keeping.diff)
-    discover = awaited(asking.discover)
+    check_control = awaited(bus_control.check_control)
+    prepare_control = awaited(bus_control.prepare_control)
+    backup = awaited(drive_backup.backup)
+    restore = awaited(drive_backup.restore)
+    diff = awaited(drive_backup.diff)
+    discover = awaited(drive_discovery.discover)
 
     @overload
     async def read(self, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...

@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import TracebackType
 
 from drivebus.aio.awake import Awake
-from drivebus.attributes import known_only
 from drivebus.errors import DrivebusError
 from drivebus.operations.turning import Turning
 from drivebus.operations.unit import Unit
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Motor"]
 

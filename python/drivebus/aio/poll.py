@@ -9,8 +9,8 @@ from types import TracebackType
 
 from drivebus import _native
 from drivebus.aio.mailbox import Mailbox
-from drivebus.attributes import known_only
-from drivebus.line.samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
+from drivebus.line.poll_samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Poll"]
 

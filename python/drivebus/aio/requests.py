@@ -1,4 +1,4 @@
-"""What a bus may be asked, awaited: checked as `drivebus.line.requests` checks it."""
+"""What a bus may be asked, awaited: checked as `drivebus.line.blocking_requests` checks it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, overload
 from drivebus.aio.line import Line
 from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.blocking import BlockingBus
-from drivebus.line.requests import (
+from drivebus.line.blocking_requests import (
     Requests,
     alone_of,
     broadcast_of,

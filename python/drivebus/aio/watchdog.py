@@ -7,9 +7,9 @@ from collections.abc import Generator
 from types import TracebackType
 from typing import Any
 
-from drivebus.attributes import known_only
 from drivebus.operations.bus_timeout import BusTimeout
 from drivebus.operations.unit import Unit
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Watchdog"]
 

@@ -6,12 +6,12 @@ was to be given back. `Drive.backup`, `Drive.diff` and `Drive.restore` make them
 
 from typing import TYPE_CHECKING
 
-from drivebus.later import later
+from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus.backup.compare import Diff, Difference
     from drivebus.backup.model import Backup, Origin
-    from drivebus.backup.report import Restoration, Restored
+    from drivebus.backup.results import Restoration, Restored
     from drivebus.backup.unread import Unread
 
 __all__ = ["Backup", "Diff", "Difference", "Origin", "Restoration", "Restored", "Unread"]
@@ -22,7 +22,7 @@ if not TYPE_CHECKING:
         {
             "compare": ("Diff", "Difference"),
             "model": ("Backup", "Origin"),
-            "report": ("Restoration", "Restored"),
+            "results": ("Restoration", "Restored"),
             "unread": ("Unread",),
         },
     )

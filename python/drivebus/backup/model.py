@@ -13,7 +13,7 @@ from pathlib import Path
 
 from drivebus import checks
 from drivebus.advice import Text, argument
-from drivebus.backup import disk, parse, text
+from drivebus.backup import atomic_file, parse, text
 from drivebus.backup.compare import Diff, Side, compare, factory
 from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, is_open
@@ -122,7 +122,7 @@ class Backup(Mapping[str, Value]):
                 is wrong and the closest name.
         """
         path = Path(checks.path("file", path))
-        found = parse.parse(path, disk.read(path), _shipped if profile is None else _meant_by(profile))
+        found = parse.parse(path, atomic_file.read(path), _shipped if profile is None else _meant_by(profile))
         return cls(
             Origin(**found.origin),
             found.raw,
@@ -189,7 +189,7 @@ class Backup(Mapping[str, Value]):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file, whole or not at all: an older file stays until the new one is complete."""
-        disk.write(Path(checks.path("file", path)), self.text())
+        atomic_file.write(Path(checks.path("file", path)), self.text())
 
     def text(self) -> str:
         """The text of the file: sorted, one parameter a line."""

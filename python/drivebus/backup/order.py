@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from drivebus.backup.detour import Step, detour, hindrance, reached
+from drivebus.backup.intermediate_values import Step, detour, hindrance, reached
 
 __all__ = ["Order", "Step"]
 

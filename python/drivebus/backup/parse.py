@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
-from drivebus.backup.parameter import FIELDS, Wrong, lacking, word
+from drivebus.backup.line_check import FIELDS, Wrong, lacking, word
 from drivebus.backup.text import FORMAT, printable
 from drivebus.backup.unread import Unread
 from drivebus.errors import BadArgument, NotAllowed

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from drivebus.backup.unread import Unread, lost, refused
 from drivebus.errors import BadAnswer, NoAnswer, Refused
-from drivebus.operations import words as bus_words
+from drivebus.operations import raw_words as bus_words
 from drivebus.operations.unit import Unit
 
 __all__ = ["Reader", "Words"]

@@ -12,16 +12,16 @@ from collections.abc import Collection, Sequence
 from drivebus import checks
 from drivebus.advice import Text, argument
 from drivebus.backup.compare import amount
+from drivebus.backup.create import Progress, origin_of
 from drivebus.backup.model import Backup
 from drivebus.backup.order import Order, Step
 from drivebus.backup.reading import Reader
-from drivebus.backup.report import Restoration, Restored
+from drivebus.backup.results import Restoration, Restored
 from drivebus.backup.rules import Rules
-from drivebus.backup.taking import Progress, origin_of
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, WrongDrive
-from drivebus.operations import sending, state
+from drivebus.operations import parameter_writes, state
 from drivebus.operations.unit import Unit
 from drivebus.profile.refusals import means
 
@@ -146,7 +146,7 @@ class Restore:
                 is_there = why.why != "not there"
                 self._results[code] = ("unread", f"not written, {why.why}: {why}") if is_there else ("missing", why)
             elif words.raw[code] == self._backup.raw[code] and (
-                self._to_ram(code) or not sending.is_in_ram(self._unit, code)
+                self._to_ram(code) or not parameter_writes.is_in_ram(self._unit, code)
             ):
                 self._results[code] = ("same", "")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivebus.errors import LINE_ERRORS, Refused, Unverified
-from drivebus.operations import sending, words
+from drivebus.operations import parameter_writes, raw_words
 from drivebus.operations.unit import Unit
 from drivebus.profile.refusals import means
 
@@ -61,7 +61,7 @@ def place(unit: Unit, code: str, *, store: bool) -> int:
 
 
 async def _look(unit: Unit, code: str) -> int:
-    [word] = await words.read_words(unit, unit.profile.address(code))
+    [word] = await raw_words.read_words(unit, unit.profile.address(code))
     return word
 
 
@@ -69,7 +69,7 @@ async def _put(unit: Unit, code: str, address: int, word: int, *, store: bool) -
     """Writes the word of a parameter, and remembers to which memory."""
     known = unit.profile.describe(code)
     if not store:
-        sending.put_in_ram(unit, known)
-    await words.write(unit, address, word)
+        parameter_writes.put_in_ram(unit, known)
+    await raw_words.write(unit, address, word)
     if store:
-        sending.stored(unit, known)
+        parameter_writes.stored(unit, known)

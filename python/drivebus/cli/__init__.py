@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import drivebus
-from drivebus.later import later
+from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus.cli.app import cli

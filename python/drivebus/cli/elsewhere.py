@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.line.write_guard import code_text
 
 __all__ = ["Started", "started_by"]
@@ -38,7 +38,7 @@ class Started(NamedTuple):
 
     def __str__(self) -> str:
         return (
-            f"{self.halt} ({code_text(self.code)} at {places.shown(self.place)}, by {self.function:02X}H) is "
+            f"{self.halt} ({code_text(self.code)} at {tables.shown(self.place)}, by {self.function:02X}H) is "
             f"{self.command} of {', '.join(self.families)}"
         )
 
@@ -64,7 +64,7 @@ def started_by(profile: drivebus.Profile) -> Iterator[Started]:
 
 def _function(profile: drivebus.Profile, place: int) -> int:
     """By which function a single word goes to *place*."""
-    table, _ = places.split(place)
+    table, _ = tables.split(place)
     if table == "coil":
         return _WRITE_COIL
     return _WRITE_MANY if _WRITE_ONE not in profile.functions and _WRITE_MANY in profile.functions else _WRITE_ONE

@@ -8,7 +8,7 @@ from datetime import datetime, timezone
 from typing import Any
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.cli.output import Output, remark
 from drivebus.cli.session import exit_code
 from drivebus.line import huanyang
@@ -144,6 +144,6 @@ def taken_back(families: Families) -> Iterator[str]:
     """What is to be said of guesses that did not hold."""
     for unit, name, address in families.withdrawn():
         yield (
-            f"unit {unit} was taken for {name} by what it was asked and answered. What came of {places.shown(address)} "
+            f"unit {unit} was taken for {name} by what it was asked and answered. What came of {tables.shown(address)} "
             f"now does not fit, so its registers are shown by addresses; `--profile {unit}=FAMILY` names them."
         )

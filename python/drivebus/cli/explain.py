@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.cli import names
 from drivebus.cli.advice import in_commands
 from drivebus.cli.crew import each_drive
@@ -47,7 +47,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
         _show_matches(session, profile, wanted, found)
         return
     values = dict(vars(known))
-    values["address"] = None if known.place is None else places.shown(known.place)
+    values["address"] = None if known.place is None else tables.shown(known.place)
     if not session.out.as_json:
         values["choices"] = ", ".join(f"{number} = {label}" for number, label in known.choices.items())
         values["bits"] = ", ".join(known.bits or {})
@@ -154,7 +154,7 @@ def _groups(rows: list[drivebus.Description]) -> list[str]:
 
 
 def _address(row: drivebus.Description) -> str | None:
-    return None if row.place is None else places.shown(row.place)
+    return None if row.place is None else tables.shown(row.place)
 
 
 def _range(row: drivebus.Description) -> str:

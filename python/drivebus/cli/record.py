@@ -18,7 +18,7 @@ from drivebus.cli.output import counted, printable, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.signals import ENDS, heeded
 from drivebus.cli.types import Place, Seconds, Size, Whole
-from drivebus.record.files import format_of
+from drivebus.record.formats import format_of
 
 __all__ = ["COMMANDS"]
 

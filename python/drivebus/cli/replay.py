@@ -9,7 +9,7 @@ from time import monotonic
 
 import click
 
-from drivebus import places
+from drivebus import tables
 from drivebus.capture import line_of, read
 from drivebus.cli.output import counted, remark
 from drivebus.cli.session import Session, pass_session
@@ -57,7 +57,7 @@ def _asked(request: bytes) -> str:
     if place is None:
         return f"function {request[1]:02X}H"
     does = "read" if written_by(request) is None else "write"
-    return f"{does} {counted(place[1], 'word')} at {places.shown(place[0])}"
+    return f"{does} {counted(place[1], 'word')} at {tables.shown(place[0])}"
 
 
 @click.command()

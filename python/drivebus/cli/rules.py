@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.line.write_guard import code_text
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
@@ -110,7 +110,7 @@ def _identification(profile: drivebus.Profile) -> list[str]:
     signature = profile.signature()
     if signature is not None:
         told = [
-            f"{what} {', '.join(places.shown(place) for place in signature[key])}"
+            f"{what} {', '.join(tables.shown(place) for place in signature[key])}"
             for key, what in (("answers", "answers"), ("refuses", "refuses"))
             if signature[key]
         ]
@@ -126,7 +126,7 @@ def _commands(profile: drivebus.Profile) -> list[str]:
     lines = []
     registers = profile.command_registers()
     for address in sorted(registers, key=lambda address: address != profile.command_address):
-        lines.append(f"written to {places.shown(address)}")
+        lines.append(f"written to {tables.shown(address)}")
         for code, label in sorted(registers[address].items()):
             either = label.split(" or ")
             for command in either if {*either} <= {*profile.commands()} else [label]:
@@ -143,7 +143,7 @@ def _commands(profile: drivebus.Profile) -> list[str]:
 def _after(profile: drivebus.Profile, command: str) -> str:
     """What goes out before *command*, if anything does."""
     first = profile.command_first(command) if command in profile.commands() else None
-    return "" if first is None else f", after {first[1]} at {places.shown(first[0])}"
+    return "" if first is None else f", after {first[1]} at {tables.shown(first[0])}"
 
 
 def _code(code: int, label: str) -> str:
@@ -239,7 +239,7 @@ def _left_alone(profile: drivebus.Profile) -> list[str]:
 
 def _place(profile: drivebus.Profile, name: str) -> str:
     row = profile.describe(name)
-    return f"{name}, whose address is not known" if row.address is None else f"{name} ({places.shown(row.place or 0)})"
+    return f"{name}, whose address is not known" if row.address is None else f"{name} ({tables.shown(row.place or 0)})"
 
 
 def _doubt(verified: bool, note: str) -> str:

@@ -10,12 +10,12 @@ from rich.table import Table
 from rich.text import Text
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.cli.advice import in_commands
 from drivebus.cli.output import printable
 from drivebus.line import huanyang
 from drivebus.sniffer import Exchange, Families, Figures
-from drivebus.sniffer.figures import RegisterFigures, UnitFigures
+from drivebus.sniffer.statistics import RegisterFigures, UnitFigures
 
 __all__ = ["SniffTable"]
 
@@ -108,7 +108,7 @@ class SniffTable:
 def _register(name: str | int, register: RegisterFigures, profile: drivebus.Profile | None) -> list[str]:
     """A register as one row: what it is called, its value, its unit, how often it was read and written."""
     value, unit = str(register.value), ""
-    shown = name if isinstance(name, str) else places.shown(name)
+    shown = name if isinstance(name, str) else tables.shown(name)
     if profile is not None and isinstance(name, str) and register.value is not None:
         row = profile.describe(name)
         value, unit = row.text(register.value), row.unit

@@ -24,8 +24,8 @@ from drivebus.cli.output import Output, remark
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
 from drivebus.cli.types import Amperes, Hertz, Place, Seconds
 from drivebus.trial import RampFigures, SineFigures, StepFigures, Trial
-from drivebus.trial.courses import Change, Wave
-from drivebus.trial.watching import Bounds
+from drivebus.trial.abort_rules import Bounds
+from drivebus.trial.setpoint_courses import Change, Wave
 
 __all__ = ["COMMANDS"]
 

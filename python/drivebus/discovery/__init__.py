@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from drivebus.later import later
+from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus.discovery.found import Discovery

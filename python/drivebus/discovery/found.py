@@ -13,9 +13,9 @@ from datetime import datetime
 from pathlib import Path
 
 from drivebus import checks
-from drivebus.backup import disk
+from drivebus.backup import atomic_file
 from drivebus.backup.unread import Unread
-from drivebus.discovery import guesses
+from drivebus.discovery import sister_family
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
 from drivebus.values import Description
@@ -123,7 +123,7 @@ class Discovery:
         except OSError as error:
             raise NotAllowed(f"{place} cannot be made: {error.strerror or error}") from None
         for name, text in made.items():
-            disk.write(place / name, text)
+            atomic_file.write(place / name, text)
         return place
 
     def files(self, name: str, base: str | None) -> dict[str, str]:
@@ -145,7 +145,7 @@ class Discovery:
             )
         if folder.name in profiles():
             raise BadArgument(f"{folder.name} is the name of a shipped profile; give another one. Nothing was asked")
-        if disk.is_there(folder) and (not folder.is_dir() or any(folder.iterdir())):
+        if atomic_file.is_there(folder) and (not folder.is_dir() or any(folder.iterdir())):
             raise BadArgument(
                 f"{folder} is there already, and what is in it would be lost; give another name. Nothing was asked"
             )
@@ -173,7 +173,7 @@ class Discovery:
         is_no_command = self.profile.command_address is not None
         told = "Found by asking the drive; it was {word} ({word:04X}H)."
         for code, word in sorted(self.unlisted.items()):
-            guess = guesses.guess(self.profile, code, word)
+            guess = sister_family.guess(self.profile, code, word)
             rows.writerow(
                 {
                     "code": code,

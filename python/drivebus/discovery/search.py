@@ -6,14 +6,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from drivebus import checks
-from drivebus.backup import disk
-from drivebus.backup.taking import origin_of
+from drivebus.backup import atomic_file
+from drivebus.backup.create import origin_of
 from drivebus.backup.unread import Unread, lost, refused
 from drivebus.discovery.found import Discovery
-from drivebus.discovery.kept import Group, Kept
-from drivebus.discovery.walk import LAST, Walk
+from drivebus.discovery.group_scan import LAST, Walk
+from drivebus.discovery.progress_file import Group, Kept
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused, WrongDrive
-from drivebus.operations import words
+from drivebus.operations import raw_words
 from drivebus.operations.unit import Unit
 
 __all__ = ["Progress", "search"]
@@ -44,7 +44,7 @@ async def search(
     wanted = _groups(unit, groups)
     if place is not None and not (resume and _is_unchanged(unit, place, base)):
         Discovery.check(unit.profile, place, base)
-    part = None if place is None else disk.part_of(place)
+    part = None if place is None else atomic_file.part_of(place)
     await unit.identity.check(unit.bus)
     kept = Kept.begin(part, await origin_of(unit), resume=resume)
     asking = _Search(unit, kept)
@@ -76,15 +76,15 @@ async def search(
 
 def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
     """Whether *place* is what an earlier call made that did not settle all, and nobody edited it."""
-    if not (place.name and place.is_dir() and disk.is_there(disk.part_of(place))):
+    if not (place.name and place.is_dir() and atomic_file.is_there(atomic_file.part_of(place))):
         return False
-    kept = Kept.of(disk.part_of(place))
+    kept = Kept.of(atomic_file.part_of(place))
     if {*kept.groups} - {*unit.profile.parameter_groups()}:
         return False
     found = _result(unit, kept, [*kept.groups])
     files = found.files(place.name, base)
     return {each.name for each in place.iterdir()} == {*files} and all(
-        disk.read(place / name) == text.encode() for name, text in files.items()
+        atomic_file.read(place / name) == text.encode() for name, text in files.items()
     )
 
 
@@ -162,7 +162,7 @@ class _Search:
             await unit.identity.check(unit.bus, judged=False)
             self._kept.requests += 1
             try:
-                came = await words.read_words(unit, group << 8 | first, count)
+                came = await raw_words.read_words(unit, group << 8 | first, count)
             except Refused as error:
                 if error.name == _LOCKED:
                     raise
@@ -182,7 +182,7 @@ class _Search:
         """Whether the drive answers at all: then it is one number that it is silent about."""
         self._kept.requests += 1
         try:
-            await words.read_words(self._unit, group << 8 | _BEYOND)
+            await raw_words.read_words(self._unit, group << 8 | _BEYOND)
         except (NoAnswer, BadAnswer):
             return False
         except Refused:

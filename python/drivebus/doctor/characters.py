@@ -11,7 +11,7 @@ from drivebus.errors import BadAnswer, NoAnswer, NotAllowed, Refused
 from drivebus.identify import codes
 from drivebus.line.seven_bits import SevenBits, agreed, seen_in
 from drivebus.line.stats import noisy
-from drivebus.searching.settings import Settings
+from drivebus.line_search.settings import Settings
 
 __all__ = ["SEVEN_BITS", "asked_of", "of_settings", "of_unit"]
 

@@ -13,19 +13,19 @@ from dataclasses import dataclass, field, replace
 from drivebus import checks
 from drivebus.bus import Bus
 from drivebus.doctor.adapter import adapter_findings, port_finding
+from drivebus.doctor.bus_noise import OTHER_MASTER, UNKNOWN, heard, overheard
 from drivebus.doctor.characters import asked_of, of_settings
 from drivebus.doctor.findings import Finding
 from drivebus.doctor.foreign import is_foreign, of_drive, speaker
 from drivebus.doctor.hints import hint_findings
-from drivebus.doctor.presence import found_elsewhere, look, nobody, units_to_ask, whole
-from drivebus.doctor.traffic import OTHER_MASTER, UNKNOWN, heard, overheard
 from drivebus.doctor.unit import UnitExamination
+from drivebus.doctor.unit_scan import found_elsewhere, look, nobody, units_to_ask, whole
 from drivebus.errors import PortError
 from drivebus.identify.results import Found
 from drivebus.line.addresses import Addresses
+from drivebus.line_search.order import candidates
+from drivebus.line_search.settings import Settings, can_be_changed
 from drivebus.profile import Profile
-from drivebus.searching.order import candidates
-from drivebus.searching.settings import Settings, can_be_changed
 
 __all__ = ["Examination", "examine"]
 

@@ -9,7 +9,7 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import NoAnswer
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
-from drivebus.searching.settings import Settings
+from drivebus.line_search.settings import Settings
 
 __all__ = ["OTHER_PROTOCOL", "is_foreign", "of_drive", "speaker"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drivebus.advice import Text
 from drivebus.bus import Bus
 from drivebus.doctor.drive import DriveExamination
-from drivebus.doctor.echoes import Echoes
+from drivebus.doctor.echo_test import Echoes
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import DrivebusError, NotAllowed
 from drivebus.identify.results import Found

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from drivebus.identify import codes
-from drivebus.identify.answers import LOCKED, NO_FUNCTION, Answer, no_such_address, passes
 from drivebus.identify.harm import HALTS, families, halt_of, harms
+from drivebus.identify.refusals import LOCKED, NO_FUNCTION, Answer, no_such_address, passes
 from drivebus.identify.signatures import shows, signature_of
 from drivebus.profile import Profile
 

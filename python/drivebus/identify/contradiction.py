@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from drivebus import places
+from drivebus import tables
 from drivebus.advice import Advice, Text, argument
 from drivebus.identify import codes
-from drivebus.identify.answers import NO_FUNCTION, Answer, no_such_address
 from drivebus.identify.families import asked_as, one_of, shipped
+from drivebus.identify.refusals import NO_FUNCTION, Answer, no_such_address
 from drivebus.identify.signatures import signature_of
 from drivebus.profile import Profile, profiles
 
@@ -110,13 +110,13 @@ def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
     """What speaks against *profile* if the unit says that it lacks an address which each unit of it has."""
     if answer.exception is None or answer.address not in _must_have(profile):
         return None
-    table, _ = places.split(answer.address)
+    table, _ = tables.split(answer.address)
     no_function = table != "holding" and answer.exception == NO_FUNCTION
     if not no_function and not no_such_address(profile, answer.exception):
         return None
     what = "function" if no_function else "address"
     return Text(
-        f"it refuses {places.shown(answer.address)} (exception {answer.exception:02X}H: there is no such {what}), "
+        f"it refuses {tables.shown(answer.address)} (exception {answer.exception:02X}H: there is no such {what}), "
         "which each of those answers: see what it is (",
         Advice("identify", unit, f"bus.identify({unit})"),
         ") and name that",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable
 
-from drivebus import places
+from drivebus import tables
 from drivebus.profile import Profile, profiles
 from drivebus.values import Description
 
@@ -90,7 +90,7 @@ def _starts_or_keeps(profile: Profile, place: int) -> bool:
 
 def _both(profile: Profile, place: int) -> tuple[int, ...]:
     """*place*, and where it is read if it has the bit that says where a parameter is kept."""
-    table, address = places.split(place)
+    table, address = tables.split(place)
     plain = profile.plain_address(address) if table == "holding" else place
     return (place,) if plain == place else (place, plain)
 
@@ -109,7 +109,7 @@ def _row(profile: Profile, place: int) -> Description | None:
 
 def _may_have_parameter(profile: Profile, place: int) -> bool:
     """Whether *place* is where units of *profile* have parameters, by the rule of their addresses."""
-    table, _ = places.split(place)
+    table, _ = tables.split(place)
     return table == "holding" and _both(profile, place)[-1] >> 8 in profile.parameter_groups()
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivebus import places
+from drivebus import tables
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
-from drivebus.identify.answers import LOCKED, UNREACHED, answer_at, no_such_address
 from drivebus.identify.families import all_of, one_of, shipped
+from drivebus.identify.refusals import LOCKED, UNREACHED, answer_at, no_such_address
 from drivebus.identify.results import Certainty, Identification
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile
@@ -54,7 +54,7 @@ async def identify(ask: Ask, unit: int) -> Identification:
     told_by = [signatures.listed()[name] for name in candidates]
     telling = {place for signature in told_by for place in (*signature["answers"], *signature["refuses"])}
     seen = ", ".join(
-        f"{places.shown(place)} {'answered' if answered[place] else 'refused'}" for place in sorted(telling)
+        f"{tables.shown(place)} {'answered' if answered[place] else 'refused'}" for place in sorted(telling)
     )
     return Identification(
         unit,
@@ -106,7 +106,7 @@ async def _as_it_behaves(ask: Ask, found: Identification, place: int) -> Identif
             return found
         against = f"says {answer.word} at"
     reason = (
-        f"{found.reason}; but it {against} {places.shown(about.place)}, where such a drive has its state: "
+        f"{found.reason}; but it {against} {tables.shown(about.place)}, where such a drive has its state: "
         f"{place:04X}H may have another meaning"
     )
     return replace(found, certainty="unverified", reason=reason)

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivebus import places
+from drivebus import tables
 from drivebus.advice import Text
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, PortError, WrongDrive
 from drivebus.identify import codes
-from drivebus.identify.answers import Answer, answer_once, passes, tells_nothing
 from drivebus.identify.contradiction import contradiction, is_suspicious, other_signature
+from drivebus.identify.refusals import Answer, answer_once, passes, tells_nothing
 from drivebus.identify.signatures import shown_by, shows, signature_of
 from drivebus.line.asking import asking
 from drivebus.line.protocols import AwaitableBus
@@ -230,7 +230,7 @@ class SameUnit:
         told = {answer.address: self._shown(answer) for answer in answers}
         if len(told) == 1:
             return next(iter(told.values()))
-        return ", ".join(f"{places.shown(address)} {said}" for address, said in told.items())
+        return ", ".join(f"{tables.shown(address)} {said}" for address, said in told.items())
 
     def _shown(self, answer: Answer) -> str:
         if answer.word is None:

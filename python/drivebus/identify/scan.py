@@ -14,8 +14,8 @@ from collections.abc import Awaitable, Callable, Iterable
 
 from drivebus import checks
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused
-from drivebus.identify.choose import usable
 from drivebus.identify.identify import identify
+from drivebus.identify.profile_choice import usable
 from drivebus.identify.results import Found
 from drivebus.line import huanyang
 from drivebus.line.addresses import Addresses

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Iterable
 
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.identify.answers import Answer, answer_at, passes
+from drivebus.identify.refusals import Answer, answer_at, passes
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile, profiles
 

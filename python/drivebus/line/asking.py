@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, overload
 
-from drivebus import places
+from drivebus import tables
 
 __all__ = ["Ask", "Asks", "Read", "Stamped", "Write", "asking"]
 
@@ -38,7 +38,7 @@ class Read:
     @classmethod
     def at(cls, unit: int, place: int, count: int = 1, *, urgent: bool = False, verify: bool = False) -> Read:
         """Of *count* from *place* on, which has the table in it."""
-        table, address = places.split(place)
+        table, address = tables.split(place)
         return cls(unit, address, count, table, urgent, verify)
 
 

@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar, overload
 
 from drivebus.line.asking import Read, Stamped, Write
+from drivebus.line.blocking_requests import Requests
 from drivebus.line.protocols import BusProtocol, CountsHalts
-from drivebus.line.requests import Requests
 from drivebus.line.stats import Link
 
 __all__ = ["BlockingBus", "at_once"]

@@ -10,7 +10,7 @@ from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument
-from drivebus.line import ports
+from drivebus.line import port_urls
 from drivebus.line.addresses import Addresses
 from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
@@ -18,7 +18,7 @@ from drivebus.line.units import Units
 from drivebus.sim import Simulator, core_of, lasting_port
 
 if TYPE_CHECKING:
-    from drivebus.line.wire_file import WireFile
+    from drivebus.line.pcapng_trace import WireFile
 
 __all__ = ["BusFace", "BusOptions", "Opening", "check_trust"]
 
@@ -73,8 +73,8 @@ class Opening:
             "share": checks.one_of("share", share, ("auto", "own", "never")),
         }
         _check_together(port, self.keywords)
-        target = ports.resolve(port, line)
-        self.format = ports.format_of(target, line)
+        target = port_urls.resolve(port, line)
+        self.format = port_urls.format_of(target, line)
         self.simulator = target if isinstance(target, Simulator) else None
         self.owned = target if target is not port and not isinstance(target, str) else None
         if isinstance(target, Simulator):
@@ -98,7 +98,7 @@ def check_trust(profile: object, trust: object) -> None:
 
 
 def _wire_file(path: object, port: str, line: SerialFormat) -> WireFile:
-    from drivebus.line.wire_file import WireFile
+    from drivebus.line.pcapng_trace import WireFile
 
     return WireFile(path, port, line)
 

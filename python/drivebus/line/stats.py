@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
-from drivebus.named import Named
+from drivebus.attribute_mapping import Named
 
 __all__ = ["Latency", "Link", "ProgramStats", "Stats", "UnitStats", "noisy"]
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Protocol
 
-from drivebus import places, rtu
+from drivebus import rtu, tables
 from drivebus.errors import DrivebusError
 from drivebus.line import huanyang
 from drivebus.line.inside import wrong_inside
@@ -19,7 +19,7 @@ from drivebus.profile import Profile
 from drivebus.values import Choice, Description
 
 if TYPE_CHECKING:
-    from drivebus.line.wire_file import WireFile
+    from drivebus.line.pcapng_trace import WireFile
 
 __all__ = ["LOGGER", "Trace", "meaning"]
 
@@ -176,17 +176,17 @@ def _read_from(asked: bytes | None, answer: rtu.Frame) -> int | None:
 def _count(request: rtu.Frame, answer: rtu.Frame) -> int | None:
     """How many *answer* brings of what was asked: an answer of bits fills its last byte."""
     asked, came = request.count or 0, answer.count or 0
-    fills = request.table in places.BITS and asked <= came < asked + 8
+    fills = request.table in tables.BITS and asked <= came < asked + 8
     return asked if fills else answer.count
 
 
 def _place(fields: rtu.Frame) -> int:
-    return places.place(fields.table, fields.address or 0)
+    return tables.place(fields.table, fields.address or 0)
 
 
 def _names(first: int, count: int, profile: Profile | None, *, written: bool = False) -> str:
     """What stands at *count* addresses from *first* on."""
-    where = places.shown(first) if count == 1 else f"{count} {_many(first)} at {places.split(first)[1]:04X}H"
+    where = tables.shown(first) if count == 1 else f"{count} {_many(first)} at {tables.split(first)[1]:04X}H"
     rows = (_row(address, profile, written) for address in range(first, first + count))
     named = [_called(row) for row in rows if row is not None]
     if not named:
@@ -208,7 +208,7 @@ def _each(first: int, words: list[int], profile: Profile | None, written: bool) 
         row = _row(address, profile, written)
         count = 1 if row is None else min(row.words, len(words) - at)
         if profile is None or row is None:
-            yield f"{places.shown(address)} = {word}"
+            yield f"{tables.shown(address)} = {word}"
         else:
             yield f"{_called(row)} = {_value(row, words[at : at + count], profile)}"
         at += count
@@ -240,7 +240,7 @@ def _asked_for(asked: bytes | None) -> int | None:
 
 
 def _many(place: int) -> str:
-    table, _ = places.split(place)
+    table, _ = tables.split(place)
     return {"coil": "coils", "discrete": "discrete inputs", "input": "input registers"}.get(table, "words")
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Mapping, Sequence
 
-from drivebus import places
+from drivebus import tables
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
@@ -41,7 +41,7 @@ def _undefined(family: Profile, known: Mapping[int, str], unit: int, address: in
     codes = ", ".join(f"{code_text(code)} {name.replace('_', ' ')}" for code, name in sorted(known.items()))
     return BadArgument(
         Text(
-            f"{code_text(word)} at {places.shown(address)} is not a command of unit {unit}, which is known as "
+            f"{code_text(word)} at {tables.shown(address)} is not a command of unit {unit}, which is known as "
             f"{family.title}: its codes are {codes or 'not known'}; ",
             _HINT,
         ),
@@ -57,10 +57,10 @@ def _check_foreign(families: Sequence[Profile], unit: int, address: int) -> None
     if others is None or any(family.name_at(place) is not None for family in families for place in plain):
         return
     own = families[0].command_address
-    where = "is not known" if own is None else f"is {places.shown(own)}"
+    where = "is not known" if own is None else f"is {tables.shown(own)}"
     raise BadArgument(
         Text(
-            f"{places.shown(address)} is the command register of {others}; unit {unit} is known as "
+            f"{tables.shown(address)} is the command register of {others}; unit {unit} is known as "
             f"{families[0].title}, whose command register {where}; ",
             _HINT,
         ),
@@ -76,7 +76,7 @@ def _codes_at(family: Profile, address: int) -> Mapping[int, str] | None:
 
 def _plain(family: Profile, address: int) -> int:
     """*address* without what tells RAM from EEPROM."""
-    if places.split(address)[0] != "holding":
+    if tables.split(address)[0] != "holding":
         return address
     memory = family.memory()
     return address & ~(1 << (15 if memory is None else memory.bit))

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from drivebus.advice import Text, argument
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, WrongDrive
-from drivebus.identify.answers import answer_at, answer_once
 from drivebus.identify.apart import Apart
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.harm import halt_of, harmed, harms
+from drivebus.identify.refusals import answer_at, answer_once
 from drivebus.line.asking import asking
 from drivebus.line.frames import may_be_of
 from drivebus.operations.unit import Unit

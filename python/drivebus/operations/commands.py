@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
-from drivebus import places
+from drivebus import tables
 from drivebus.errors import (
     LINE_ERRORS,
     BadAnswer,
@@ -22,7 +22,7 @@ from drivebus.errors import (
 )
 from drivebus.identify.harm import HALTS
 from drivebus.look import Look
-from drivebus.operations import setpoints, state, words
+from drivebus.operations import raw_words, setpoints, state
 from drivebus.operations.stop_proof import Fall
 from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
@@ -98,7 +98,7 @@ async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequenc
     before = unit.record.halts_begun
     await send_once(unit, name, *first)
     halted = Unconfirmed(
-        f"unit {unit.address} was told to stop when {first[1]} had been sent to {places.shown(first[0])}, "
+        f"unit {unit.address} was told to stop when {first[1]} had been sent to {tables.shown(first[0])}, "
         f"which comes before {name}; the rest of {name} was not sent",
         unit=unit.address,
     )
@@ -113,7 +113,7 @@ async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequenc
 async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
     try:
-        await words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
+        await raw_words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
     except NotReady as error:
         if error.why != "halted":
             raise

@@ -10,7 +10,7 @@ from drivebus import checks
 from drivebus.errors import level_of_the_program
 from drivebus.line.blocking import at_once
 from drivebus.operations import setpoints
-from drivebus.operations.face import DriveFace, unit_of
+from drivebus.operations.drive_base import DriveFace, unit_of
 
 __all__ = ["AwaitedFormerNames", "BlockingFormerNames"]
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
 from drivebus.identify.harm import harmed
 from drivebus.line.frames import may_be_of
-from drivebus.operations import commands, state, words
+from drivebus.operations import commands, raw_words, state
 from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
 from drivebus.operations.unit import Unit
 
@@ -219,7 +219,7 @@ class Halt:
         self.is_confirmed = True
         for address, code in (*(() if first is None else (first,)), profile.command(command)):
             try:
-                self.is_confirmed &= await words.send(
+                self.is_confirmed &= await raw_words.send(
                     unit, address, code, urgent=True, timeout=ANSWER_WITHIN, force=is_another
                 )
             except DrivebusError as error:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import functools
 
-from drivebus import places, rtu
+from drivebus import rtu, tables
 from drivebus.identify import codes
-from drivebus.identify.answers import Answer
 from drivebus.identify.contradiction import contradiction
+from drivebus.identify.refusals import Answer
 from drivebus.line.protocols import KeepsWills
+from drivebus.operations.raw_words import as_written
 from drivebus.operations.unit import Unit
-from drivebus.operations.words import as_written
 from drivebus.profile import Profile
 
 __all__ = ["LastWill"]
@@ -82,7 +82,7 @@ def _requests(profile: Profile, command: str) -> list[bytes]:
 
 
 def _write(profile: Profile, place: int, word: int) -> bytes:
-    table, address = places.split(place)
+    table, address = tables.split(place)
     if table == "coil":
         return bytes([_WRITE_COIL]) + address.to_bytes(2, "big") + (b"\xff\0" if word else b"\0\0")
     return _pdu(rtu.encode_write(_ANY, address, as_written(profile, word)))
@@ -100,7 +100,7 @@ def _look(profile: Profile) -> tuple[bytes, tuple[bytes, ...]] | None:
     at = next(iter(codes.registers()), None) if own is None else own
     if at is None or (own is None and profile.name_at(at) is not None):
         return None
-    table, address = places.split(at)
+    table, address = tables.split(at)
     function = _READ[table]
     others = [code for code in codes.listed() if contradiction(profile, 1, [Answer(at, code, None)]) is not None]
     question = bytes([function]) + address.to_bytes(2, "big") + b"\0\1"

@@ -11,7 +11,7 @@ from drivebus import checks
 from drivebus.advice import Advice, Text, call
 from drivebus.errors import BadArgument, NotReady, Unconfirmed
 from drivebus.look import Look
-from drivebus.operations import commands, control, setpoints, speed, start_checks, start_sequence, state
+from drivebus.operations import bus_control, commands, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
 from drivebus.operations.halting import WITHIN, Halt
@@ -85,7 +85,7 @@ async def run(
     raw = None if hz is None else await setpoints.word_of(unit, hz)
     before = await start_checks.ready_to_start(unit)
     if hz is not None:
-        await control.check_set(unit, unit.profile.needs("frequency"), "would not take its speed from the bus")
+        await bus_control.check_set(unit, unit.profile.needs("frequency"), "would not take its speed from the bus")
     await _start(unit, command, raw, reverse, before, confirm)
 
 

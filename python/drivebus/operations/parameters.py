@@ -13,8 +13,8 @@ from typing import NamedTuple, overload
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call, joined
 from drivebus.errors import BadArgument, DrivebusError, NotReady
-from drivebus.operations import registers, sending, state, variants
-from drivebus.operations.sending import Planned
+from drivebus.operations import parameter_writes, registers, state, unit_variants
+from drivebus.operations.parameter_writes import Planned, key
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import Description, Value
@@ -86,13 +86,13 @@ async def write(
     if not isinstance(name, Mapping) and value is None:
         raise BadArgument(f'no value is given for "{name}"; say write("{name}", value)')
     _check_deciding(unit, wanted)
-    unit = await variants.settled(unit.trusting(unverified), *wanted)
-    planned = [plan_write(unit, key, asked, store) for key, asked in wanted.items()]
+    unit = await unit_variants.settled(unit.trusting(unverified), *wanted)
+    planned = [plan_write(unit, each, asked, store) for each, asked in wanted.items()]
     await check_now(unit, planned)
     done: list[str] = []
     for run in _runs(unit, planned):
         try:
-            await sending.write(unit, run, store)
+            await parameter_writes.write(unit, run, store)
         except DrivebusError as error:
             if done and hasattr(error, "add_note"):
                 error.add_note(f"written before it: {', '.join(done)}")
@@ -121,12 +121,14 @@ def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
     if item.address != last.address + 1 or len(run) == profile.max_words or not profile.requests().joined:
         return False
     alone = unit.evidence.once(_alone)
-    if not all(_is_plain(unit, each) and sending.key(each.known) not in alone for each in (last, item)):
+    if not all(_is_plain(unit, each) and key(each.known) not in alone for each in (last, item)):
         return False
-    together = {sending.key(each.known) for each in (*run, item)}
-    narrows = any(sending.key(profile.describe(limit.other)) in together for limit in _limits(unit, item.known))
+    together = {key(each.known) for each in (*run, item)}
+    narrows = any(
+        key(profile.describe(limit.other)) in together for limit in _limits(unit, item.known)
+    )
     narrowed = any(
-        sending.key(profile.describe(limit.other)) == sending.key(item.known)
+        key(profile.describe(limit.other)) == key(item.known)
         for each in run
         for limit in _limits(unit, each.known)
     )
@@ -144,14 +146,14 @@ def _alone(evidence: Evidence) -> frozenset[str]:
     """Parameters that decide who commands the drive, or how the line is set."""
     profile = evidence.profile
     names = [*profile.serial_parameters(), *(need.code for need in profile.control())]
-    return frozenset(sending.key(profile.describe(name)) for name in names)
+    return frozenset(key(profile.describe(name)) for name in names)
 
 
 def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
     """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
-    for variant, rule in variants.rules(unit).items():
-        parameter = sending.key(unit.profile.describe(rule.parameter))
-        name = next((name for name in wanted if sending.key(unit.profile.describe(name)) == parameter), None)
+    for variant, rule in unit_variants.rules(unit).items():
+        parameter = key(unit.profile.describe(rule.parameter))
+        name = next((name for name in wanted if key(unit.profile.describe(name)) == parameter), None)
         if name is None:
             continue
         depends = next((other for other in wanted if unit.profile.describe(other).variant == variant), None)
@@ -230,17 +232,17 @@ async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
                 why="turning",
                 unit=unit.address,
             )
-    in_force = {sending.key(unit.profile.describe(name)): values[name] for name in others}
+    in_force = {key(unit.profile.describe(name)): values[name] for name in others}
     for item in planned:
         _check_range(unit, item, in_force)
-        in_force[sending.key(item.known)] = registers.value(unit, item.name, item.raw)
+        in_force[key(item.known)] = registers.value(unit, item.name, item.raw)
 
 
 def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> None:
     value = registers.value(unit, item.name, item.raw)
     for other, low in _limits(unit, item.known):
         narrow = unit.profile.describe(other)
-        limit = in_force.get(sending.key(narrow))
+        limit = in_force.get(key(narrow))
         if limit is None or (value >= limit if low else value <= limit):
             continue
         raise BadArgument(
@@ -258,7 +260,9 @@ def _limits(unit: Unit, known: Description) -> list[_Limit]:
     if known.kind == "parameter":
         have = {unit.profile.describe(limit.other).code for limit in limits}
         limits += [
-            limit for limit in unit.evidence.once(_narrowing).get(sending.key(known), ()) if limit.other not in have
+            limit
+            for limit in unit.evidence.once(_narrowing).get(key(known), ())
+            if limit.other not in have
         ]
     return limits
 
@@ -271,5 +275,7 @@ def _narrowing(evidence: Evidence) -> Mapping[str, Sequence[_Limit]]:
         if other.kind == "parameter":
             for bound, low in ((other.low_from, False), (other.high_from, True)):
                 if bound is not None:
-                    found.setdefault(sending.key(profile.describe(bound)), []).append(_Limit(sending.key(other), low))
+                    found.setdefault(key(profile.describe(bound)), []).append(
+                        _Limit(key(other), low)
+                    )
     return found

@@ -23,7 +23,7 @@ from types import FrameType
 
 from drivebus._native import begin_of_child, end_of_program
 from drivebus.errors import NotAllowed, NotReady
-from drivebus.operations.interruptions import Kept
+from drivebus.operations.deferred_signals import Kept
 
 __all__ = ["Guard", "before_start", "end_over"]
 

@@ -8,7 +8,7 @@ from typing import overload
 from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
-from drivebus.operations import variants, words
+from drivebus.operations import raw_words, unit_variants
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
@@ -54,12 +54,12 @@ async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bo
     """Reads *names* in the fewest requests, under one time stamp. *verify* and *unverified* as for `read`."""
     unit = unit.trusting(unverified)
     unit.evidence.reads(names)
-    unit = await variants.settled(unit, *names)
+    unit = await unit_variants.settled(unit, *names)
     plan = unit.profile.compile(names)
     answers: list[list[int]] = []
     started = ended = 0.0
     for place, count in plan.reads:
-        with words.explained(unit):
+        with raw_words.explained(unit):
             came, sent, ended = await unit.bus.ask_stamped(Read.at(unit.address, place, count, verify=verify))
         started = started if answers else sent
         answers.append(came)
@@ -88,13 +88,13 @@ def readable(unit: Unit, *names: str) -> list[str]:
         return list(unit.evidence.once(_monitored))
     unit.evidence.reads(names)
     for name in names:
-        if variants.is_open(unit, name):
+        if unit_variants.is_open(unit, name):
             variant = unit.profile.describe(name).variant or ""
-            rule = variants.rules(unit)[variant]
+            rule = unit_variants.rules(unit)[variant]
             raise BadArgument(
                 Text(
                     f"what {name} means depends on {rule.parameter} of unit {unit.address}: give ",
-                    variants.given(unit, variant),
+                    unit_variants.given(unit, variant),
                 ),
                 unit=unit.address,
             )
@@ -114,7 +114,7 @@ async def settled_profile(unit: Unit, *names: str, unverified: bool = False) -> 
         NotAllowed: An unknown name; or what decides its meaning is not verified, or says nothing known.
         NoAnswer, BadAnswer, Refused, PortError: The drive was only asked; nothing changed.
     """
-    return (await variants.settled(unit.trusting(unverified), *names)).profile
+    return (await unit_variants.settled(unit.trusting(unverified), *names)).profile
 
 
 async def contradiction(unit: Unit) -> str | None:
@@ -129,5 +129,5 @@ async def contradiction(unit: Unit) -> str | None:
 
 
 def _monitored(evidence: Evidence) -> Sequence[str]:
-    known, undecided = evidence.readable(evidence.profile.monitor_names()), evidence.once(variants.undecided)
+    known, undecided = evidence.readable(evidence.profile.monitor_names()), evidence.once(unit_variants.undecided)
     return [name for name in known if evidence.profile.describe(name).variant not in undecided]

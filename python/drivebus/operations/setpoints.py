@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from drivebus import checks
 from drivebus.errors import BadArgument
-from drivebus.operations import control, parameters, registers, sending, variants, words
+from drivebus.operations import bus_control, parameter_writes, parameters, raw_words, registers, unit_variants
 from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.values import Value
@@ -154,9 +154,9 @@ async def write_setpoint(
         return
     register = register_of(unit, name)
     planned = parameters.plan_write(unit, register, checks.number(name, value, -math.inf), False)
-    await control.check_heeded(unit, name, register)
+    await bus_control.check_heeded(unit, name, register)
     await parameters.check_now(unit, [planned])
-    await sending.write(unit, [planned], False)
+    await parameter_writes.write(unit, [planned], False)
 
 
 def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
@@ -178,7 +178,7 @@ def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
 
 async def with_setpoint(unit: Unit, setpoint: str) -> Unit:
     """The same unit, with everything fixed on which the meaning of *setpoint* depends."""
-    return await variants.settled(unit, register_of(unit, setpoint))
+    return await unit_variants.settled(unit, register_of(unit, setpoint))
 
 
 def register_of(unit: Unit, setpoint: str) -> str:
@@ -216,7 +216,7 @@ async def write_word(unit: Unit, word: int) -> None:
     """Writes the frequency, as the drive counts it."""
     register = register_of(unit, "frequency")
     read_back = unit.profile.read_back(register)
-    await words.write(unit, unit.profile.address(register), word, read_back=read_back, absolute=True)
+    await raw_words.write(unit, unit.profile.address(register), word, read_back=read_back, absolute=True)
 
 
 async def word_of(unit: Unit, hz: float) -> int:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.look import STANDSTILL
-from drivebus.operations import control, registers, words
+from drivebus.operations import bus_control, raw_words, registers
 from drivebus.operations.unit import Unit
 from drivebus.values import State, Value
 
@@ -38,7 +38,7 @@ async def frequencies(unit: Unit, *, urgent: bool) -> tuple[float | None, float]
 async def ramp(unit: Unit, *, urgent: bool) -> Ramp:
     """How a stop slows the motor down, and who else may, as the drive's parameters say it."""
     time, start = unit.profile.role("deceleration"), unit.profile.role("ramp_start")
-    wanted = control.wanted_for(unit, None)
+    wanted = bus_control.wanted_for(unit, None)
     codes = [row.code for row in wanted]
     readable = unit.evidence.readable([*codes, *(name for name in (time, start) if name)])
     try:
@@ -55,7 +55,7 @@ async def output_frequency(unit: Unit, *, urgent: bool = False) -> float | None:
     register = unit.profile.role("frequency")
     if register is None or unit.evidence.unreadable(register) is not None:
         return None
-    [word] = await words.read_words(unit, unit.profile.address(register), urgent=urgent)
+    [word] = await raw_words.read_words(unit, unit.profile.address(register), urgent=urgent)
     return abs(float(registers.value(unit, register, word)))
 
 
@@ -72,5 +72,5 @@ async def _told(unit: Unit, names: Sequence[str], *, urgent: bool) -> dict[str, 
     if not names:
         return {}
     plan = unit.profile.compile(names)
-    answers = [await words.read_words(unit, address, count, urgent=urgent) for address, count in plan.reads]
+    answers = [await raw_words.read_words(unit, address, count, urgent=urgent) for address, count in plan.reads]
     return dict(zip(plan.names, plan.values(answers), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import BadAnswer, BadLink, NoAnswer, NotReady, Refused
 from drivebus.look import Look
-from drivebus.operations import control, start_sequence, state
+from drivebus.operations import bus_control, start_sequence, state
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import ControlSource, State
@@ -66,7 +66,7 @@ async def prove_link(unit: Unit, force: bool) -> None:
 
 async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
     """How the drive stands. Raises `NotAllowed` where it would not start, or not obey the bus (*by_bus*)."""
-    await control.check_set(unit, control.wanted_always(unit), "has its words elsewhere")
+    await bus_control.check_set(unit, bus_control.wanted_always(unit), "has its words elsewhere")
     seen = await state.glance(unit)
     if seen.tripped:
         raise NotReady(
@@ -96,8 +96,8 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
             unit=unit.address,
         )
     if by_bus and seen.source is None:
-        left = [row for row in control.wanted_of_commands(unit) if not row.always]
-        await control.check_set(unit, left, "does not take its commands from the bus")
+        left = [row for row in bus_control.wanted_of_commands(unit) if not row.always]
+        await bus_control.check_set(unit, left, "does not take its commands from the bus")
     return seen
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
 from drivebus.look import Look
-from drivebus.operations import commands, state, words
+from drivebus.operations import commands, raw_words, state
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.facts import StartStep
@@ -66,7 +66,7 @@ class _Step:
         unit = self._unit
         address, _ = unit.profile.command(self._command)
         try:
-            await words.write(unit, address, self._step.word)
+            await raw_words.write(unit, address, self._step.word)
         except NotReady as error:
             if self._is_first or error.why != "halted":
                 raise

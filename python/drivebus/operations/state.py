@@ -13,7 +13,7 @@ from typing import NamedTuple
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
 from drivebus.look import Look
-from drivebus.operations import registers, words
+from drivebus.operations import raw_words, registers
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import ReadPlan
@@ -67,7 +67,7 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Look:
     answers: list[list[int]] = []
     first = 0.0
     for place, count in plan.plan.reads:
-        with words.explained(unit):
+        with raw_words.explained(unit):
             came, time, _ = await unit.bus.ask_stamped(Read.at(unit.address, place, count, urgent=urgent))
         first = first if answers else time
         answers.append(came)
@@ -100,7 +100,7 @@ async def state(unit: Unit, *, unverified: bool = False) -> State:
         NotAllowed: The family has no state word that is known, or verified. Nothing was sent.
     """
     unit = unit.trusting(unverified)
-    [word] = await words.read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
+    [word] = await raw_words.read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
     seen = state_of(unit, word)
     remember(unit, str(seen))
     return seen
@@ -118,7 +118,7 @@ async def ping(unit: Unit) -> None:
     roles = [unit.profile.role("state"), unit.profile.role("fault")]
     named = [*roles, *unit.profile.monitor_names(), *unit.profile.names()]
     for name in unit.evidence.readable(name for name in named if name is not None):
-        await words.read_words(unit, unit.profile.address(name))
+        await raw_words.read_words(unit, unit.profile.address(name))
         return
     raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 

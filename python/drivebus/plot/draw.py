@@ -12,7 +12,7 @@ from drivebus.plot.picture import Picture
 
 __all__ = ["check", "draw"]
 
-_BY = {".png": "still", ".svg": "still", ".html": "page"}
+_BY = {".png": "matplotlib_writer", ".svg": "matplotlib_writer", ".html": "plotly_writer"}
 
 
 def check(path: str | os.PathLike[str]) -> None:

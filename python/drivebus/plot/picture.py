@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from drivebus.errors import BadArgument
-from drivebus.plot.thin import thinned
+from drivebus.plot.downsample import thinned
 from drivebus.record.reading import Event, Recording
 from drivebus.record.table import moment
 

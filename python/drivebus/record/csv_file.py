@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from drivebus.record.appended import Appended
+from drivebus.record.append_file import Appended
 from drivebus.record.table import Row, Table
 
 __all__ = ["open_new"]

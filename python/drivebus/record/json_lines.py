@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drivebus.record.appended import Appended
+from drivebus.record.append_file import Appended
 from drivebus.record.table import FIXED, Row, Table, moment
 
 __all__ = ["open_new"]

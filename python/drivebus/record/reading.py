@@ -15,7 +15,7 @@ from typing import Any
 from drivebus import checks
 from drivebus._native import read_sheet
 from drivebus.errors import BadArgument, NotAllowed
-from drivebus.record.files import format_of
+from drivebus.record.formats import format_of
 from drivebus.record.table import FIXED, seconds_of
 
 __all__ = ["Event", "Recording", "read"]

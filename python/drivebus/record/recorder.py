@@ -13,17 +13,17 @@ from types import TracebackType
 from typing import Any
 
 from drivebus import _native, checks
-from drivebus.attributes import known_only
 from drivebus.bus import Bus
 from drivebus.drive import Drive, check_drive
 from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed
-from drivebus.line.samples import Names, Sample
-from drivebus.operations.face import DriveFace
+from drivebus.line.poll_samples import Names, Sample
+from drivebus.operations.drive_base import DriveFace
 from drivebus.poll import Poll, never_run
-from drivebus.record.events import Witness
-from drivebus.record.files import format_of
+from drivebus.record.formats import format_of
+from drivebus.record.gap_events import Witness
 from drivebus.record.series import Series
 from drivebus.record.table import Recorded, Table
+from drivebus.strict_attributes import known_only
 
 __all__ = ["Recorder"]
 

@@ -14,7 +14,7 @@ from time import time
 
 from drivebus.capture.standing import LOOK
 from drivebus.errors import DrivebusWarning, NotAllowed
-from drivebus.record.files import Sink, sink_for
+from drivebus.record.formats import Sink, sink_for
 from drivebus.record.table import Row, Table
 
 __all__ = ["Series"]

@@ -6,8 +6,8 @@ has told apart, `figures` counts them and says what they mean for the line, and 
 
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.families import Families
-from drivebus.sniffer.figures import Figures
-from drivebus.sniffer.listening import sniff
+from drivebus.sniffer.live import sniff
 from drivebus.sniffer.pairing import exchanges_in
+from drivebus.sniffer.statistics import Figures
 
 __all__ = ["Exchange", "Families", "Figures", "exchanges_in", "sniff"]

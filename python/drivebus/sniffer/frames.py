@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivebus import _native, places
+from drivebus import _native, tables
 
 __all__ = ["carried", "place_of", "written_by"]
 
@@ -27,7 +27,7 @@ def carried(answer: bytes, request: bytes) -> list[int] | None:
     if asked is None or answer[1] != request[1] or answer[1] not in _READS or not data:
         return None
     place, count = asked
-    if places.split(place)[0] not in places.BITS:
+    if tables.split(place)[0] not in tables.BITS:
         return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data) - 1, 2)]
     bits = int.from_bytes(data, "little")
     return [bits >> at & 1 for at in range(min(count, 8 * len(data)))]

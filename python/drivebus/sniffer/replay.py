@@ -16,7 +16,7 @@ from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.rtu import is_frame
 from drivebus.sniffer.exchange import Exchange
-from drivebus.sniffer.seen import Seen
+from drivebus.sniffer.register_history import Seen
 
 __all__ = ["Replay"]
 

@@ -8,15 +8,7 @@
 `samples` is what came of that, `figures` is the arithmetic over it, and `trials` are the functions that one calls.
 """
 
-from drivebus.trial.figures import (
-    RampFigures,
-    SineFigures,
-    StepFigures,
-    peak,
-    ramp_figures,
-    sine_figures,
-    step_figures,
-)
+from drivebus.trial.metrics import RampFigures, SineFigures, StepFigures, peak, ramp_figures, sine_figures, step_figures
 from drivebus.trial.samples import Samples
 from drivebus.trial.trials import Trial, ramp, sine, step
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from drivebus.drive import Drive
-from drivebus.trial.courses import Course, Wave
+from drivebus.trial.abort_rules import Bounds
 from drivebus.trial.samples import Samples
-from drivebus.trial.watching import Bounds
+from drivebus.trial.setpoint_courses import Course, Wave
 
 __all__ = ["Recording"]
 

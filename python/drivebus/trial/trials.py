@@ -10,19 +10,11 @@ from drivebus import checks
 from drivebus.advice import Text, argument
 from drivebus.drive import Drive, check_drive
 from drivebus.errors import BadArgument, NotAllowed
-from drivebus.trial.courses import Change, Wave
-from drivebus.trial.figures import (
-    RampFigures,
-    SineFigures,
-    StepFigures,
-    peak,
-    ramp_figures,
-    sine_figures,
-    step_figures,
-)
+from drivebus.trial.abort_rules import Bounds, Roles
+from drivebus.trial.metrics import RampFigures, SineFigures, StepFigures, peak, ramp_figures, sine_figures, step_figures
 from drivebus.trial.recording import Recording
 from drivebus.trial.samples import Samples
-from drivebus.trial.watching import Bounds, Roles
+from drivebus.trial.setpoint_courses import Change, Wave
 
 __all__ = ["Trial", "ramp", "sine", "step"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import click
 
 import drivebus
-from drivebus import places
+from drivebus import tables
 from drivebus.cli import names
 from drivebus.cli.advice import in_commands
 from drivebus.line.addresses import Addresses
@@ -95,7 +95,7 @@ def check_commands(request: Request) -> None:
         there = [family for family in families if address in family.command_registers()]
         if there and not any(word in family.command_registers()[address] for family in there):
             raise drivebus.BadArgument(
-                f"{word} at {places.shown(address)} is not a command of any family that has its command register there "
+                f"{word} at {tables.shown(address)} is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
                 "--profile the family is known; with --force it is sent all the same"
             )

@@ -19,7 +19,7 @@ from typing import Any
 
 import drivebus
 from drivebus.cli.advice import in_commands
-from drivebus.line.run_time import run_time_folder
+from drivebus.line.runtime_folder import run_time_folder
 
 __all__ = ["Order", "ask", "open_to_orders", "running"]
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Set
 
 from drivebus.advice import Advice, Text
 from drivebus.errors import NotReady
+from drivebus.operations.raw_words import read_words
 from drivebus.operations.unit import Unit
-from drivebus.operations.words import read_words
 from drivebus.profile.evidence import Evidence, not_verified
 from drivebus.profile.facts import Variant
 

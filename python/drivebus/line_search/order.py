@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from drivebus.line_search.settings import Settings
 from drivebus.profile import Profile, profiles
-from drivebus.searching.settings import Settings
 
 __all__ = ["LIKELY_UNITS", "candidates", "factory", "longest_delay"]
 

@@ -8,7 +8,7 @@ from drivebus.errors import BadAnswer
 from drivebus.line import huanyang
 from drivebus.line.frames import frames_in, in_words
 from drivebus.line.seven_bits import SevenBits, ascii_in
-from drivebus.searching.settings import Settings
+from drivebus.line_search.settings import Settings
 
 __all__ = ["OTHER_MASTER", "UNKNOWN", "heard", "overheard"]
 

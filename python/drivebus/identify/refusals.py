@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from drivebus import places
+from drivebus import tables
 from drivebus.errors import BadAnswer, Refused
 from drivebus.line.asking import Ask, Read
 from drivebus.profile import Profile, standard_means
@@ -98,7 +98,7 @@ async def answer_at(ask: Ask, unit: int, place: int) -> Answer:
                 continue
             if not decides:
                 raise BadAnswer(
-                    f"unit {unit} is busy, or gets requests damaged: it refused {places.shown(place)} with exception "
+                    f"unit {unit} is busy, or gets requests damaged: it refused {tables.shown(place)} with exception "
                     f"{error.code:02X}H {again + 1} times",
                     unit=unit,
                     request=error.request,

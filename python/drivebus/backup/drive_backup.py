@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from drivebus.backup.compare import Diff
+    from drivebus.backup.create import Progress
     from drivebus.backup.model import Backup
-    from drivebus.backup.report import Restoration
-    from drivebus.backup.taking import Progress
+    from drivebus.backup.results import Restoration
 
 __all__ = ["backup", "diff", "restore"]
 
@@ -56,11 +56,11 @@ async def backup(
         Refused: The drive is locked by a password.
         NoAnswer, BadAnswer, PortError: Nothing is answered any more; what was read until then is kept.
     """
-    from drivebus.backup import taking
+    from drivebus.backup import create
 
     resume, force = checks.flag("resume", resume), checks.flag("force", force)
     place = None if path is None else _path(path)
-    return await taking.take(unit.trusting(unverified), place, resume=resume, force=force, progress=progress)
+    return await create.take(unit.trusting(unverified), place, resume=resume, force=force, progress=progress)
 
 
 async def restore(
@@ -139,7 +139,7 @@ async def diff(
     """
     from dataclasses import replace
 
-    from drivebus.backup import taking
+    from drivebus.backup import create
     from drivebus.backup.compare import Side, compare, factory
     from drivebus.backup.reading import Reader
     from drivebus.backup.rules import Rules
@@ -150,7 +150,7 @@ async def diff(
         left = factory(unit.profile)
     else:
         kept = _kept(unit, backup, force)
-        others = [] if force else kept.origin.other(await taking.origin_of(unit))
+        others = [] if force else kept.origin.other(await create.origin_of(unit))
         if others:
             raise WrongDrive(
                 Text(

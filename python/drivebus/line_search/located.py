@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivebus.identify.choose import usable
+from drivebus.identify.profile_choice import usable
 from drivebus.identify.results import Identification
-from drivebus.searching.settings import Settings
+from drivebus.line_search.settings import Settings
 
 __all__ = ["Located", "Progress"]
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivebus.look import Look
-from drivebus.trial.courses import Course
+from drivebus.trial.setpoint_courses import Course
 
 __all__ = ["Bounds", "Roles"]
 

@@ -6,8 +6,8 @@
 The room is not called `search`, because the function is: a module of that name would take its place in the package.
 """
 
-from drivebus.searching.finder import Search, search
-from drivebus.searching.located import Located, Progress
-from drivebus.searching.settings import Settings
+from drivebus.line_search.finder import Search, search
+from drivebus.line_search.located import Located, Progress
+from drivebus.line_search.settings import Settings
 
 __all__ = ["Located", "Progress", "Search", "Settings", "search"]

@@ -9,7 +9,7 @@ from drivebus.checks import UNITS
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify.results import Found
-from drivebus.searching.settings import Settings
+from drivebus.line_search.settings import Settings
 
 __all__ = ["found_elsewhere", "look", "nobody", "units_to_ask", "whole"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import NotReady, Unconfirmed
-from drivebus.operations import parameters, registers, sending
+from drivebus.operations import parameter_writes, parameters, registers
 from drivebus.operations.by_name import by_name
 from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
@@ -66,7 +66,7 @@ async def prepare_control(
     wanted = wanted_for(unit, setpoint)
     needed = {}
     for row, item in zip(wanted, await _check_items(unit, wanted), strict=True):
-        if item.ok and not (store and sending.is_in_ram(unit, item.code)):
+        if item.ok and not (store and parameter_writes.is_in_ram(unit, item.code)):
             continue
         if item.actual is not None and row.by_hand:
             raise NotReady(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from drivebus import _native, checks, places
+from drivebus import _native, checks, tables
 from drivebus.errors import PortError, Refused
 from drivebus.line.asking import Read, Write
 from drivebus.line.write_guard import check_words
@@ -128,8 +128,8 @@ async def send(
         Whether the drive confirmed it; False where it only said that it took it and is still at it.
     """
     value = as_written(unit.profile, value)
-    table, first = places.split(address)
-    shown_at = None if read_back is None else places.split(read_back)[1]
+    table, first = tables.split(address)
+    shown_at = None if read_back is None else tables.split(read_back)[1]
     try:
         with explained(unit):
             await unit.bus.ask(
@@ -187,7 +187,7 @@ def _asked(request: bytes) -> str:
     if touched is None:
         return "the request"
     place, count, words = touched
-    address, table = places.shown(place), places.split(place)[0]
+    address, table = tables.shown(place), tables.split(place)[0]
     if words is None and table == "holding":
         return f"to read {count} word{'s' if count != 1 else ''} at {address}"
     if words is None:

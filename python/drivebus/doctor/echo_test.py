@@ -13,8 +13,8 @@ from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import BadAnswer, CrcError, DrivebusError, NoAnswer, Refused
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.seven_bits import agreed, seen_in
+from drivebus.line_search.settings import Settings
 from drivebus.rtu import is_frame
-from drivebus.searching.settings import Settings
 
 __all__ = ["Echoes"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivebus.line.samples import Sample
+from drivebus.line.poll_samples import Sample
 from drivebus.record.table import Recorded, Row, Table
 
 __all__ = ["Witness"]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from drivebus.advice import Advice, Text
 from drivebus.errors import LINE_ERRORS, Refused, StoreWarning, level_of_the_program
-from drivebus.operations import registers, words
+from drivebus.operations import raw_words, registers
 from drivebus.operations.unit import Unit
 from drivebus.values import Description
 
@@ -42,7 +42,7 @@ async def write(unit: Unit, run: Sequence[Planned], store: bool) -> None:
         await _send(unit, run, unit.profile.read_back(run[0].name))
         return
     # What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-    in_force = await words.read_words(unit, unit.profile.address(run[0].name), len(run))
+    in_force = await raw_words.read_words(unit, unit.profile.address(run[0].name), len(run))
     left: list[Planned] = []
     is_told = True
     for item, word in zip(run, in_force, strict=True):
@@ -67,10 +67,10 @@ async def _store(unit: Unit, run: Sequence[Planned], is_told: bool) -> None:
 
 async def _send(unit: Unit, run: Sequence[Planned], read_back: int | None) -> None:
     if len(run) == 1:
-        await words.write(unit, run[0].address, run[0].raw, read_back=read_back, absolute=True)
+        await raw_words.write(unit, run[0].address, run[0].raw, read_back=read_back, absolute=True)
         return
     try:
-        await words.write(unit, run[0].address, [item.raw for item in run], read_back=read_back, absolute=True)
+        await raw_words.write(unit, run[0].address, [item.raw for item in run], read_back=read_back, absolute=True)
     except Refused as error:
         # Whether a drive takes none of the words then, or those before the wrong one, is not printed.
         if hasattr(error, "add_note"):
@@ -82,7 +82,7 @@ async def _shown(unit: Unit, run: Sequence[Planned]) -> str:
     """What the drive shows of *run*, for people."""
     together = f"{', '.join(item.name for item in run)} shared that request"
     try:
-        shown = await words.read_words(unit, unit.profile.address(run[0].name), len(run))
+        shown = await raw_words.read_words(unit, unit.profile.address(run[0].name), len(run))
     except LINE_ERRORS as error:
         return f"{together}; what the drive took of it could not be read: {error}"
     values = (

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from drivebus.checks import UNITS
-from drivebus.searching.order import LIKELY_UNITS, candidates, factory
-from drivebus.searching.settings import Settings
+from drivebus.line_search.order import LIKELY_UNITS, candidates, factory
+from drivebus.line_search.settings import Settings
 
 __all__ = ["Plan"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from drivebus import _native, checks, places
+from drivebus import _native, checks, tables
 from drivebus.errors import BadArgument
 from drivebus.line.stats import Link
 from drivebus.line.units import Units
@@ -212,7 +212,7 @@ def read_of(
     known: Units, unit: int, address: int, count: int, table: object, urgent: object, verify: object
 ) -> tuple[int, int, int]:
     """What a read is of: unit, address and count. Raises `NotAllowed` where something is out of range."""
-    most = 125 if table == "holding" or checks.one_of("table", table, places.TABLES) not in places.BITS else 2000
+    most = 125 if table == "holding" or checks.one_of("table", table, tables.TABLES) not in tables.BITS else 2000
     unit, address = known.addresses.unit(unit), checks.address(address)
     count = checks.whole("count", count, 1, most)
     # Without a call for each of them where both are right.
@@ -257,7 +257,7 @@ def write_of(
     unit, address = known.addresses.unit(unit, changes=True), checks.address(address)
     words = checks.of_table(table, value)
     checks.flag("urgent", urgent)
-    known.check(unit, places.place(str(table), address), words, checks.flag("force", force))
+    known.check(unit, tables.place(str(table), address), words, checks.flag("force", force))
     return unit, address, words
 
 

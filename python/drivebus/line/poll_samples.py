@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
 
 from drivebus import _native, checks
+from drivebus.attribute_mapping import Named
 from drivebus.errors import BadArgument, DrivebusError, Refused
 from drivebus.line.addresses import Addresses
 from drivebus.line.units import units_of
-from drivebus.named import Named
 from drivebus.profile import Profile
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Value

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from drivebus import checks
 from drivebus.errors import BadArgument, NotAllowed
-from drivebus.operations import commands, control, setpoints, start_checks, words
+from drivebus.operations import bus_control, commands, raw_words, setpoints, start_checks
 from drivebus.operations.commands import A_WORD
 from drivebus.operations.unit import Unit
 from drivebus.values import Description
@@ -86,7 +86,7 @@ async def special_control(
 
 async def _word(unit: Unit, name: str) -> int:
     unit.evidence.reads([name])
-    [word] = await words.read_words(unit, unit.profile.address(name))
+    [word] = await raw_words.read_words(unit, unit.profile.address(name))
     return word
 
 
@@ -121,14 +121,14 @@ async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], forc
         await start_checks.prove_link(unit, checks.flag("force", force))
         # These words stand in for terminals, so the drive need not take its commands from the bus.
         await start_checks.ready_to_start(unit, by_bus=False)
-    await control.check_heeded(unit, setpoint, register)
+    await bus_control.check_heeded(unit, setpoint, register)
     # What can only be written tells nothing: there, what is not named is off.
     word = 0 if known.access == "wo" else await _word(unit, register)
     for mask, value in wanted:
         word = (word & ~mask) | (value * (mask & -mask) & mask)
     address = unit.profile.address(register)
     if not moves:
-        await words.write(unit, address, word, read_back=unit.profile.read_back(register))
+        await raw_words.write(unit, address, word, read_back=unit.profile.read_back(register))
         return
     unit.record.started_unverified |= unit.unverified
     await commands.send_once(unit, A_WORD, address, word)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivebus.advice import Text, argument
-from drivebus.backup import disk
+from drivebus.backup import atomic_file
 from drivebus.backup.model import Origin
 from drivebus.backup.unread import WHY, Unread
 from drivebus.errors import BadArgument, WrongDrive
@@ -68,7 +68,7 @@ class Kept:
             "identification": origin.identification,
         }
         kept = cls(path, whose, origin.taken)
-        if path is not None and resume and disk.is_there(path):
+        if path is not None and resume and atomic_file.is_there(path):
             kept._take(cls.of(path))
         # Whether it can be written there at all is known before the drive is asked for minutes.
         kept.keep()
@@ -81,7 +81,7 @@ class Kept:
         Raises:
             NotAllowed: It cannot be read.
         """
-        data = disk.read(path)
+        data = atomic_file.read(path)
         try:
             whole = json.loads(data)
             whose = dict(whole["discovery"])
@@ -119,12 +119,12 @@ class Kept:
             for group, one in self.groups.items()
         }
         whole = {"discovery": self.whose, "taken": self.taken.isoformat(), "requests": self.requests, "groups": groups}
-        disk.write(self.path, json.dumps(whole, indent=1) + "\n")
+        atomic_file.write(self.path, json.dumps(whole, indent=1) + "\n")
 
     def done(self) -> None:
         """Takes the file away."""
         if self.path is not None:
-            disk.remove(self.path)
+            atomic_file.remove(self.path)
 
     def _take(self, left: Kept) -> None:
         if left.whose != self.whose:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from drivebus._native import __version__
 from drivebus.advice import Text, argument
-from drivebus.backup import disk
+from drivebus.backup import atomic_file
 from drivebus.backup.model import Backup, Origin
 from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, refused
 from drivebus.errors import BadArgument, NotAllowed, Refused, WrongDrive
-from drivebus.operations import registers, sending, words
+from drivebus.operations import parameter_writes, raw_words, registers
 from drivebus.operations.unit import Unit
 
 __all__ = ["Progress", "origin_of", "take"]
@@ -66,7 +66,7 @@ async def _told(unit: Unit, name: str) -> int | None:
     address = unit.profile.address(name)
     for last in (False, True):
         try:
-            [word] = await words.read_words(unit, address)
+            [word] = await raw_words.read_words(unit, address)
         except Refused as error:
             if refused(unit.profile, error).why != "lost":
                 return None
@@ -100,7 +100,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     were_in_ram: frozenset[str] = frozenset()
     if path is not None:
         _check_old(path, origin, unit, force)
-        before = _begun(disk.part_of(path), origin, unit) if resume else None
+        before = _begun(atomic_file.part_of(path), origin, unit) if resume else None
         if before is not None:
             origin = replace(origin, taken=before.origin.taken)
             raw = {code: word for code, word in before.raw.items() if code in codes}
@@ -113,12 +113,12 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     total, done, steps = len(codes), len(raw), 0
 
     def taken(interrupted: bool) -> Backup:
-        in_ram = [code for code in raw if code in were_in_ram or sending.is_in_ram(unit, code)]
+        in_ram = [code for code in raw if code in were_in_ram or parameter_writes.is_in_ram(unit, code)]
         return Backup(origin, raw, unread, unit.profile, interrupted=interrupted, in_ram=in_ram)
 
     def keep() -> None:
         if path is not None:
-            taken(interrupted=True).save(disk.part_of(path))
+            taken(interrupted=True).save(atomic_file.part_of(path))
 
     # Whether it can be written there at all is known before the drive is asked for an hour.
     keep()
@@ -137,22 +137,22 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     except BaseException as error:
         keep()
         if path is not None and hasattr(error, "add_note"):
-            error.add_note(f"{len(raw)} of {total} parameters are in {disk.part_of(path)}; the rest follows")
+            error.add_note(f"{len(raw)} of {total} parameters are in {atomic_file.part_of(path)}; the rest follows")
         raise
     backup = taken(interrupted=False)
     if path is not None and not backup.complete:
-        backup.save(disk.part_of(path))
+        backup.save(atomic_file.part_of(path))
     elif path is not None:
         backup.save(path)
-        disk.remove(disk.part_of(path))
+        atomic_file.remove(atomic_file.part_of(path))
     return backup
 
 
 def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
-    if disk.is_there(path) and not path.is_file():
+    if atomic_file.is_there(path) and not path.is_file():
         raise BadArgument(f"{path} is not a file, and a backup cannot take its place; nothing was read")
-    if force or not disk.is_there(path):
+    if force or not atomic_file.is_there(path):
         return
     try:
         others = Backup.load(path, unit.profile).origin.other(origin, unit=True)
@@ -174,7 +174,7 @@ def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
 
 def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
     """What was read before a break, if it was read of this drive."""
-    if not disk.is_there(part):
+    if not atomic_file.is_there(part):
         return None
     try:
         before = Backup.load(part, unit.profile)
